@@ -1,0 +1,43 @@
+"""What goes wrong, in one line that says where and what to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class InputError(ValueError):
+    """Input that cannot be used: the message names the place and the cure in one line.
+
+    The command line prints the message and exits with status 2; nothing half-written is left.
+    """
+
+
+class BayeshapticWarning(UserWarning):
+    """Something a user should know, but that does not stop the work."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A sentence about the input or the result that belongs into the report.
+
+    Attributes
+    ----------
+    level : str
+        ``"note"`` for something to know, ``"warning"`` for something to act on.
+    topic : str
+        One word or two: what it is about, for example ``"feedback"`` or ``"units"``.
+    text : str
+        The sentence, with numbers and units, and what to do.
+    """
+
+    level: str
+    topic: str
+    text: str
+
+
+def describe(error: BaseException) -> str:
+    """One line that says what went wrong, for people: no traceback, no line breaks."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    text = " ".join(str(error).split())
+    return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"

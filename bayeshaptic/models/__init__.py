@@ -1,0 +1,35 @@
+"""Parameters and priors, mechanisms, the sampled response, and the rigid, free, grasped models."""
+
+from bayeshaptic.models.build import build_model, free, grasped, rigid
+from bayeshaptic.models.model import LinearEffect, Model
+from bayeshaptic.models.parameter import Parameter
+from bayeshaptic.models.prior import (
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    Normal,
+    Prior,
+    Uniform,
+    draw,
+    prior_from_table,
+)
+from bayeshaptic.models.system import LinearSystem
+
+__all__ = [
+    "HalfNormal",
+    "LinearEffect",
+    "LinearSystem",
+    "LogNormal",
+    "LogUniform",
+    "Model",
+    "Normal",
+    "Parameter",
+    "Prior",
+    "Uniform",
+    "build_model",
+    "draw",
+    "free",
+    "grasped",
+    "prior_from_table",
+    "rigid",
+]

@@ -1,0 +1,191 @@
+"""Building the rigid, free and grasped models: from a device file, or for an unknown device."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.models.model import Model
+from bayeshaptic.models.parameter import Parameter
+from bayeshaptic.models.prior import HalfNormal, LogNormal, Normal, Prior
+from bayeshaptic.models.structures import (
+    FREE,
+    GRASPED,
+    GROUND_DAMPERS,
+    HAND,
+    QUANTITIES,
+    RIGID,
+    STRUCTURES,
+    Structure,
+)
+
+if TYPE_CHECKING:
+    from bayeshaptic.devices import Device
+
+# How well a device file is believed, as log standard deviations: configurations, assembly and
+# above all people differ.
+DEVICE_LOG_SD = 0.5
+HAND_LOG_SD = 0.7
+# A damper to the ground may be zero: half-normal, at this multiple of the file's total.
+DAMPER_SCALE = 2.0
+# A free delay lies within a few periods.
+FREE_DELAY_PERIODS = 2.0
+
+
+def rigid(
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    period_s: float | None = None,
+    prior: Mapping[str, Prior] | None = None,
+) -> Model:
+    """One mass and one damper, G of the paper's (1).  For the parameters see `grasped`."""
+    return _build(RIGID, device, delay_s, delay_sd_s, period_s, prior)
+
+
+def free(
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    period_s: float | None = None,
+    prior: Mapping[str, Prior] | None = None,
+) -> Model:
+    """Two masses and a transmission, G1 of the paper's (3).  For the parameters see `grasped`."""
+    return _build(FREE, device, delay_s, delay_sd_s, period_s, prior)
+
+
+def grasped(
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    period_s: float | None = None,
+    prior: Mapping[str, Prior] | None = None,
+) -> Model:
+    """A user holds the device, H1 of the paper's (11): 11 parameters and the delay.
+
+    Parameters
+    ----------
+    device : str or Device, optional
+        Name of a device file, path to one, or a loaded one: gives values, priors around them,
+        period and delay.  Without it priors come from the data at the first fit.
+    delay_s : float, optional
+        Loop delay in seconds.  By default the device's; without a device it is free.
+    delay_sd_s : float, optional
+        Its standard deviation in seconds: 0 is a known delay, infinity a free one.
+    period_s : float, optional
+        Sampling period in seconds; by default the device's, else the recording's.
+    prior : mapping from name to Prior, optional
+        Your own priors; they replace those of the device.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    InputError
+        If the device is unknown, has no values for this model, or a number is out of range.
+    """
+    return _build(GRASPED, device, delay_s, delay_sd_s, period_s, prior)
+
+
+def build_model(
+    name: str,
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    period_s: float | None = None,
+    prior: Mapping[str, Prior] | None = None,
+) -> Model:
+    """The model called `name` ("rigid", "free", "grasped").  For the rest see `grasped`."""
+    if name not in STRUCTURES:
+        raise InputError(f"no model {name!r}; there are {', '.join(STRUCTURES)}.")
+    return _build(STRUCTURES[name], device, delay_s, delay_sd_s, period_s, prior)
+
+
+def device_priors(structure: Structure, values: Mapping[str, float]) -> dict[str, Prior]:
+    """Priors around a device file's `values`: log-normal, and half-normal for ground dampers."""
+    damping = sum(values[name] for name in structure.names if name in GROUND_DAMPERS)
+    priors: dict[str, Prior] = {}
+    for name in structure.names:
+        if name in GROUND_DAMPERS and damping > 0:
+            priors[name] = HalfNormal(DAMPER_SCALE * damping)
+        elif values[name] > 0:
+            priors[name] = LogNormal(values[name], HAND_LOG_SD if name in HAND else DEVICE_LOG_SD)
+        else:
+            raise InputError(f"the device file gives {name} = {values[name]}; it must be positive.")
+    return priors
+
+
+def delay_prior(delay_s: float | None, delay_sd_s: float | None, period_s: float) -> Prior | None:
+    """The prior of the loop delay; None where it is known."""
+    if delay_s is None or delay_sd_s == float("inf"):
+        return HalfNormal(FREE_DELAY_PERIODS * period_s)
+    return Normal(delay_s, delay_sd_s, low=0.0) if delay_sd_s else None
+
+
+def _build(
+    structure: Structure,
+    device: str | Device | None,
+    delay_s: float | None,
+    delay_sd_s: float | None,
+    period_s: float | None,
+    prior: Mapping[str, Prior] | None,
+) -> Model:
+    _check_numbers(delay_s, delay_sd_s, period_s)
+    if isinstance(device, str):
+        from bayeshaptic.devices import load_device
+
+        device = load_device(device)
+    parameters = [Parameter(name, *QUANTITIES[name]) for name in structure.names]
+    reference: dict[str, float] = {}
+    if device is not None:
+        reference = dict(_device_values(device, structure))
+        if reference:
+            priors = device_priors(structure, reference)
+            parameters = [replace(p, prior=priors[p.name]) for p in parameters]
+        if delay_s is None:
+            delay_s = device.delay_s
+            delay_sd_s = device.delay_sd_s if delay_sd_s is None else delay_sd_s
+        period_s = device.period_s if period_s is None else period_s
+    fixed: dict[str, float] = {}
+    if delay_s is not None and not delay_sd_s:
+        fixed["delay_s"] = delay_s
+    else:
+        belief = delay_prior(delay_s, delay_sd_s, period_s) if period_s else None
+        parameters.append(Parameter("delay_s", *QUANTITIES["delay_s"], prior=belief))
+        if delay_s is not None:
+            reference["delay_s"] = delay_s
+    rotational = device is not None and device.kind == "rotational"
+    model = Model(
+        structure,
+        tuple(parameters),
+        fixed,
+        period_s,
+        reference,
+        force_unit="Nm" if rotational else "N",
+        position_unit="rad" if rotational else "m",
+        device=device,
+    )
+    return model.with_prior(prior) if prior else model
+
+
+def _device_values(device: Device, structure: Structure) -> Mapping[str, float]:
+    """The device file's values for `structure`; a rigid device is the sum of the free one's parts."""
+    values = device.parameters.get(structure.name)
+    if values is None and structure is RIGID and "free" in device.parameters:
+        parts = device.parameters["free"]
+        values = {"m": parts["m1"] + parts["m2"], "b": parts["b1"] + parts["b2"]}
+    return {name: values[name] for name in structure.names} if values else {}
+
+
+def _check_numbers(delay_s: float | None, delay_sd_s: float | None, period_s: float | None) -> None:
+    for name, value in (("delay_s", delay_s), ("delay_sd_s", delay_sd_s)):
+        if value is not None and not value >= 0:
+            raise InputError(f"{name} is {value} s; give a number of seconds, zero or more.")
+    if period_s is not None and not 0 < period_s < 10:
+        raise InputError(
+            f"period_s is {period_s} s; give the sampling period in seconds, e.g. 1e-3."
+        )

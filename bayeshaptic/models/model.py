@@ -1,0 +1,195 @@
+"""A model: a base structure, its parameters with priors, the loop delay, and its effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.models.parameter import Parameter, unit_of
+from bayeshaptic.models.prior import Prior
+from bayeshaptic.models.structures import Structure
+from bayeshaptic.models.system import Complexes, Floats, LinearSystem
+
+if TYPE_CHECKING:
+    from bayeshaptic.devices import Device
+
+
+class LinearEffect(Protocol):
+    """A linear effect as a model sees it: parameters, and what they do to the system."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+
+    def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem: ...
+
+
+@dataclass(frozen=True)
+class Model:
+    """A parametric model of the sampled response from commanded force to motor position.
+
+    Attributes
+    ----------
+    structure : Structure
+        Rigid, free or grasped.
+    parameters : tuple of Parameter
+        What is inferred, in this order; the delay last, unless it is known.
+    fixed : mapping
+        Parameters that are known: name to value.
+    period_s : float or None
+        Sampling period; None until data say it.
+    reference : mapping
+        The device file's own values; empty without one.
+    force_unit, position_unit : str
+    device : Device or None
+    effects : tuple of LinearEffect
+    """
+
+    structure: Structure
+    parameters: tuple[Parameter, ...]
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    period_s: float | None = None
+    reference: Mapping[str, float] = field(default_factory=dict)
+    force_unit: str = "N"
+    position_unit: str = "m"
+    device: Device | None = None
+    effects: tuple[LinearEffect, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return self.structure.name
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def size(self) -> int:
+        return len(self.parameters)
+
+    @property
+    def stiffness_unit(self) -> str:
+        return unit_of("stiffness", self.force_unit, self.position_unit)
+
+    @property
+    def has_priors(self) -> bool:
+        """False while some priors are still to be set from the data."""
+        return all(parameter.prior is not None for parameter in self.parameters)
+
+    @property
+    def values(self) -> Floats:
+        """The device file's values of the parameters, shape (P,).
+
+        Raises
+        ------
+        InputError
+            Without a device file: there are no values before a fit.
+        """
+        missing = [name for name in self.names if name not in self.reference]
+        if missing:
+            raise InputError(
+                f"the {self.name} model has no values for {', '.join(missing)}: name a device "
+                '(device="lhifam"), or fit the model to a recording first.'
+            )
+        return np.array([self.reference[name] for name in self.names])
+
+    def parameter(self, name: str) -> Parameter:
+        return self.parameters[self.names.index(name)]
+
+    def prior(self, name: str) -> Prior:
+        prior = self.parameter(name).prior
+        if prior is None:
+            raise InputError(f"the prior of {name} is not set: fit the model to data first.")
+        return prior
+
+    def unit(self, name: str) -> str:
+        dimension = self.parameter(name).dimension
+        return unit_of(dimension, self.force_unit, self.position_unit)
+
+    def system(self, theta: ArrayLike) -> LinearSystem:
+        """The linear systems of parameter vectors `theta`, shape (B, P) or (P,)."""
+        theta = np.atleast_2d(np.asarray(theta, float))
+        if theta.shape[1] != self.size:
+            raise InputError(
+                f"the {self.name} model has {self.size} parameters ({', '.join(self.names)}), "
+                f"but {theta.shape[1]} were given."
+            )
+        values: dict[str, Floats] = dict(zip(self.names, theta.T, strict=True))
+        for name, value in self.fixed.items():
+            values[name] = np.full(len(theta), value)
+        system = LinearSystem(self.structure.build(values), values["delay_s"])
+        for effect in self.effects:
+            system = effect.apply(system, values)
+        return system
+
+    def response(
+        self, theta: ArrayLike, frequency_hz: ArrayLike, approximation: str = "exact"
+    ) -> Complexes:
+        """Sampled response from force to position.
+
+        Parameters
+        ----------
+        theta : array_like, shape (B, P) or (P,)
+            Parameters in the order of `names`, SI units.
+        frequency_hz : array_like, shape (L,)
+        approximation : {"exact", "continuous"}
+            "continuous" is the paper's P(s) e^{-s (td + T/2)}.
+
+        Returns
+        -------
+        ndarray of complex, shape (B, L) or (L,)
+            In `position_unit` over `force_unit`.
+        """
+        if self.period_s is None:
+            raise InputError("the model has no sampling period: give period_s, or a device.")
+        system = self.system(theta)
+        frequency_hz = np.asarray(frequency_hz, float)
+        if approximation == "exact":
+            response = system.sampled_response(frequency_hz, self.period_s)
+        elif approximation == "continuous":
+            response = system.continuous_approximation(frequency_hz, self.period_s)
+        else:
+            raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
+        return response[0] if np.ndim(theta) == 1 else response
+
+    def log_prior(self, theta: ArrayLike) -> Floats:
+        """Log prior density of parameter vectors of shape (B, P); shape (B,)."""
+        theta = np.atleast_2d(np.asarray(theta, float))
+        total = np.zeros(len(theta))
+        for name, column in zip(self.names, theta.T, strict=True):
+            total += self.prior(name).log_density(column)
+        return total
+
+    def with_period(self, period_s: float) -> Model:
+        return replace(self, period_s=period_s)
+
+    def with_prior(self, priors: Mapping[str, Prior]) -> Model:
+        """With other priors for the named parameters.
+
+        Raises
+        ------
+        InputError
+            If a name is not a parameter of this model.
+        """
+        unknown = sorted(set(priors) - set(self.names))
+        if unknown:
+            raise InputError(
+                f"no parameter {', '.join(unknown)} in the {self.name} model; it has "
+                f"{', '.join(self.names)}."
+            )
+        parameters = tuple(replace(p, prior=priors.get(p.name, p.prior)) for p in self.parameters)
+        return replace(self, parameters=parameters)
+
+    def with_effect(self, effect: LinearEffect) -> Model:
+        """With one more linear effect, whose parameters come before the delay's."""
+        own = tuple(p for p in self.parameters if p.name != "delay_s")
+        delay = tuple(p for p in self.parameters if p.name == "delay_s")
+        parameters = own + tuple(effect.parameters) + delay
+        return replace(self, parameters=parameters, effects=(*self.effects, effect))

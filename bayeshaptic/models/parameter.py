@@ -1,0 +1,67 @@
+"""A parameter: its name, what it is, its unit and its prior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bayeshaptic.models.prior import Prior
+
+_UNITS = {
+    ("N", "m"): {"mass": "kg", "damping": "N s/m", "stiffness": "N/m", "force": "N"},
+    ("Nm", "rad"): {
+        "mass": "kg m^2",
+        "damping": "N m s/rad",
+        "stiffness": "N m/rad",
+        "force": "N m",
+    },
+}
+
+
+def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
+    """The unit of a quantity, for a force in `force_unit` and a position in `position_unit`.
+
+    Parameters
+    ----------
+    dimension : str
+        "mass", "damping", "stiffness", "force", "position", "time", "frequency", "number", or
+        "cubic_stiffness" (force over position cubed).
+    force_unit : {"N", "Nm", "A"}
+        Without a torque constant a force is in amperes, and so a mass is in A s^2/rad.
+    position_unit : {"m", "rad"}
+    """
+    plain = {"time": "s", "frequency": "Hz", "number": "", "position": position_unit}
+    if dimension in plain:
+        return plain[dimension]
+    known = _UNITS.get((force_unit, position_unit), {})
+    if dimension in known:
+        return known[dimension]
+    force = "N m" if force_unit == "Nm" else force_unit
+    return {
+        "mass": f"{force} s^2/{position_unit}",
+        "damping": f"{force} s/{position_unit}",
+        "stiffness": f"{force}/{position_unit}",
+        "cubic_stiffness": f"{force}/{position_unit}^3",
+        "force": force,
+    }[dimension]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number that the data and the prior decide.
+
+    Attributes
+    ----------
+    name : str
+        For example ``"kc"``.
+    dimension : str
+        What kind of quantity it is; with the units of force and position it gives the unit.
+    title : str
+        What it is, in words.
+    prior : Prior or None
+        None where the prior is to be set from the data (a device without a device file).
+    """
+
+    name: str
+    dimension: str
+    title: str
+    prior: Prior | None = None

@@ -1,0 +1,222 @@
+"""Prior densities of one parameter each, in its natural (physical) value.
+
+Each prior also names the coordinate in which the parameter is sampled: ``"log"`` for quantities
+that are positive and known up to a factor, ``"linear"`` for those that may be zero (dampers).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr, ndtri
+
+from bayeshaptic.errors import InputError
+
+Floats = NDArray[np.float64]
+_LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
+
+
+@runtime_checkable
+class Prior(Protocol):
+    """What every prior offers: density, quantiles, support, and the coordinate to sample in."""
+
+    @property
+    def coordinate(self) -> str: ...
+
+    @property
+    def support(self) -> tuple[float, float]: ...
+
+    def log_density(self, x: ArrayLike) -> Floats: ...
+
+    def quantile(self, p: ArrayLike) -> Floats: ...
+
+    def describe(self, unit: str) -> str: ...
+
+
+def draw(prior: Prior, rng: np.random.Generator, size: int) -> Floats:
+    """`size` independent draws from `prior`, by inversion."""
+    return prior.quantile(rng.uniform(size=size))
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """log(x) is normal around log(median) with standard deviation `log_sd`."""
+
+    median: float
+    log_sd: float
+    coordinate = "log"
+    support = (0.0, np.inf)
+
+    def __post_init__(self) -> None:
+        if not (self.median > 0 and self.log_sd > 0):
+            raise InputError(f"LogNormal needs median > 0 and log_sd > 0, got {self}.")
+
+    def log_density(self, x: ArrayLike) -> Floats:
+        x = np.asarray(x, float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            log_x = np.log(x)
+            u = (log_x - np.log(self.median)) / self.log_sd
+            density = -0.5 * u * u - log_x - np.log(self.log_sd) - _LOG_SQRT_2PI
+        return np.where(x > 0, density, -np.inf)
+
+    def quantile(self, p: ArrayLike) -> Floats:
+        return self.median * np.exp(self.log_sd * ndtri(np.asarray(p, float)))
+
+    def describe(self, unit: str) -> str:
+        return f"log-normal, median {self.median:.4g} {unit}, factor {np.exp(self.log_sd):.3g} a sd"
+
+
+@dataclass(frozen=True)
+class HalfNormal:
+    """|z| with z normal around zero: for dampers, which may be zero."""
+
+    scale: float
+    coordinate = "linear"
+    support = (0.0, np.inf)
+
+    def __post_init__(self) -> None:
+        if not self.scale > 0:
+            raise InputError(f"HalfNormal needs scale > 0, got {self}.")
+
+    def log_density(self, x: ArrayLike) -> Floats:
+        x = np.asarray(x, float)
+        density = np.log(2 / self.scale) - _LOG_SQRT_2PI - 0.5 * (x / self.scale) ** 2
+        return np.where(x >= 0, density, -np.inf)
+
+    def quantile(self, p: ArrayLike) -> Floats:
+        return self.scale * ndtri(0.5 + 0.5 * np.asarray(p, float))
+
+    def describe(self, unit: str) -> str:
+        return f"half-normal from zero, scale {self.scale:.4g} {unit}"
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal around `mean`, cut off below `low` (by default not at all)."""
+
+    mean: float
+    sd: float
+    low: float = -np.inf
+    coordinate = "linear"
+
+    def __post_init__(self) -> None:
+        if not self.sd > 0:
+            raise InputError(f"Normal needs sd > 0, got {self}.")
+
+    @property
+    def support(self) -> tuple[float, float]:
+        return (self.low, np.inf)
+
+    @property
+    def _mass_below(self) -> float:
+        return float(ndtr((self.low - self.mean) / self.sd))
+
+    def log_density(self, x: ArrayLike) -> Floats:
+        x = np.asarray(x, float)
+        u = (x - self.mean) / self.sd
+        norm = np.log(self.sd) + _LOG_SQRT_2PI + np.log1p(-self._mass_below)
+        return np.where(x >= self.low, -0.5 * u * u - norm, -np.inf)
+
+    def quantile(self, p: ArrayLike) -> Floats:
+        below = self._mass_below
+        return self.mean + self.sd * ndtri(below + np.asarray(p, float) * (1 - below))
+
+    def describe(self, unit: str) -> str:
+        cut = f", not below {self.low:.4g}" if np.isfinite(self.low) else ""
+        return f"normal, {self.mean:.4g} +- {self.sd:.4g} {unit}{cut}"
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Every value between `low` and `high` alike."""
+
+    low: float
+    high: float
+    coordinate = "linear"
+
+    def __post_init__(self) -> None:
+        if not self.high > self.low:
+            raise InputError(f"Uniform needs low < high, got {self}.")
+
+    @property
+    def support(self) -> tuple[float, float]:
+        return (self.low, self.high)
+
+    def log_density(self, x: ArrayLike) -> Floats:
+        x = np.asarray(x, float)
+        inside = (x >= self.low) & (x <= self.high)
+        return np.where(inside, -np.log(self.high - self.low), -np.inf)
+
+    def quantile(self, p: ArrayLike) -> Floats:
+        return self.low + (self.high - self.low) * np.asarray(p, float)
+
+    def describe(self, unit: str) -> str:
+        return f"uniform from {self.low:.4g} to {self.high:.4g} {unit}"
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """Every factor between `low` and `high` alike."""
+
+    low: float
+    high: float
+    coordinate = "log"
+
+    def __post_init__(self) -> None:
+        if not 0 < self.low < self.high:
+            raise InputError(f"LogUniform needs 0 < low < high, got {self}.")
+
+    @property
+    def support(self) -> tuple[float, float]:
+        return (self.low, self.high)
+
+    def log_density(self, x: ArrayLike) -> Floats:
+        x = np.asarray(x, float)
+        inside = (x >= self.low) & (x <= self.high)
+        safe = np.where(inside, x, self.low)
+        return np.where(inside, -np.log(safe) - np.log(np.log(self.high / self.low)), -np.inf)
+
+    def quantile(self, p: ArrayLike) -> Floats:
+        return self.low * (self.high / self.low) ** np.asarray(p, float)
+
+    def describe(self, unit: str) -> str:
+        return f"log-uniform from {self.low:.4g} to {self.high:.4g} {unit}"
+
+
+_FORMS: dict[frozenset[str], type] = {
+    frozenset({"median", "log_sd"}): LogNormal,
+    frozenset({"scale"}): HalfNormal,
+    frozenset({"mean", "sd"}): Normal,
+    frozenset({"mean", "sd", "low"}): Normal,
+    frozenset({"low", "high"}): Uniform,
+}
+
+
+def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
+    """The prior that a ``[prior]`` table of a study declares for the parameter `name`.
+
+    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{mean, sd}`` (and ``low``) normal,
+    ``{low, high}`` uniform, and ``{low, high, log = true}`` log-uniform.
+
+    Raises
+    ------
+    InputError
+        If the keys fit none of these forms, or a value is not a number in range.
+    """
+    keys = dict(table)
+    log = keys.pop("log", False)
+    form = _FORMS.get(frozenset(keys))
+    if form is None:
+        raise InputError(
+            f"prior of {name}: keys {sorted(table)} fit no prior; use {{median, log_sd}}, {{scale}}, "
+            "{mean, sd}, {low, high} or {low, high, log = true}."
+        )
+    try:
+        numbers = {key: float(value) for key, value in keys.items()}  # type: ignore[arg-type]
+        return LogUniform(**numbers) if log and form is Uniform else form(**numbers)
+    except (TypeError, ValueError) as problem:
+        raise InputError(f"prior of {name}: {problem}") from None

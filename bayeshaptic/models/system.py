@@ -1,0 +1,128 @@
+"""Everything between the commanded force and the sampled position, for a batch of vectors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.models.mechanism import Mechanism
+from bayeshaptic.models.polynomial import Polynomial, evaluate, multiply
+from bayeshaptic.models.sampled import from_poles, from_polynomials
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+_CHUNK = 48  # vectors at a time: the arrays of one chunk stay in the cache
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A rational factor in the loop: actuator, sensor.  Polynomials of shape (degree + 1, B)."""
+
+    numerator: Polynomial
+    denominator: Polynomial
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """Mechanism, loop delay and filters of a batch of parameter vectors.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    delay_s : ndarray, shape (B,)
+    filters : tuple of Filter
+        Rational factors before or after the mechanism (they commute).
+    """
+
+    mechanism: Mechanism
+    delay_s: Floats
+    filters: tuple[Filter, ...] = ()
+
+    @property
+    def batch(self) -> int:
+        return self.mechanism.batch
+
+    def with_filter(self, numerator: Polynomial, denominator: Polynomial) -> LinearSystem:
+        return replace(self, filters=(*self.filters, Filter(numerator, denominator)))
+
+    def rows(self, index: slice | NDArray[np.bool_] | NDArray[np.int_]) -> LinearSystem:
+        """A part of the batch."""
+        mechanism = self.mechanism
+        links = tuple(
+            replace(link, damping=link.damping[index], stiffness=link.stiffness[index])
+            for link in mechanism.links
+        )
+        masses = tuple(mass[index] for mass in mechanism.masses)
+        filters = tuple(
+            Filter(f.numerator[:, index], f.denominator[:, index]) for f in self.filters
+        )
+        return replace(
+            self,
+            mechanism=replace(mechanism, masses=masses, links=links),
+            delay_s=self.delay_s[index],
+            filters=filters,
+        )
+
+    def transfer(self) -> tuple[Polynomial, Polynomial]:
+        """Numerator and denominator of the continuous response without the delay."""
+        numerator, denominator = self.mechanism.transfer()
+        for factor in self.filters:
+            numerator = multiply(numerator, factor.numerator)
+            denominator = multiply(denominator, factor.denominator)
+        return numerator, denominator
+
+    def poles(self) -> tuple[Complexes, Complexes]:
+        """Poles and residues of the continuous response without the delay, each of shape (B, n).
+
+        The residues assume simple poles; beside a double pole they blow up (`sampled_response`
+        does not use them there).
+        """
+        poles = [np.linalg.eigvals(self.mechanism.state_matrix()).astype(complex)]
+        for factor in self.filters:
+            poles.append(_roots(factor.denominator))
+        p = np.concatenate(poles, axis=1)
+        numerator, denominator = self.transfer()
+        gaps = p[:, :, None] - p[:, None, :]
+        gaps[:, np.arange(p.shape[1]), np.arange(p.shape[1])] = 1.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            residues = evaluate(numerator, p.T).T / (denominator[-1][:, None] * gaps.prod(axis=2))
+        return p, residues
+
+    def continuous_response(self, s: Complexes) -> Complexes:
+        """P(s) without hold and delay at points `s` of shape (L,); shape (B, L)."""
+        numerator, denominator = self.transfer()
+        points = np.asarray(s, complex)[:, None]
+        return (evaluate(numerator, points) / evaluate(denominator, points)).T
+
+    def continuous_approximation(self, frequency_hz: Floats, period_s: float) -> Complexes:
+        """P(s) e^{-s (td + T/2)}, the paper's stand-in for the sampled response; shape (B, L)."""
+        s = 2j * np.pi * np.asarray(frequency_hz, float)
+        return self.continuous_response(s) * np.exp(-s * (self.delay_s[:, None] + period_s / 2))
+
+    def sampled_response(self, frequency_hz: Floats, period_s: float) -> Complexes:
+        """The exact sampled response at frequencies of shape (L,); shape (B, L)."""
+        frequency_hz = np.asarray(frequency_hz, float)
+        out = np.empty((self.batch, len(frequency_hz)), complex)
+        for start in range(0, self.batch, _CHUNK):
+            rows = slice(start, min(start + _CHUNK, self.batch))
+            out[rows] = self._chunk_response(rows, frequency_hz, period_s)
+        return out
+
+    def _chunk_response(self, rows: slice, frequency_hz: Floats, period_s: float) -> Complexes:
+        part = self.rows(rows) if self.batch > _CHUNK else self
+        response, good = from_polynomials(*part.transfer(), part.delay_s, frequency_hz, period_s)
+        if not good.all():
+            bad = part.rows(~good)
+            response[~good] = from_poles(*bad.poles(), bad.delay_s, frequency_hz, period_s)
+        return response
+
+
+def _roots(polynomial: Polynomial) -> Complexes:
+    """Roots of a batch of polynomials by the companion matrix, shape (B, degree)."""
+    degree = len(polynomial) - 1
+    companion = np.zeros((polynomial.shape[1], degree, degree))
+    companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+    companion[:, :, -1] = -(polynomial[:-1] / polynomial[-1]).T
+    return np.linalg.eigvals(companion).astype(complex)

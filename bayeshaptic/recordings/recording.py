@@ -1,0 +1,86 @@
+"""A recording: commanded force and measured position, sampled every T seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayeshaptic.errors import InputError
+
+FORCE_UNITS = ("N", "Nm", "A")
+POSITION_UNITS = ("m", "rad")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One experiment: commanded force u[k] and motor position y[k], every T seconds.
+
+    The force u[k] is commanded at the instant of sample k and held until k + 1 (zero-order hold);
+    the position y[k] is read at that same instant, so the earliest answer to u[k] is y[k + 1].
+
+    Attributes
+    ----------
+    force : ndarray, shape (N,)
+        Commanded force, in `force_unit`.
+    position : ndarray, shape (N,)
+        Measured motor position, in `position_unit`.
+    period_s : float
+        Sampling period T in seconds.
+    force_unit : {"N", "Nm", "A"}
+        "A" where no force constant is known; stiffness is then in A/m or A/rad.
+    position_unit : {"m", "rad"}
+    name : str
+        What to call it in reports (the file's name by default).
+    device, user : str or None
+        Nobody holds the device where `user` is None.
+    configuration : float or str or None
+        A coordinate, or a name.
+    trial : int or str or None
+    level : float or None
+        Excitation level as declared.
+    encoder_resolution : float or None
+        One encoder count, in `position_unit`, where it is known.
+    time_jitter : float or None
+        Standard deviation of the recorded time steps over the period; None without time stamps.
+    source : Path or None
+        The file it was read from.
+    """
+
+    force: NDArray[np.float64] = field(repr=False)
+    position: NDArray[np.float64] = field(repr=False)
+    period_s: float
+    force_unit: str = "N"
+    position_unit: str = "m"
+    name: str = "recording"
+    device: str | None = None
+    user: str | None = None
+    configuration: float | str | None = None
+    trial: int | str | None = None
+    level: float | None = None
+    encoder_resolution: float | None = None
+    time_jitter: float | None = None
+    source: Path | None = None
+
+    @property
+    def kind(self) -> str:
+        """ "translational" or "rotational", by the unit of the position."""
+        return "rotational" if self.position_unit == "rad" else "translational"
+
+    @property
+    def samples(self) -> int:
+        return len(self.force)
+
+    @property
+    def duration_s(self) -> float:
+        return self.samples * self.period_s
+
+    @property
+    def stiffness_unit(self) -> str:
+        return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
+
+    def part(self, start: int, stop: int) -> Recording:
+        """The samples from `start` up to but without `stop`, as a recording of its own."""
+        return replace(self, force=self.force[start:stop], position=self.position[start:stop])
