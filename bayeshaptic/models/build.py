@@ -173,7 +173,7 @@ def _build(
 
 
 def _device_values(device: Device, structure: Structure) -> Mapping[str, float]:
-    """The device file's values for `structure`; a rigid device is the sum of the free one's parts."""
+    """The device file's values for `structure`; a rigid one is the sum of the free one's parts."""
     values = device.parameters.get(structure.name)
     if values is None and structure is RIGID and "free" in device.parameters:
         parts = device.parameters["free"]

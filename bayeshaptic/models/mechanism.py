@@ -77,7 +77,7 @@ class Mechanism:
         return matrix
 
     def transfer(self) -> tuple[Polynomial, Polynomial]:
-        """Numerator and denominator of position over force (for a chain: H1 of the paper's (11))."""
+        """Numerator and denominator of position over force (G, G1 and H1 of the paper)."""
         return self.transfer_to(self.measured)
 
     def transfer_to(self, mass: int) -> tuple[Polynomial, Polynomial]:
@@ -98,7 +98,7 @@ class Mechanism:
         return np.broadcast_to(sign * minor, (len(minor), self.batch)), denominator
 
     def state_matrix(self) -> Floats:
-        """The matrix A of (positions, velocities)' = A (positions, velocities), shape (B, 2n, 2n)."""
+        """A of d/dt (positions, velocities) = A (positions, velocities), shape (B, 2n, 2n)."""
         n = len(self.masses)
         stiffness = np.zeros((self.batch, n, n))
         damping = np.zeros((self.batch, n, n))

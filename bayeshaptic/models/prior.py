@@ -199,8 +199,8 @@ _FORMS: dict[frozenset[str], type] = {
 def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     """The prior that a ``[prior]`` table of a study declares for the parameter `name`.
 
-    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{mean, sd}`` (and ``low``) normal,
-    ``{low, high}`` uniform, and ``{low, high, log = true}`` log-uniform.
+    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{mean, sd}`` (and ``low``)
+    normal, ``{low, high}`` uniform, and ``{low, high, log = true}`` log-uniform.
 
     Raises
     ------
@@ -212,8 +212,8 @@ def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     form = _FORMS.get(frozenset(keys))
     if form is None:
         raise InputError(
-            f"prior of {name}: keys {sorted(table)} fit no prior; use {{median, log_sd}}, {{scale}}, "
-            "{mean, sd}, {low, high} or {low, high, log = true}."
+            f"prior of {name}: keys {sorted(table)} fit no prior; use {{median, log_sd}}, "
+            "{scale}, {mean, sd}, {low, high} or {low, high, log = true}."
         )
     try:
         numbers = {key: float(value) for key, value in keys.items()}  # type: ignore[arg-type]

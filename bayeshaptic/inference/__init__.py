@@ -1,0 +1,9 @@
+"""Likelihood, least squares, sampling, and the posterior."""
+
+from bayeshaptic.inference.arviz_io import load_posterior
+from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampler import sample
+
+__all__ = ["Fit", "Likelihood", "Posterior", "least_squares", "load_posterior", "sample"]

@@ -1,0 +1,189 @@
+"""The deterministic fit: weighted least squares from several starts (the paper's, section III)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
+from bayeshaptic.inference.gauss_newton import jacobian, minimise
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models import Model
+from bayeshaptic.models.start import informed, starting_points
+from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.windows import Windows, compress
+
+Floats = NDArray[np.float64]
+
+CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
+_REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
+_KEPT_STARTS = 24
+_REWINDOWINGS = 2
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A weighted least-squares fit.
+
+    Attributes
+    ----------
+    model : Model
+        With the priors, period and units that the fit used.
+    theta : ndarray, shape (P,)
+        Best parameters, natural values.
+    covariance : ndarray, shape (P, P)
+        In natural values, scaled by the reduced chi-square where that exceeds 1; nan in the rows
+        of parameters at a bound.
+    outcome : mapping
+        Name to "converged", "at a bound", or "prior-dominated" (the data alone say less than the
+        prior: the sd exceeds the prior's).
+    reduced_chi_square : float
+        1 where the residual is noise.
+    log_likelihood : float
+    windows : Windows
+        Compressed around this very fit.
+    frequency_hz : ndarray, shape (L,)
+    residual : complex ndarray, shape (L,)
+        Normalised deviations: E|.|^2 = 1 where the model is true.
+    starts : int
+        How many starting points ended within 0.5 of the best half chi-square, of those refined.
+    """
+
+    model: Model
+    theta: Floats
+    covariance: Floats
+    outcome: Mapping[str, str]
+    reduced_chi_square: float
+    log_likelihood: float
+    windows: Windows = field(repr=False)
+    frequency_hz: Floats = field(repr=False)
+    residual: NDArray[np.complex128] = field(repr=False)
+    starts: int = 0
+
+    @property
+    def sd(self) -> Floats:
+        """Standard deviations, shape (P,); nan for parameters at a bound."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def likelihood(self) -> Likelihood:
+        return Likelihood(self.model, self.windows)
+
+    def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
+        """The fitted sampled response, shape (L,)."""
+        return self.model.response(self.theta, frequency_hz)
+
+
+def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None = None) -> Fit:
+    """Fit `model` to `etfe` by weighted least squares from several starts.
+
+    The residual of every window is weighted by the noise that the window itself shows; priors only
+    bound the search (at six standard deviations).  The windows are compressed anew around each
+    fit, because only the ratio to a good first fit is smooth beside a resonance.
+
+    Parameters
+    ----------
+    model : Model
+    etfe : Etfe
+    seed : int
+        For the starting points.
+    start : ndarray, shape (P,), optional
+        Begin here and nowhere else.
+
+    Returns
+    -------
+    Fit
+    """
+    model = informed(model, etfe)
+    here = coordinates(model)
+    low, high = (here.coordinate(bound) for bound in reach(model, _REACH_SDS))
+    likelihood = Likelihood(model, compress(etfe))
+    residuals = weighted_residuals(likelihood, here)
+    if start is None:
+        points = starting_points(model, etfe, np.random.default_rng(seed))
+        phi = np.clip(here.coordinate(points), low, high)
+        phi, cost = _best_of_many(residuals, phi, low, high)
+        agreeing = int(np.sum(cost < cost.min() + 0.5))
+    else:
+        phi, agreeing = here.coordinate(np.atleast_2d(start)), 1
+        cost = np.zeros(1)
+    best = phi[[np.argmin(cost)]]
+    for _ in range(_REWINDOWINGS):
+        fitted = here.natural(best)[0]
+        windows = compress(etfe, lambda f, fitted=fitted: model.response(fitted, f))
+        likelihood = Likelihood(model, windows)
+        residuals = weighted_residuals(likelihood, here)
+        best, cost = minimise(residuals, best, low, high, steps=60, tolerance=1e-8)
+    return _summarise(likelihood, here, best[0], low, high, agreeing)
+
+
+def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[Floats], Floats]:
+    """Real residuals of unit variance, as a function of coordinates: (B, P) to (B, N)."""
+
+    def residuals(phi: Floats) -> Floats:
+        left = likelihood.normalised(here.natural(phi)).reshape(len(phi), -1)
+        return np.sqrt(2) * np.concatenate([left.real, left.imag], axis=1)
+
+    return residuals
+
+
+def _best_of_many(
+    residuals: Callable[[Floats], Floats], phi: Floats, low: Floats, high: Floats
+) -> tuple[Floats, Floats]:
+    """Sift the starting points, refine the better ones, converge the best."""
+    with np.errstate(all="ignore"):
+        cost = np.einsum("bn,bn->b", *(2 * [residuals(phi)]))
+    cost = np.where(np.isfinite(cost), cost, np.inf)
+    phi = phi[np.argsort(cost)[:_KEPT_STARTS]]
+    phi, cost = minimise(residuals, phi, low, high, steps=15, tolerance=1e-2)
+    phi = phi[np.argsort(cost)[:6]]
+    return minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
+
+
+def _summarise(
+    likelihood: Likelihood,
+    here: Coordinates,
+    phi: Floats,
+    low: Floats,
+    high: Floats,
+    agreeing: int,
+) -> Fit:
+    model, windows = likelihood.model, likelihood.windows
+    theta = here.natural(phi[None])
+    slope = jacobian(weighted_residuals(likelihood, here), phi[None])[0]
+    width = high - low
+    bound = (phi - low < 1e-6 * width) | (high - phi < 1e-6 * width)
+    chi_square = float(likelihood.reduced_chi_square(theta)[0])
+    covariance = np.full((model.size, model.size), np.nan)
+    inner = np.flatnonzero(~bound)
+    within = np.linalg.pinv(slope[:, inner].T @ slope[:, inner], hermitian=True)
+    stretch = np.where(here.log, theta[0], here.scale)[inner]
+    covariance[np.ix_(inner, inner)] = within * np.outer(stretch, stretch) * max(1.0, chi_square)
+    residual = likelihood.normalised(theta)[0].ravel()
+    return Fit(
+        model,
+        theta[0],
+        covariance,
+        _outcomes(model, theta[0], np.sqrt(np.diag(covariance)), bound),
+        chi_square,
+        float(likelihood(theta)[0]),
+        windows,
+        windows.frequency_hz.ravel(),
+        residual,
+        agreeing,
+    )
+
+
+def _outcomes(model: Model, theta: Floats, sd: Floats, bound: NDArray[np.bool_]) -> dict[str, str]:
+    outcome = {}
+    for i, name in enumerate(model.names):
+        prior = model.prior(name)
+        spread = 0.5 * float(prior.quantile(0.84) - prior.quantile(0.16))
+        if bound[i]:
+            outcome[name] = AT_BOUND
+        else:
+            outcome[name] = PRIOR_DOMINATED if sd[i] > spread else CONVERGED
+    return outcome

@@ -1,0 +1,135 @@
+"""The posterior: draws of the parameters, with what it takes to trust them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.inference.diagnostics import Diagnostics
+from bayeshaptic.models import Model
+from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.windows import Windows
+
+Floats = NDArray[np.float64]
+
+_DOMINATED = 0.5  # posterior sd over prior sd from which the prior decides
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Draws from the posterior of a model's parameters.
+
+    Attributes
+    ----------
+    model : Model
+    chains : ndarray, shape (ensembles, steps, walkers, P)
+        Natural values.
+    log_likelihood : ndarray, shape (ensembles, steps, walkers)
+        Up to a constant.
+    diagnostics : Diagnostics
+    converged : bool
+    message : str
+        Why it is, or is not, converged; in words and numbers.
+    seconds : float
+        Fit of the proposal and adaptation included.
+    seed : int
+    windows : Windows or None
+        What the likelihood was computed from.
+    etfe : Etfe or None
+        What was measured.
+    """
+
+    model: Model
+    chains: Floats = field(repr=False)
+    log_likelihood: Floats = field(repr=False)
+    diagnostics: Diagnostics
+    converged: bool
+    message: str
+    seconds: float
+    seed: int
+    windows: Windows | None = field(default=None, repr=False)
+    etfe: Etfe | None = field(default=None, repr=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.model.names
+
+    @cached_property
+    def draws(self) -> Floats:
+        """All draws, shape (n, P)."""
+        return self.chains.reshape(-1, self.chains.shape[-1])
+
+    @property
+    def effective(self) -> float:
+        """Smallest effective sample size, bulk or tail, of any parameter."""
+        return self.diagnostics.ess
+
+    @property
+    def rhat(self) -> Floats:
+        return self.diagnostics.rhat
+
+    @property
+    def ess_bulk(self) -> Floats:
+        return self.diagnostics.ess_bulk
+
+    @property
+    def ess_tail(self) -> Floats:
+        return self.diagnostics.ess_tail
+
+    def quantile(self, p: float | Floats) -> Floats:
+        """Quantiles of every parameter, shape (..., P)."""
+        return np.quantile(self.draws, p, axis=0)
+
+    @cached_property
+    def prior_dominated(self) -> Mapping[str, bool]:
+        """Name to whether the posterior is hardly narrower than the prior.
+
+        Compared in the coordinate of sampling, by the central 68 % ranges.
+        """
+        out = {}
+        for name, column in zip(self.names, self.draws.T, strict=True):
+            prior = self.model.prior(name)
+            log = prior.coordinate == "log"
+            own = np.quantile(column, [0.16, 0.84])
+            believed = prior.quantile([0.16, 0.84])
+            if log:
+                own, believed = np.log(own), np.log(believed)
+            out[name] = bool(np.ptp(own) > _DOMINATED * np.ptp(believed))
+        return out
+
+    def summary(self) -> dict[str, dict[str, Any]]:
+        """Mean, sd, quantiles, unit and diagnostics of every parameter, by name."""
+        q05, q50, q95 = self.quantile(np.array([0.05, 0.5, 0.95]))
+        return {
+            name: {
+                "mean": float(self.draws[:, i].mean()),
+                "sd": float(self.draws[:, i].std(ddof=1)),
+                "q05": float(q05[i]),
+                "q50": float(q50[i]),
+                "q95": float(q95[i]),
+                "unit": self.model.unit(name),
+                "ess_bulk": float(self.ess_bulk[i]),
+                "ess_tail": float(self.ess_tail[i]),
+                "rhat": float(self.rhat[i]),
+                "prior_dominated": self.prior_dominated[name],
+            }
+            for i, name in enumerate(self.names)
+        }
+
+    def to_arviz(self) -> Any:
+        """An ArviZ InferenceData (0.x) or DataTree (1.x): see `arviz_io`."""
+        from bayeshaptic.inference.arviz_io import to_arviz
+
+        return to_arviz(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as netCDF; `load_posterior` reads it back.  Never leaves half a file."""
+        from bayeshaptic.inference.arviz_io import save_posterior
+
+        return save_posterior(self, Path(path))
