@@ -1,0 +1,26 @@
+"""Critical stiffness and the rules beside it."""
+
+from bayeshaptic.stability.binding import BindingCrossing
+from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
+from bayeshaptic.stability.crossings import Crossings, find_crossings
+from bayeshaptic.stability.rules import (
+    ground_damping,
+    passivity_limit,
+    quantisation_limit,
+    rigid_limit,
+)
+from bayeshaptic.stability.spectral_radius import confirms, spectral_radius
+
+__all__ = [
+    "BindingCrossing",
+    "CriticalStiffness",
+    "Crossings",
+    "confirms",
+    "critical_stiffness",
+    "find_crossings",
+    "ground_damping",
+    "passivity_limit",
+    "quantisation_limit",
+    "rigid_limit",
+    "spectral_radius",
+]

@@ -1,0 +1,131 @@
+"""Which crossing binds: a kind by the shape of the motion, then groups by frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.models.polynomial import evaluate
+from bayeshaptic.models.system import LinearSystem
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+
+RIGID, AGAINST_HAND, MODE, NYQUIST, NEVER, NONE = range(6)
+_TITLES = {
+    RIGID: "rigid body",
+    AGAINST_HAND: "device against the hand",
+    MODE: "vibration mode",
+    NYQUIST: "Nyquist frequency",
+    NEVER: "unstable at any stiffness",
+    NONE: "no crossing",
+}
+_GAP = 0.1  # crossings of one kind further apart than 10 % are not the same
+_SHARE = 0.005  # and hold at least this share of the draws
+
+
+@dataclass(frozen=True)
+class BindingCrossing:
+    """One of the crossings that may set the limit.
+
+    Attributes
+    ----------
+    label : str
+        For example "vibration mode at 102 Hz".
+    frequency_hz : float or None
+        Median over the draws where it binds; None where the loop is never stable.
+    probability : float
+        Share of the draws where it binds.
+    """
+
+    label: str
+    frequency_hz: float | None
+    probability: float
+
+
+def binding_kinds(
+    system: LinearSystem, frequency_hz: Floats, period_s: float, hand: int | None = None
+) -> Ints:
+    """What moves at each binding crossing, shape (B,).
+
+    The masses' motions are compared with the motion of the measured one at the crossing: where all
+    go along with it the body is rigid, where one of them opposes it a vibration mode carries the
+    crossing.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    frequency_hz : ndarray, shape (B,)
+        Binding crossing; 0 where the loop is never stable, nan without a crossing.
+    period_s : float
+    hand : int or None
+        Number of the mass that is the user's hand.
+    """
+    mechanism = system.mechanism
+    s = (2j * np.pi * np.nan_to_num(frequency_hz)).astype(complex)
+    own = evaluate(mechanism.transfer()[0], s)
+    device_opposes = np.zeros(len(s), bool)
+    hand_opposes = np.zeros(len(s), bool)
+    for mass in range(len(mechanism.masses)):
+        opposes = (evaluate(mechanism.transfer_to(mass)[0], s) * np.conj(own)).real < 0
+        if mass == hand:
+            hand_opposes |= opposes
+        else:
+            device_opposes |= opposes
+    kinds = np.where(device_opposes, MODE, np.where(hand_opposes, AGAINST_HAND, RIGID))
+    kinds[frequency_hz > 0.5 / period_s * (1 - 1e-6)] = NYQUIST
+    kinds[frequency_hz == 0] = NEVER
+    kinds[np.isnan(frequency_hz)] = NONE
+    return kinds
+
+
+def group_crossings(kinds: Ints, frequency_hz: Floats) -> tuple[tuple[BindingCrossing, ...], Ints]:
+    """Groups of binding crossings, the most probable first, and each draw's group.
+
+    Parameters
+    ----------
+    kinds : ndarray of int, shape (n,)
+    frequency_hz : ndarray, shape (n,)
+
+    Returns
+    -------
+    crossings : tuple of BindingCrossing
+    group : ndarray of int, shape (n,)
+        Index into `crossings` for each draw.
+    """
+    found: list[tuple[BindingCrossing, Ints]] = []
+    for kind in np.unique(kinds):
+        members = np.flatnonzero(kinds == kind)
+        for part in _split(members, frequency_hz, len(kinds)):
+            median = float(np.median(frequency_hz[part]))
+            has_frequency = kind not in (NEVER, NONE)
+            place = f" at {median:.3g} Hz" if has_frequency else ""
+            crossing = BindingCrossing(
+                _TITLES[int(kind)] + place,
+                median if has_frequency else None,
+                len(part) / len(kinds),
+            )
+            found.append((crossing, part))
+    found.sort(key=lambda pair: -pair[0].probability)
+    group = np.empty(len(kinds), int)
+    for number, (_, part) in enumerate(found):
+        group[part] = number
+    return tuple(crossing for crossing, _ in found), group
+
+
+def _split(members: Ints, frequency_hz: Floats, draws: int) -> list[Ints]:
+    """Members of one kind, parted at wide gaps in frequency that leave enough on both sides."""
+    members = members[np.argsort(frequency_hz[members])]
+    frequency = frequency_hz[members]
+    least = max(_SHARE * draws, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        wide = np.flatnonzero(np.diff(np.log(frequency)) > _GAP) + 1
+    parts: list[Ints] = []
+    start = 0
+    for cut in wide.tolist():
+        if cut - start >= least and len(members) - cut >= least:
+            parts.append(members[start:cut])
+            start = cut
+    return [*parts, members[start:]]

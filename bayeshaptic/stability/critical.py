@@ -1,0 +1,210 @@
+"""The critical stiffness of a model, or its distribution over a posterior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.models.model import Model
+from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
+from bayeshaptic.stability.crossings import find_crossings, rational
+from bayeshaptic.stability.effective import effective_draws
+from bayeshaptic.stability.spectral_radius import confirms
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+
+ENOUGH_BELOW = 20  # effective draws below a stiffness that is called safe
+MOST_DRAWS = 60_000  # 0.1 % risk needs 20,000 effective draws
+_CHUNK = 4096
+_CHECKED = 64
+
+
+@dataclass(frozen=True)
+class CriticalStiffness:
+    """K_CR of each draw of a posterior, or of one model.
+
+    Attributes
+    ----------
+    samples : ndarray, shape (n,)
+        K_CR in `unit`; chains one after the other.  0 where the loop is unstable at any stiffness,
+        inf where nothing limits it.
+    frequency_hz : ndarray, shape (n,)
+        Of the binding crossing; 0 and nan where K_CR is 0 and inf.
+    unit : str
+        "N/m", "N m/rad", "A/m" or "A/rad".
+    crossings : tuple of BindingCrossing
+        Which crossing binds with what probability, the most probable first.
+    group : ndarray of int, shape (n,)
+        Index into `crossings`.
+    chains : int
+        Number of chains (walkers of all ensembles) that `samples` consists of.
+    checked, confirmed : int
+        Draws whose limit was checked by the spectral radius just below and above, and how many
+        of them hold.
+    notices : tuple of Notice
+    """
+
+    samples: Floats = field(repr=False)
+    frequency_hz: Floats = field(repr=False)
+    unit: str
+    crossings: tuple[BindingCrossing, ...]
+    group: Ints = field(repr=False)
+    chains: int = 1
+    checked: int = 0
+    confirmed: int = 0
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def value(self) -> float:
+        """K_CR of the one model; the median of a distribution."""
+        return float(self.quantile(0.5))
+
+    @property
+    def effective(self) -> float:
+        """Effective number of draws of K_CR (of its ranks), each walker a chain."""
+        ranks = np.unique(self.samples, return_inverse=True)[1]
+        return effective_draws(ranks.reshape(self.chains, -1))
+
+    def quantile(self, p: ArrayLike) -> Any:
+        """The stiffness that K_CR is below with probability `p`; a float, or an array as `p`."""
+        levels = np.asarray(p, float)
+        if np.isfinite(self.samples).all():
+            quantile = np.quantile(self.samples, levels)
+        else:  # nothing can be interpolated between a number and infinity
+            quantile = np.quantile(self.samples, levels, method="inverted_cdf")
+        return float(quantile) if levels.ndim == 0 else quantile
+
+    def db(self, p: ArrayLike = 0.5) -> Any:
+        """The same in decibels, 20 log10 of the number in `unit`."""
+        with np.errstate(divide="ignore"):
+            return 20 * np.log10(self.quantile(p))
+
+    def probability_unstable(self, stiffness: ArrayLike) -> Any:
+        """P(K_CR < stiffness), a float, or an array as `stiffness`."""
+        below = np.searchsorted(np.sort(self.samples), stiffness, side="left")
+        return below / len(self.samples)
+
+    def safe(self, risk: float) -> float | None:
+        """The stiffness that is unstable with probability `risk`.
+
+        None where fewer than 20 effective draws lie below it (or where there is one model only):
+        the number would be an accident of the draws.
+        """
+        stiffness = self.quantile(risk)
+        below = (self.samples < stiffness).reshape(self.chains, -1)
+        if effective_draws(below) * risk < ENOUGH_BELOW:
+            return None
+        return float(stiffness)
+
+    def tip(self, lever_m: float) -> CriticalStiffness:
+        """The same at the tip of a lever arm on a rotational device: K / lever^2, in N/m.
+
+        Raises
+        ------
+        InputError
+            If the device is not rotational, its force is not in N m, or the lever is not positive.
+        """
+        if self.unit != "N m/rad":
+            raise InputError(
+                f"a stiffness in {self.unit} has no tip; only one in N m/rad does: give the force "
+                "as a torque in N m and the position as an angle."
+            )
+        if not lever_m > 0:
+            raise InputError(f"lever_m is {lever_m}; give the lever arm in metres, above zero.")
+        return replace(self, samples=self.samples / lever_m**2, unit="N/m")
+
+
+def critical_stiffness(
+    source: Any,
+    theta: ArrayLike | None = None,
+    approximation: str = "exact",
+    max_draws: int = MOST_DRAWS,
+) -> CriticalStiffness:
+    """Critical stiffness of a model at its own values, of a fit, or of every draw of a posterior.
+
+    Parameters
+    ----------
+    source : Model, Fit or Posterior
+    theta : array_like, shape (n, P) or (P,), optional
+        With a model: the parameter vectors to use instead of its device file's.
+    approximation : {"exact", "continuous"}
+        "continuous" is the paper's P(s) e^{-s (td + T/2)}; it is not the truth of a sampled loop.
+    max_draws : int
+        A longer posterior is thinned, every so many steps of each chain.
+
+    Returns
+    -------
+    CriticalStiffness
+
+    Raises
+    ------
+    InputError
+        If the model has no values or no sampling period, or the approximation is unknown.
+
+    Notes
+    -----
+    K_CR is the smallest -1/Re G over all frequencies where the sampled response G is real and
+    negative, the Nyquist frequency included (I. Diaz and J. J. Gil, IEEE Transactions on Robotics
+    26(1), 2010, with an exact hold).
+    """
+    if approximation not in ("exact", "continuous"):
+        raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
+    model: Model = source if isinstance(source, Model) else source.model
+    vectors, chains = _vectors(source, theta, max_draws)
+    if model.period_s is None:
+        raise InputError("the model has no sampling period: give period_s, or a device.")
+    limit = _limits(model, vectors, model.period_s, approximation)
+    limit = replace(limit, chains=chains)
+    checkable = approximation == "exact" and rational(model.system(vectors[:1]))
+    return _checked(limit, model, vectors) if checkable else limit
+
+
+def _vectors(source: Any, theta: ArrayLike | None, max_draws: int) -> tuple[Floats, int]:
+    """Parameter vectors, chain after chain, and the number of chains."""
+    chains = getattr(source, "chains", None)
+    if theta is not None or chains is None:
+        if theta is None:
+            theta = source.values if isinstance(source, Model) else source.theta
+        vectors = np.atleast_2d(np.asarray(theta, float))
+        return vectors, len(vectors)
+    chains = np.asarray(chains)  # (E, S, W, P)
+    every = -(-chains[..., 0].size // max_draws)
+    kept = np.swapaxes(chains[:, every - 1 :: every], 1, 2)
+    return kept.reshape(-1, kept.shape[-1]), kept.shape[0] * kept.shape[1]
+
+
+def _limits(
+    model: Model, vectors: Floats, period_s: float, approximation: str
+) -> CriticalStiffness:
+    hand = 2 if model.name == "grasped" else None
+    parts = []
+    for start in range(0, len(vectors), _CHUNK):
+        system = model.system(vectors[start : start + _CHUNK])
+        found = find_crossings(system, period_s, approximation)
+        kinds = binding_kinds(system, found.binding_hz, period_s, hand)
+        parts.append((found.critical, found.binding_hz, kinds))
+    samples, frequency, kinds = (np.concatenate(part) for part in zip(*parts, strict=True))
+    crossings, group = group_crossings(kinds, frequency)
+    return CriticalStiffness(samples, frequency, model.stiffness_unit, crossings, group)
+
+
+def _checked(limit: CriticalStiffness, model: Model, vectors: Floats) -> CriticalStiffness:
+    """With draws at equal steps of probability checked against the closed loop's own poles."""
+    count = min(_CHECKED, len(vectors))
+    order = np.argsort(limit.samples)
+    pick = order[np.linspace(0, len(order) - 1, count).astype(int)]
+    assert model.period_s is not None
+    held = int(confirms(model.system(vectors[pick]), model.period_s, limit.samples[pick]).sum())
+    notices = limit.notices
+    if held < count:
+        text = (
+            f"for {count - held} of {count} checked draws the closed loop's poles do not confirm "
+            "the critical stiffness; do not rely on it."
+        )
+        notices = (*notices, Notice("warning", "critical stiffness", text))
+    return replace(limit, checked=count, confirmed=held, notices=notices)

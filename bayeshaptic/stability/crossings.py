@@ -1,0 +1,170 @@
+"""Every frequency at which the sampled response is real and negative."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.models.system import LinearSystem
+from bayeshaptic.stability.evaluated import EvaluableSystem, EvaluatedResponse
+from bayeshaptic.stability.grid import search_grid
+from bayeshaptic.stability.response import Response, pole_response
+from bayeshaptic.stability.roots import bracketed_roots
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+
+_CHUNK = 64  # rows at a time: the arrays of one chunk stay in the cache
+_DIP_POINTS = 17
+_DIP_ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """All crossings of a batch of loops, lowest stiffness first.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (B, C)
+        Where the response is real and negative; padded with nan.  1/(2T) is the Nyquist frequency.
+    stiffness : ndarray, shape (B, C)
+        -1/G there: the gain that puts a closed-loop pole on the unit circle at that frequency.
+    stable_at_rest : ndarray of bool, shape (B,)
+        False where the loop is unstable for every small K > 0.
+    """
+
+    frequency_hz: Floats
+    stiffness: Floats
+    stable_at_rest: NDArray[np.bool_]
+
+    @property
+    def critical(self) -> Floats:
+        """K_CR, shape (B,): the lowest crossing; 0 if never stable; inf without a crossing."""
+        lowest = np.where(np.isnan(self.stiffness[:, 0]), np.inf, self.stiffness[:, 0])
+        return np.where(self.stable_at_rest, lowest, 0.0)
+
+    @property
+    def binding_hz(self) -> Floats:
+        """Frequency of the binding crossing, shape (B,); 0 if never stable; nan without one."""
+        return np.where(self.stable_at_rest, self.frequency_hz[:, 0], 0.0)
+
+
+def find_crossings(
+    system: LinearSystem | EvaluableSystem, period_s: float, approximation: str = "exact"
+) -> Crossings:
+    """Every crossing of a batch of loops in (0, pi/T], the Nyquist frequency included.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        Mechanism, delay and filters of B parameter vectors.  A system with ``rational = False``
+        is searched on a fine grid, by its sampled response alone.
+    period_s : float
+    approximation : {"exact", "continuous"}
+        "continuous" looks at P(s) e^{-s (td + T/2)} instead, as the paper does.
+
+    Returns
+    -------
+    Crossings
+    """
+    exact = approximation == "exact"
+    response: Response
+    if isinstance(system, LinearSystem) and rational(system):
+        response = pole_response(system, period_s, exact)
+    else:
+        response = EvaluatedResponse(system, period_s, exact)
+    return search(response, period_s)
+
+
+def rational(system: LinearSystem | EvaluableSystem) -> bool:
+    """Whether the loop has finitely many poles; a system may say otherwise by itself."""
+    return bool(getattr(system, "rational", True))
+
+
+def search(response: Response, period_s: float) -> Crossings:
+    """Every crossing of `response`: scan, look into the dips, refine, add the real ends."""
+    batch = len(response.delay)
+    scans = [
+        _scan(response, slice(start, min(start + _CHUNK, batch)))
+        for start in range(0, batch, _CHUNK)
+    ]
+    row, low, high, s_low, s_high = (np.concatenate(part) for part in zip(*scans, strict=True))
+
+    def value(index: Ints, theta: Floats) -> Floats:
+        return _sine(response.at(row[index], theta[:, None])[:, 0])
+
+    theta = bracketed_roots(value, low, high, s_low, s_high)
+    gain = response.at(row, theta[:, None])[:, 0].real
+    static, nyquist = response.at_ends()
+    ends = np.arange(batch)
+    row = np.concatenate([row, ends, ends])
+    theta = np.concatenate([theta, np.zeros(batch), np.full(batch, np.pi)])
+    gain = np.concatenate([gain, static, nyquist])
+    with np.errstate(invalid="ignore"):
+        keep = (gain < 0) & np.isfinite(gain)
+    stiffness = -1.0 / gain[keep]
+    frequency = theta[keep] / (2 * np.pi * period_s)
+    return Crossings(*_padded(row[keep], stiffness, frequency, batch), response.stable_at_rest())
+
+
+def _sine(response: NDArray[np.complex128]) -> Floats:
+    """Im(-G)/|G|: the sine of how far the phase is from -180 degrees."""
+    return -response.imag / np.abs(response)
+
+
+def _scan(response: Response, rows: slice) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+    """Brackets (row, low, high, values there) of the sign changes of one chunk."""
+    theta = search_grid(response, rows)
+    index = np.arange(rows.start, rows.stop)
+    value = response.at(index, theta)
+    sine, negative = _sine(value), value.real < 0
+    change = np.signbit(sine[:, 1:]) != np.signbit(sine[:, :-1])
+    change &= negative[:, 1:] | negative[:, :-1]
+    i, k = np.nonzero(change)
+    found = (index[i], theta[i, k], theta[i, k + 1], sine[i, k], sine[i, k + 1])
+    size = np.abs(sine)
+    dip = (size[:, 1:-1] <= size[:, :-2]) & (size[:, 1:-1] < size[:, 2:])
+    dip &= negative[:, 1:-1] & ~change[:, 1:] & ~change[:, :-1]
+    i, k = np.nonzero(dip)
+    if not i.size:
+        return found
+    deeper = _dips(response, index[i], theta[i, k], theta[i, k + 2])
+    return tuple(np.concatenate(pair) for pair in zip(found, deeper, strict=True))  # type: ignore[return-value]
+
+
+def _dips(
+    response: Response, row: Ints, low: Floats, high: Floats
+) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+    """Pairs of sign changes hidden between grid points: zoom in where |sine| has a minimum."""
+    steps = np.linspace(0.0, 1.0, _DIP_POINTS)
+    found = []
+    for _ in range(_DIP_ROUNDS):
+        theta = low[:, None] + (high - low)[:, None] * steps
+        sine = _sine(response.at(row, theta))
+        change = np.signbit(sine[:, 1:]) != np.signbit(sine[:, :-1])
+        i, k = np.nonzero(change)
+        found.append((row[i], theta[i, k], theta[i, k + 1], sine[i, k], sine[i, k + 1]))
+        left = ~change.any(axis=1)
+        if not left.any():
+            break
+        row, theta, sine = row[left], theta[left], sine[left]
+        best = np.argmin(np.abs(sine), axis=1)
+        pick = np.arange(len(best))
+        low = theta[pick, np.maximum(best - 1, 0)]
+        high = theta[pick, np.minimum(best + 1, _DIP_POINTS - 1)]
+    return tuple(np.concatenate(part) for part in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def _padded(row: Ints, stiffness: Floats, frequency: Floats, batch: int) -> tuple[Floats, Floats]:
+    """Flat lists as arrays (B, C) of frequency and stiffness, lowest stiffness first."""
+    order = np.lexsort((stiffness, row))
+    row, stiffness, frequency = row[order], stiffness[order], frequency[order]
+    count = np.bincount(row, minlength=batch)
+    column = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    shape = (batch, max(int(count.max(initial=0)), 1))
+    frequency_table, stiffness_table = np.full(shape, np.nan), np.full(shape, np.nan)
+    frequency_table[row, column] = frequency
+    stiffness_table[row, column] = stiffness
+    return frequency_table, stiffness_table

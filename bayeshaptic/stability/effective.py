@@ -1,0 +1,43 @@
+"""How many independent draws a set of chains is worth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def effective_draws(chains: ArrayLike) -> float:
+    """Effective sample size of the mean, over chains of shape (C, S).
+
+    Each walker is a chain: walkers laid end to end would count as independent what is not.  Chains
+    of one step are independent draws and count as they are; so does a constant.
+
+    References
+    ----------
+    A. Vehtari et al., "Rank-normalization, folding, and localization: an improved R-hat",
+    Bayesian Analysis 16 (2021), equations (10)-(13), with Geyer's initial monotone sequence.
+    """
+    x = np.asarray(chains, float)
+    count, steps = x.shape
+    total = count * steps
+    if steps < 4 or np.ptp(x) == 0:
+        return float(total)
+    mean = x.mean(axis=1)
+    covariance = _mean_autocovariance(x - mean[:, None])
+    within = covariance[0] * steps / (steps - 1)
+    spread = within * (steps - 1) / steps + (np.var(mean, ddof=1) if count > 1 else 0.0)
+    correlation = 1 - (within - covariance * steps / (steps - 1)) / spread
+    correlation[0] = 1.0
+    pairs = correlation[: steps // 2 * 2].reshape(-1, 2).sum(axis=1)
+    ended = np.flatnonzero(pairs <= 0)
+    pairs = pairs[: ended[0] if ended.size else None]
+    time = 2 * np.minimum.accumulate(pairs).sum() - 1
+    return float(min(total / max(time, 1 / np.log10(total)), total * np.log10(total)))
+
+
+def _mean_autocovariance(centred: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Autocovariance (divided by S) at lags 0..S-1, averaged over the chains (C, S)."""
+    steps = centred.shape[1]
+    size = 1 << (2 * steps - 1).bit_length()
+    power = np.mean(np.abs(np.fft.rfft(centred, size, axis=1)) ** 2, axis=0)
+    return np.fft.irfft(power, size)[:steps] / steps

@@ -1,0 +1,94 @@
+"""The response of a loop without a finite set of poles (delayed internal forces, hysteresis)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.stability.grid import LOWEST
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Rows = NDArray[np.int_]
+
+
+class EvaluableSystem(Protocol):
+    """A batch of loops of which the response can be evaluated, and nothing else be known."""
+
+    @property
+    def batch(self) -> int: ...
+
+    @property
+    def delay_s(self) -> Floats: ...
+
+    def rows(self, index: Rows) -> Self: ...
+
+    def sampled_response(self, frequency_hz: Floats, period_s: float) -> Complexes: ...
+
+    def continuous_approximation(self, frequency_hz: Floats, period_s: float) -> Complexes: ...
+
+
+@dataclass(frozen=True)
+class EvaluatedResponse:
+    """A sampled response known by evaluation alone; the search takes a fine grid.
+
+    Attributes
+    ----------
+    system : EvaluableSystem
+    period_s : float
+    exact : bool
+        False: the continuous approximation P(s) e^{-s (td + T/2)}.
+    """
+
+    system: EvaluableSystem
+    period_s: float
+    exact: bool = True
+    smooth: bool = False
+
+    @property
+    def delay(self) -> Floats:
+        return self.system.delay_s / self.period_s
+
+    @property
+    def features(self) -> Complexes:
+        return np.zeros((self.system.batch, 0), complex)
+
+    def at(self, rows: Rows, theta: Floats) -> Complexes:
+        if len(rows) > 1 and np.all(theta == theta[0]):
+            return self._evaluate(rows, theta[0])
+        out = np.empty(theta.shape, complex)
+        for row in np.unique(rows):  # one call for all frequencies of one loop
+            mine = np.flatnonzero(rows == row)
+            response = self._evaluate(np.array([row]), theta[mine].ravel())
+            out[mine] = response.reshape(len(mine), -1)
+        return out
+
+    def _evaluate(self, rows: Rows, theta: Floats) -> Complexes:
+        frequency = theta / (2 * np.pi * self.period_s)
+        system = self.system.rows(rows)
+        if self.exact:
+            return system.sampled_response(frequency, self.period_s)
+        return system.continuous_approximation(frequency, self.period_s)
+
+    def at_ends(self) -> tuple[Floats, Floats]:
+        every = np.arange(self.system.batch)
+        response = self._evaluate(every, np.array([LOWEST, np.pi]))
+        static, nyquist = response[:, 0], response[:, 1].real
+        flat = np.abs(static.imag) < 1e-3 * np.abs(static.real)
+        if not self.exact:
+            nyquist = np.full_like(nyquist, np.nan)
+        return np.where(flat, static.real, np.inf), nyquist
+
+    def stable_at_rest(self) -> NDArray[np.bool_]:
+        """Whether static stiffness is positive, or an integrator's phase above -180 degrees.
+
+        A loop without poles to look at is taken to be stable by itself; what a mechanism can
+        still do wrong is a double integrator with a delay, or a negative static stiffness.
+        """
+        every = np.arange(self.system.batch)
+        response = self._evaluate(every, np.array([1e-6]))[:, 0]
+        above = (response.real >= 0) | (response.imag < 0)
+        return above & (self.at_ends()[0] > 0)
