@@ -1,0 +1,86 @@
+"""The posterior of each parameter, its prior over it, and least squares beside it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.quantities import Scale, scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+COLUMNS = 4
+BINS = 36
+
+
+def draw(analysis: Analysis) -> Figure:
+    """A small panel a parameter, each with its own unit; densities without an axis."""
+    model = analysis.model
+    columns = min(COLUMNS, max(model.size, 3))
+    rows = -(-model.size // columns)
+    figure = style.new_figure(0.35 + 1.45 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for index, axes in enumerate(panels):
+        if index < model.size:
+            _marginal(axes, analysis, index)
+        else:
+            axes.axis("off")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False,
+                  fontsize=style.SMALL + 0.5)  # fmt: skip
+    return figure
+
+
+def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
+    model, fit = analysis.model, analysis.fit
+    name = model.names[index]
+    draws = analysis.posterior.draws[:, index]
+    row = scale(float(np.median(draws)), model.unit(name))
+    low, high = _range(draws, float(fit.theta[index]), model.prior(name).support)
+    density, edges = np.histogram(draws, BINS, (low, high), density=True)
+    density, edges = density / row.factor, edges * row.factor
+    axes.stairs(density, edges, fill=True, color=style.MODEL, alpha=0.45, label="posterior")
+    axes.stairs(density, edges, color=style.MODEL, linewidth=0.8)
+    x = np.linspace(low, high, 200)
+    prior = np.exp(model.prior(name).log_density(x)) / row.factor
+    axes.plot(x * row.factor, prior, "--", color=style.PRIOR, linewidth=1.1, label="prior")
+    axes.axvline(fit.theta[index] * row.factor, color=style.OTHER, linewidth=1.2,
+                 linestyle="-.", label="least squares")  # fmt: skip
+    style.panel(axes, grid=False, title=_title(name, row), size=style.FONT - 0.5)
+    axes.set_xlim(low * row.factor, high * row.factor)
+    axes.set_ylim(0, 1.12 * max(float(density.max()), float(prior[np.isfinite(prior)].max())))
+    axes.set_yticks([])
+    axes.spines["left"].set_visible(False)
+    _ticks(axes)
+    if analysis.posterior.prior_dominated.get(name):
+        axes.set_xlabel("the prior decides this one", fontsize=style.SMALL, style="italic")
+
+
+def _title(name: str, row: Scale) -> str:
+    return f"{style.short(name)} [{row.unit}]" if row.unit else name
+
+
+def _range(
+    draws: NDArray[Any], least_squares: float, support: tuple[float, float]
+) -> tuple[float, float]:
+    """Where the posterior is, and least squares too where that is not far away."""
+    low, high = (float(v) for v in np.quantile(draws, (0.001, 0.999)))
+    width = (high - low) or abs(high) or 1.0
+    if low - 0.6 * width < least_squares < high + 0.6 * width:
+        low, high = min(low, least_squares), max(high, least_squares)
+    low, high = low - 0.08 * width, high + 0.08 * width
+    return max(low, support[0]), min(high, support[1])
+
+
+def _ticks(axes: Axes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 2.5, 5, 10]))
+    axes.ticklabel_format(axis="x", useOffset=False, style="plain")

@@ -1,0 +1,139 @@
+"""Which parameters the data cannot tell apart: the strongest correlations, pair by pair."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.quantities import scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+SHOWN = 6
+POINTS = 1500
+LEVELS = (0.9, 0.5)
+
+
+def correlation(draws: NDArray[Any]) -> NDArray[Any]:
+    """Spearman's rank correlation of draws of shape (n, P), shape (P, P): no coordinate matters."""
+    ranks = np.argsort(np.argsort(draws, axis=0), axis=0).astype(float)
+    return np.atleast_2d(np.corrcoef(ranks, rowvar=False))
+
+
+def strongest(matrix: NDArray[Any], count: int = SHOWN) -> list[int]:
+    """Indices of the `count` parameters in the strongest pairs, in the order of the model."""
+    size = np.abs(np.triu(matrix, 1))
+    chosen: list[int] = []
+    for flat in np.argsort(-size, axis=None):
+        pair = [int(i) for i in np.unravel_index(flat, size.shape)]
+        new = [i for i in pair if i not in chosen]
+        if pair[0] < pair[1] and len(chosen) + len(new) <= count:
+            chosen += new
+        if len(chosen) >= min(count, len(matrix)):
+            break
+    return sorted(chosen)
+
+
+def draw(analysis: Analysis) -> Figure:
+    """Scatter and contours below the diagonal; all correlations as a map in the empty corner."""
+    draws = analysis.posterior.draws[:: max(len(analysis.posterior.draws) // 20_000, 1)]
+    matrix = correlation(draws)
+    chosen = strongest(matrix)
+    size = len(chosen) - 1
+    if size < 1:
+        return _nothing()
+    figure = style.new_figure(1.2 + 1.12 * size, style.WIDTH_IN if size > 2 else 4.6)
+    panels = figure.subplots(size, size, squeeze=False, sharex="col", sharey="row")
+    rows = [scale(float(np.median(draws[:, i])), analysis.model.unit(analysis.model.names[i]))
+            for i in chosen]  # fmt: skip
+    label = [f"{style.short(analysis.model.names[i])}\n[{row.unit}]" for i, row in zip(chosen, rows, strict=True)]
+    scaled = draws[:, chosen] * [row.factor for row in rows]
+    for i in range(size):
+        for j in range(size):
+            if j > i:
+                panels[i, j].axis("off")
+                continue
+            _pair(panels[i, j], scaled[:, j], scaled[:, i + 1], matrix[chosen[j], chosen[i + 1]])
+            panels[i, j].label_outer()
+    for i in range(size):
+        panels[i, 0].set_ylabel(label[i + 1], fontsize=style.FONT)
+        panels[-1, i].set_xlabel(label[i], fontsize=style.FONT)
+    figure.align_labels()
+    if size > 3:
+        _map(figure, matrix, analysis.model.names)
+    return figure
+
+
+def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float) -> None:
+    style.panel(axes, grid=False, size=style.FONT - 1)
+    few = slice(None, None, max(len(x) // POINTS, 1))
+    axes.plot(x[few], y[few], ".", color=style.MODEL, markersize=1.1, alpha=0.35, rasterized=True)
+    ranges = [_wide(x), _wide(y)]
+    count, x_edges, y_edges = np.histogram2d(x, y, 22, ranges)
+    levels = _credible(count)
+    if np.all(np.diff(levels) > 0):
+        axes.contour(_middle(x_edges), _middle(y_edges), _smooth(count).T, levels,
+                     colors=style.DATA, linewidths=0.7)  # fmt: skip
+    axes.set_xlim(*ranges[0])
+    axes.set_ylim(*ranges[1])
+    axes.text(0.97, 0.95, f"{rank_correlation:+.2f}".replace("-", "\N{MINUS SIGN}"),
+              transform=axes.transAxes, ha="right", va="top", fontsize=style.SMALL,
+              bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1})  # fmt: skip
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.yaxis.set_major_locator(MaxNLocator(3))
+    axes.ticklabel_format(useOffset=False, style="plain")
+
+
+def _map(figure: Figure, matrix: NDArray[Any], names: tuple[str, ...]) -> None:
+    """The correlations of all parameters; number and colour say the same."""
+    axes = figure.add_axes((0.60, 0.675, 0.385, 0.285))
+    axes.set_in_layout(False)
+    axes.imshow(matrix, cmap="PuOr", vmin=-1.3, vmax=1.3)
+    marks, names = range(len(names)), tuple(style.short(name) for name in names)
+    axes.set_xticks(marks, names, rotation=90, fontsize=style.SMALL - 0.5)
+    axes.set_yticks(marks, names, fontsize=style.SMALL - 0.5)
+    axes.tick_params(length=0)
+    axes.set_title("rank correlation × 10, all parameters", fontsize=style.SMALL + 0.5)
+    for i in marks:
+        for j in range(i):
+            text = f"{10 * matrix[i, j]:.0f}".replace("-0", "0").replace("-", "\N{MINUS SIGN}")
+            axes.text(j, i, text, ha="center", va="center", fontsize=style.SMALL - 1.5)
+            axes.text(i, j, text, ha="center", va="center", fontsize=style.SMALL - 1.5)
+
+
+def _wide(values: NDArray[Any]) -> tuple[float, float]:
+    low, high = (float(v) for v in np.quantile(values, (0.002, 0.998)))
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _middle(edges: NDArray[Any]) -> NDArray[Any]:
+    return 0.5 * (edges[1:] + edges[:-1])
+
+
+def _smooth(count: NDArray[Any]) -> NDArray[Any]:
+    from scipy.ndimage import gaussian_filter
+
+    return gaussian_filter(count, 1.0, mode="constant")
+
+
+def _credible(count: NDArray[Any]) -> NDArray[Any]:
+    """Heights of the contours that enclose the probabilities LEVELS, ascending."""
+    heights = np.sort(_smooth(count), axis=None)[::-1]
+    share = np.cumsum(heights) / heights.sum()
+    return np.array([heights[np.searchsorted(share, level)] for level in LEVELS])
+
+
+def _nothing() -> Figure:
+    figure = style.new_figure(0.8)
+    figure.text(0.5, 0.5, "One parameter: there are no pairs.", ha="center", va="center")
+    return figure

@@ -1,0 +1,83 @@
+"""The measured frequency response with the posterior's band: gain, phase, difference, coherence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.band import ResponseBand, response_band
+from bayeshaptic.report.quantities import pretty_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.recordings.etfe import Etfe
+
+
+def draw(analysis: Analysis) -> Figure:
+    """Gain, phase, measured over model, and the coherence where there is one."""
+    etfe, band = analysis.etfe, response_band(analysis)
+    known = bool(np.isfinite(etfe.coherence).any())
+    heights = (2.8, 2.0, 1.7, 1.0) if known else (2.8, 2.0, 1.7)
+    figure = style.new_figure(0.95 * sum(heights))
+    panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    unit = f"{etfe.position_unit}/{pretty_unit(etfe.force_unit)}"
+    gain = style.panel(panels[0], y=f"gain, dB re 1 {unit}")
+    phase = style.panel(panels[1], y="phase, degrees")
+    relative = etfe.relative_sd
+    measured = _near(etfe.phase_deg, np.interp(etfe.frequency_hz, band.frequency_hz, band.phase_deg[1]))
+    # Beyond 100 % the noise has taken over, and a symmetric bar in dB says nothing.
+    error = 2 * np.clip(relative / np.sqrt(2), 0.0, 1.0)
+    _points(gain, etfe, etfe.gain_db, 20 / np.log(10) * error, "measured, ± 2 sd")
+    _points(phase, etfe, measured, np.degrees(error))
+    for axes, quantiles in ((gain, band.gain_db), (phase, band.phase_deg)):
+        low, middle, high = quantiles
+        axes.fill_between(
+            band.frequency_hz, low, high, color=style.MODEL, alpha=0.3, linewidth=0, zorder=3,
+            label="model, 90 % band of the posterior",
+        )  # fmt: skip
+        axes.plot(band.frequency_hz, middle, color=style.MODEL, linewidth=1.2, zorder=3,
+                  label="model, posterior median")  # fmt: skip
+    style.legend(gain, loc="lower left")
+    _difference(panels[2], etfe, band, 20 / np.log(10) * error)
+    if known:
+        coherence = style.panel(panels[3], y="coherence")
+        coherence.plot(etfe.frequency_hz, etfe.coherence, ".", color=style.DATA, markersize=2.5)
+        coherence.set_ylim(-0.03, 1.05)
+    low_hz, high_hz = etfe.frequency_hz[0], etfe.frequency_hz[-1]
+    for axes in panels:
+        style.frequency_axis(axes, low_hz / 1.05, high_hz * 1.05)
+    panels[-1].set_xlabel("frequency, Hz", fontsize=style.FONT)
+    figure.align_ylabels(panels)
+    return figure
+
+
+def _difference(axes: Axes, etfe: Etfe, band: ResponseBand, error: NDArray[Any]) -> None:
+    """Measured minus model: here a band that is too narrow for the gain's axis can be seen."""
+    style.panel(axes, y="measured / model,\ngain in dB")
+    low, middle, high = band.gain_db
+    difference = etfe.gain_db - np.interp(etfe.frequency_hz, band.frequency_hz, middle)
+    _points(axes, etfe, difference, error)
+    axes.fill_between(band.frequency_hz, low - middle, high - middle, color=style.MODEL, alpha=0.35,
+                      linewidth=0, zorder=3)  # fmt: skip
+    axes.axhline(0, color=style.MODEL, linewidth=1.0, zorder=3)
+    # The few worst lines, of almost no signal, may run out of the panel.
+    reach = 1.15 * float(np.quantile(np.abs(difference) + error, 0.97))
+    axes.set_ylim(-reach, reach)
+
+
+def _points(axes: Axes, etfe: Etfe, value: NDArray[Any], error: NDArray[Any], label: str = "") -> None:
+    axes.errorbar(
+        etfe.frequency_hz, value, yerr=error, fmt="o", color=style.DATA, ecolor="#8c8c8c",
+        markersize=2.2, markeredgewidth=0, elinewidth=0.7, zorder=2, label=label,
+    )  # fmt: skip
+
+
+def _near(phase: NDArray[Any], model: NDArray[Any]) -> NDArray[Any]:
+    """The measured phase on the turn of 360 degrees on which the model lies."""
+    return phase - 360 * np.round((phase - model) / 360)

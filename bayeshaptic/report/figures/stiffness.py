@@ -1,0 +1,154 @@
+"""The distribution of the critical stiffness, which crossing binds, and the other witnesses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.limits import RISKS, Witness, decibel, witnesses
+from bayeshaptic.report.quantities import Scale, percent, scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+BINS = 60
+LOG_BEYOND = 8.0  # a distribution wider than this factor is drawn on a logarithmic axis
+
+
+def draw(analysis: Analysis) -> Figure:
+    """The histogram by binding crossing above; every estimate of the limit on one axis below."""
+    rows = witnesses(analysis)
+    figure = style.new_figure(3.3 + 0.42 + 0.21 * len(rows))
+    top, bottom = figure.subplots(2, 1, height_ratios=(3.0, 0.42 + 0.21 * len(rows)))
+    _histogram(top, analysis)
+    _forest(bottom, rows, analysis.limit.unit)
+    return figure
+
+
+def _histogram(axes: Axes, analysis: Analysis) -> None:
+    limit = analysis.limit
+    samples = limit.samples[np.isfinite(limit.samples)]
+    style.panel(axes, y="probability density", grid=False)
+    axes.set_yticks([])
+    if not len(samples) or not np.any(samples > 0):
+        axes.text(0.5, 0.5, "no stiffness above zero is stable" if len(samples) else
+                  "stable at every stiffness", transform=axes.transAxes, ha="center")  # fmt: skip
+        return
+    row = scale(float(np.median(samples)), limit.unit)
+    low, high = (float(v) for v in np.quantile(samples[samples > 0], (0.0005, 0.9995)))
+    logarithmic = high > LOG_BEYOND * low
+    edges = _edges(low, high, logarithmic) * row.factor
+    _stack(axes, analysis, row, edges, logarithmic)
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
+    _lines(axes, analysis, row)
+    if logarithmic:
+        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(style.plain))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel(f"critical stiffness, {row.unit}", fontsize=style.FONT)
+    _decibel_axis(axes, row, limit.unit)
+    style.legend(axes, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4)
+
+
+def _edges(low: float, high: float, logarithmic: bool) -> NDArray[Any]:
+    if logarithmic:
+        return np.geomspace(low / 1.1, high * 1.1, BINS + 1)
+    margin = 0.12 * (high - low) or 0.01 * high
+    return np.linspace(max(low - margin, 0.0), high + margin, BINS + 1)
+
+
+def _stack(
+    axes: Axes, analysis: Analysis, row: Scale, edges: NDArray[Any], logarithmic: bool
+) -> None:
+    """One colour and hatch a binding crossing, stacked; density over K, or over log K."""
+    samples = analysis.limit.samples
+    width = np.diff(np.log(edges) if logarithmic else edges)
+    base = np.zeros(len(edges) - 1)
+    for number, crossing in enumerate(analysis.limit.crossings):
+        part = samples[(analysis.limit.group == number) & np.isfinite(samples)] * row.factor
+        height = np.histogram(part, edges)[0] / (len(samples) * width)
+        colour = style.CYCLE[number % len(style.CYCLE)]
+        axes.stairs(base + height, edges, baseline=base, fill=True, facecolor=colour, alpha=0.55,
+                    edgecolor=style.DATA, linewidth=0.0,
+                    hatch=style.HATCHES[number % len(style.HATCHES)],
+                    label=f"{crossing.label}: {percent(crossing.probability)}")  # fmt: skip
+        axes.stairs(base + height, edges, baseline=base, color=colour, linewidth=0.8)
+        base = base + height
+
+
+def _lines(axes: Axes, analysis: Analysis, row: Scale) -> None:
+    """Safe stiffnesses, least squares, and the measurement's own crossing."""
+    low, high = axes.get_xlim()
+    for number, risk in enumerate(RISKS):
+        safe = analysis.limit.safe(risk)
+        if safe is not None and low <= safe * row.factor <= high:
+            axes.axvline(safe * row.factor, color=style.DATA, linewidth=1.0,
+                         linestyle=style.DASHES[1:][number],
+                         label=f"safe at {percent(risk)} risk")  # fmt: skip
+    for witness in witnesses(analysis):
+        if witness.middle is None or not low <= witness.middle * row.factor <= high:
+            continue
+        if witness.key == "least_squares":
+            axes.axvline(witness.middle * row.factor, color=style.OTHER, linewidth=1.4,
+                         label="least squares")  # fmt: skip
+        if witness.key == "etfe" and witness.low is not None and witness.high is not None:
+            middle = witness.middle * row.factor
+            reach = [[middle - witness.low * row.factor], [witness.high * row.factor - middle]]
+            axes.errorbar([middle], [0.965 * axes.get_ylim()[1]], xerr=reach, fmt="s",
+                          color=style.DATA, capsize=3, markersize=4, linewidth=1.1,
+                          label="measurement alone, 90 %")  # fmt: skip
+    axes.set_xlim(low, high)
+
+
+def _decibel_axis(axes: Axes, row: Scale, unit: str) -> None:
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+
+    low, high = (decibel(v / row.factor) for v in axes.get_xlim())
+    low = low if np.isfinite(low) else high - 40.0
+    step = next((s for s in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5) if (high - low) / s <= 8), 10)
+    ticks = np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
+    top = axes.secondary_xaxis("top")
+    top.xaxis.set_major_locator(FixedLocator(list(10 ** (ticks / 20) * row.factor)))
+    top.xaxis.set_minor_locator(NullLocator())
+    top.xaxis.set_minor_formatter(NullFormatter())
+    places = max(-int(np.floor(np.log10(step))), 0)
+    top.xaxis.set_major_formatter(
+        FuncFormatter(lambda value, _: f"{decibel(value / row.factor):.{places}f}")
+    )
+    top.tick_params(labelsize=style.FONT - 0.5, width=0.6, length=3)
+    top.spines["top"].set_linewidth(0.6)
+    top.set_xlabel(f"dB re 1 {unit}", fontsize=style.FONT)
+
+
+def _forest(axes: Axes, rows: tuple[Witness, ...], unit: str) -> None:
+    """Every estimate of the limit, a row each, in dB."""
+    style.panel(axes, f"critical stiffness, dB re 1 {unit}")
+    axes.grid(False, axis="y")
+    for place, witness in enumerate(rows):
+        if witness.middle is None or witness.middle <= 0:
+            continue
+        middle = decibel(witness.middle)
+        reach = [[0.0], [0.0]]
+        if witness.low is not None and witness.high is not None and witness.low > 0:
+            reach = [[max(middle - decibel(witness.low), 0)], [max(decibel(witness.high) - middle, 0)]]
+        ours = witness.key == "posterior"
+        axes.errorbar([middle], [place], xerr=reach, fmt="o" if ours else "s",
+                      color=style.MODEL if ours else style.DATA, markersize=4.5 if ours else 3.5,
+                      linewidth=2.0 if ours else 1.1, capsize=3,
+                      markerfacecolor=None if ours else "white")  # fmt: skip
+    axes.set_yticks(range(len(rows)), [row.label for row in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    low, high = axes.get_xlim()
+    if high - low < 1.0:
+        axes.set_xlim(0.5 * (low + high) - 0.5, 0.5 * (low + high) + 0.5)
+    axes.ticklabel_format(axis="x", useOffset=False)

@@ -1,0 +1,129 @@
+"""Numbers with units as a person writes them: digits by uncertainty, SI prefixes, one scale a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+_PREFIXES = {-9: "n", -6: "\N{MICRO SIGN}", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_GRAMS = {-9: "\N{MICRO SIGN}g", -6: "mg", -3: "g", 0: "kg"}
+_PREFIXABLE = ("N", "A", "s", "m", "Hz")
+_NOTHING = "\N{EN DASH}"
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How the numbers of one row are written: ``value * factor`` followed by `unit`.
+
+    Attributes
+    ----------
+    factor : float
+        1e-3 where newtons are written as kilonewtons.
+    unit : str
+        The unit with its prefix, for example ``"kN/m"``; empty for a pure number.
+    """
+
+    factor: float
+    unit: str
+
+    def number(self, value: float | None, sd: float | None = None, digits: int = 3) -> str:
+        """The number alone: two digits of `sd` where that is known, else `digits` digits."""
+        if value is None or not math.isfinite(value):
+            return _NOTHING
+        scaled = value * self.factor
+        decimals = _decimals(scaled, None if sd is None else sd * self.factor, digits)
+        return _minus(f"{round(scaled, decimals):.{max(decimals, 0)}f}")
+
+    def quantity(self, value: float | None, sd: float | None = None, digits: int = 3) -> str:
+        """The number with its unit."""
+        return f"{self.number(value, sd, digits)} {self.unit}".rstrip()
+
+
+def pretty_unit(unit: str) -> str:
+    """A unit for reading: ``"kg m^2"`` becomes ``"kg m²"`` and ``"Nm"`` ``"N m"``."""
+    spaced = "N m" + unit[2:] if unit == "Nm" or unit.startswith(("Nm/", "Nm ")) else unit
+    return spaced.replace("^2", "²").replace("^3", "³").replace("*", " ")
+
+
+def scale(values: float | Iterable[float | None], unit: str) -> Scale:
+    """The SI prefix under which the largest of `values` reads as a number from 0.1 to 1000.
+
+    Masses go from kilograms to grams; units that take no prefix (dB, rad, degrees, none) keep theirs.
+    """
+    unit = pretty_unit(unit)
+    given = [values] if isinstance(values, int | float) else list(values)
+    sizes = [abs(v) for v in given if v is not None and math.isfinite(v) and v != 0.0]
+    if not sizes:
+        return Scale(1.0, unit)
+    head, rest = _first_symbol(unit)
+    # 999.7 is written 1.000 k; and 0.19 kg, 0.85 g m^2 read better than 190 g, 850 mg m^2.
+    exponent = math.log10(max(sizes) * 1.0005)
+    power = 3 * math.floor(exponent / 3)
+    if power < 0 and exponent - power >= 2.0 and head != "s":
+        power += 3
+    if head == "kg":
+        power = min(max(power, min(_GRAMS)), 0)
+        return Scale(10.0**-power, _GRAMS[power] + rest)
+    if head not in _PREFIXABLE:
+        return Scale(1.0, unit)
+    power = min(max(power, min(_PREFIXES)), 0 if head == "s" else max(_PREFIXES))
+    return Scale(10.0**-power, _PREFIXES[power] + unit)
+
+
+def quantity(value: float | None, unit: str, sd: float | None = None, digits: int = 3) -> str:
+    """A number with its unit, for example ``"22.1 kN/m"``; a dash for a missing one."""
+    if value is None or not math.isfinite(value):
+        return _NOTHING
+    return scale(value, unit).quantity(value, sd, digits)
+
+
+def interval(low: float | None, high: float | None, unit: str, sd: float | None = None) -> str:
+    """Two ends of an interval with one unit, for example ``"21.9 to 22.4 kN/m"``."""
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
+        return _NOTHING
+    row = scale((low, high), unit)
+    spread = sd if sd is not None else (high - low) / 3.3 or None
+    return f"{row.number(low, spread)} to {row.number(high, spread)} {row.unit}".rstrip()
+
+
+def rounded_down(value: float, sd: float) -> float:
+    """`value` cut to two digits of `sd`, downwards: a safe stiffness must not be rounded up."""
+    if not (value > 0.0 and math.isfinite(value)):
+        return value
+    step = 10.0 ** -_decimals(value, sd, 3)
+    cut = math.floor(value / step * (1.0 + 1e-12)) * step
+    return cut if cut > 0.0 else value
+
+
+def percent(probability: float) -> str:
+    """A probability in per cent, for example ``"1 %"``, ``"0.1 %"``; never 0 or 100 by rounding."""
+    if 0.0 < probability < 0.0005:
+        return "under 0.1 %"
+    if 0.995 < probability < 1.0:
+        return "over 99 %"
+    digits = 2 if probability < 0.1 else 0
+    text = f"{100 * probability:.{digits}g}" if digits else f"{100 * probability:.0f}"
+    return f"{text} %"
+
+
+def _first_symbol(unit: str) -> tuple[str, str]:
+    for position, character in enumerate(unit):
+        if character in " /²³":
+            return unit[:position], unit[position:]
+    return unit, ""
+
+
+def _decimals(value: float, sd: float | None, digits: int) -> int:
+    """Decimal places: two digits of `sd`, but at least two and at most seven of `value`."""
+    if value == 0.0:
+        return 0 if not sd else max(1 - math.floor(math.log10(sd)), 0)
+    exponent = math.floor(math.log10(abs(value)))
+    if sd is None or not math.isfinite(sd) or sd <= 0.0:
+        return digits - 1 - exponent
+    wanted = 1 - math.floor(math.log10(sd))
+    return min(max(wanted, 1 - exponent), 6 - exponent)
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "\N{MINUS SIGN}")
