@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.errors import Notice
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.periodic_excitation import estimate_periodic
+from bayeshaptic.recordings.random_excitation import estimate_random
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.spectra import PeriodicSpectra, RandomSpectra, Spectra, TableSpectra
 
@@ -102,11 +104,66 @@ def estimate_etfe(
         Frequencies to use, Hz. By default chosen from the data: where the force has power and
         the response stands out of the noise.
     minimum_lines : int, optional
-        DFT lines in the narrowest window of a random excitation.
+        DFT lines in the narrowest window of a random excitation, at least 10. By default 24, and 12
+        where the recording is shorter than 10 s.
+
+    Returns
+    -------
+    Etfe
+        With one point a window (random excitation) or an excited line (periodic).
 
     Raises
     ------
     InputError
         When the recording is too short, the force has no power, or the band makes no sense.
     """
-    raise NotImplementedError
+    _check(recording, band_hz)
+    if minimum_lines is not None and minimum_lines < 10:
+        raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
+    found = estimate_periodic(recording, band_hz)
+    spectra: PeriodicSpectra | RandomSpectra
+    if found is not None:
+        spectra, points, notices = found
+    else:
+        spectra, points, notices = estimate_random(recording, band_hz, minimum_lines)
+    return Etfe(
+        frequency_hz=points.frequency_hz,
+        value=points.value,
+        variance=points.variance,
+        coherence=points.coherence,
+        period_s=recording.period_s,
+        band_hz=(float(spectra.frequency_hz[0]), float(spectra.frequency_hz[-1])),
+        force_unit=recording.force_unit,
+        position_unit=recording.position_unit,
+        spectra=spectra,
+        recording=recording,
+        period_lines=spectra.lines if found is not None else None,
+        notices=notices,
+    )
+
+
+def _check(recording: Recording, band_hz: tuple[float, float] | None) -> None:
+    """What no estimate can be made from."""
+    for name, values in (("force", recording.force), ("position", recording.position)):
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"{recording.name}: {name} is {values[bad[0]]} in sample {bad[0] + 1} "
+                f"({len(bad)} such samples)"
+            )
+        if np.ptp(values) == 0:
+            raise InputError(
+                f"{recording.name}: the {name} is {values[0]:g} in all {len(values)} samples; "
+                "a frequency response needs a force that varies and a position that answers"
+            )
+    if band_hz is None:
+        return
+    low, high = band_hz
+    nyquist = 0.5 / recording.period_s
+    if not 0 < low < high:
+        raise InputError(f"band {low:g} to {high:g} Hz: it must be 0 < low < high")
+    if not high <= nyquist * (1 + 1e-9):
+        raise InputError(
+            f"band {low:g} to {high:g} Hz: it ends above the Nyquist frequency, {nyquist:g} Hz "
+            f"at a period of {recording.period_s:g} s"
+        )

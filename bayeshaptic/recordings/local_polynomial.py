@@ -1,0 +1,80 @@
+"""The local polynomial method: response, leakage and noise in windows of neighbouring DFT lines.
+
+In a window the DFT of the position is Y = G U + T + V: the response to the force, the leakage of a
+record that does not end as it began, and noise of nearly constant variance. Leakage is smooth over
+the lines; near zero frequency it looks like that of an integrator, 1/f and 1/f^2. After
+R. Pintelon and J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed.,
+Wiley, 2012, chapter 7.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+NODES = np.array([-np.sqrt(0.75), 0.0, np.sqrt(0.75)])
+"""Chebyshev nodes of a parabola on [-1, 1]; the middle one is the window's centre."""
+
+LEAKAGE_TERMS = 5
+
+
+def leakage_terms(
+    position: NDArray[Any], frequency: NDArray[Any], centre: NDArray[Any]
+) -> NDArray[Any]:
+    """1, x, x^2, 1/f and 1/f^2, scaled to the size of one.
+
+    Parameters
+    ----------
+    position : ndarray, shape (..., w)
+        x, about -1 to 1 over the window.
+    frequency : ndarray, shape (..., w)
+        Any unit.
+    centre : ndarray, shape (..., 1)
+        The frequency where the last two terms are 1.
+
+    Returns
+    -------
+    ndarray, shape (..., w, 5)
+    """
+    inverse = centre / frequency
+    one = np.ones_like(position)
+    return np.stack([one, position, position**2, inverse, inverse**2], axis=-1)
+
+
+def interpolation(position: NDArray[Any]) -> NDArray[Any]:
+    """Weights of the parabola through the values at `NODES`, shape (..., w, 3)."""
+    outer = NODES[2]
+    x = position / outer
+    return np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2], axis=-1)
+
+
+def window_edges(
+    frequency: NDArray[Any], minimum_lines: int, decades: float = 1 / 80
+) -> NDArray[np.int64]:
+    """Where windows begin and end: at least `minimum_lines` and `decades` wide.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (L,)
+        Lines, evenly spaced, Hz.
+    minimum_lines : int
+    decades : float
+        Relative width of the windows at high frequencies.
+
+    Returns
+    -------
+    ndarray of int, shape (W + 1,)
+        Window w holds the lines edges[w]:edges[w + 1]. What is left at the upper end is shared
+        by the last window.
+    """
+    edges = [0]
+    while (start := edges[-1]) + minimum_lines <= len(frequency):
+        stop = int(np.searchsorted(frequency, frequency[start] * 10**decades))
+        edges.append(max(start + minimum_lines, stop))
+    if len(edges) > 2 and edges[-1] > len(frequency):
+        edges.pop()
+    if len(edges) > 1:
+        edges[-1] = len(frequency)
+    return np.array(edges)

@@ -1,0 +1,91 @@
+"""A small independent simulator of linear devices for the tests of the estimators."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.signal import dlsim, lfilter
+
+LHIFAM_FREE = {
+    "masses": [0.19, 5.2],
+    "ground": [(0.1, 0.0), (6.8, 0.0)],
+    "links": [(15.0, 55.3e3)],
+}
+PHANTOM_FREE = {
+    "masses": [0.895e-3, 0.155e-3],
+    "ground": [(0.0085, 0.0), (0.0, 0.0)],
+    "links": [(0.0057, 18.13)],
+}
+LHIFAM_HELD = {
+    "masses": [0.2, 3.78, 1.42],
+    "ground": [(0.1, 0.0), (4.0, 0.0), (18.34, 133.48)],
+    "links": [(13.41, 61.36e3), (62.68, 56.03e3)],
+}
+PHANTOM_HELD = {
+    "masses": [0.81e-3, 0.95e-3, 3.14e-3],
+    "ground": [(0.057, 0.0), (0.0, 0.0), (0.099, 1.42)],
+    "links": [(0.0084, 18.11), (0.017, 52.73)],
+}
+RIGID = {"masses": [5.39], "ground": [(6.9, 0.0)], "links": []}
+
+
+class Device:
+    """A chain of masses, force on the first, zero-order hold, delay e = delay_s < T."""
+
+    def __init__(self, chain, period=1e-3, delay=0.2e-3):
+        masses, n = np.array(chain["masses"]), len(chain["masses"])
+        damping, stiffness = (
+            np.diag([g[0] for g in chain["ground"]]),
+            np.diag([g[1] for g in chain["ground"]]),
+        )
+        for i, (b, k) in enumerate(chain["links"]):
+            pair = np.zeros(n)
+            pair[i], pair[i + 1] = 1, -1
+            damping = damping + b * np.outer(pair, pair)
+            stiffness = stiffness + k * np.outer(pair, pair)
+        inverse = np.diag(1 / masses)
+        self.a = np.block(
+            [[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]]
+        )
+        self.period, self.n = period, n
+        self.ad = expm(self.a * period)
+        self.drive = [self._inputs(np.eye(n)[:, [i]] / masses[i], delay) for i in range(n)]
+
+    def _inputs(self, b, delay):
+        late = self._hold(b, self.period - delay)
+        early = self._hold(b, self.period) - late
+        return late, early
+
+    def _hold(self, b, t):
+        m = len(self.a)
+        block = np.zeros((m + 1, m + 1))
+        block[:m, :m], block[:m, m:] = self.a, np.vstack([np.zeros((self.n, 1)), b])
+        return expm(block * t)[:m, m:]
+
+    def response(self, frequency, mass=0):
+        z = np.exp(2j * np.pi * np.ravel(frequency) * self.period)
+        late, early = self.drive[mass]
+        resolvent = z[:, None, None] * np.eye(len(self.a)) - self.ad
+        value = np.linalg.solve(resolvent, late + early / z[:, None, None])[:, 0, 0]
+        return value.reshape(np.shape(frequency))
+
+    def simulate(self, force, mass=0):
+        late, early = self.drive[mass]
+        previous = np.concatenate([[0.0], force[:-1]])
+        b = np.hstack([late, early])
+        c = np.zeros((1, len(self.a)))
+        c[0, 0] = 1
+        system = (self.ad, b, c, np.zeros((1, 2)), self.period)
+        return dlsim(system, np.column_stack([force, previous]))[1][:, 0]
+
+
+def tremor(rng, samples, period, peak_hz=9.0):
+    """Force of a hand: a tremor near 9 Hz above a slow wander, unit standard deviation."""
+    w0, zeta = 2 * np.pi * peak_hz * period, 0.1
+    r = np.exp(-zeta * w0)
+    a = [1, -2 * r * np.cos(w0), r * r]
+    slow = np.exp(-2 * np.pi * 0.3 * period)
+    white = rng.standard_normal((2, samples + 20000))
+    peak, wander = lfilter([1], a, white[0]), lfilter([1], [1, -slow], white[1])
+    total = peak / peak.std() + wander / wander.std()
+    return total[20000:] / total[20000:].std()
