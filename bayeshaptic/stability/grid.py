@@ -11,7 +11,9 @@ Floats = NDArray[np.float64]
 
 LOWEST = 1e-9  # radians a sample: 0.16 microhertz at T = 1 ms
 _TOP = np.pi * (1 - 1e-7)  # a crossing nearer to the Nyquist frequency has its K to 1e-13
-_TANGENTS = np.tan(np.deg2rad(np.array([-88.0, -80, -60, -30, 0, 30, 60, 80, 88])))
+# No point on the pole itself: an undamped one is infinite there.
+_TANGENTS = np.tan(np.deg2rad(np.array([-88.0, -80, -60, -30, -8, 8, 30, 60, 80, 88])))
+_SHARPEST = 1e-8  # relative half width around an undamped pole
 _PER_TURN = 16  # points for each turn of the delay's phase
 _LOG_POINTS = 60
 _FINE_POINTS = 1500
@@ -37,7 +39,10 @@ def search_grid(response: Response, rows: slice) -> Floats:
         # Conjugates see the same angles: the half with the largest imaginary parts is enough.
         order = np.argsort(-features.imag, axis=1)[:, : (features.shape[1] + 1) // 2]
         upper = np.take_along_axis(features, order, axis=1)
-        around = upper.imag[:, :, None] + np.abs(upper.real)[:, :, None] * _TANGENTS
+        width = np.maximum(np.abs(upper.real), _SHARPEST * np.abs(upper.imag))
+        # A pole beyond the Nyquist frequency shows at its alias.
+        angle = np.abs(upper.imag - 2 * np.pi * np.round(upper.imag / (2 * np.pi)))
+        around = angle[:, :, None] + width[:, :, None] * _TANGENTS
         parts.append(np.clip(around.reshape(batch, -1), low, _TOP))
     steps = np.linspace(0.0, 1.0, _LOG_POINTS if response.smooth else _FINE_POINTS)
     parts.append(low * np.exp(steps * np.log(_TOP / low)))

@@ -177,6 +177,8 @@ def _simple_poles(
         rank = np.tril(near, -1).sum(axis=2) - 0.5 * near.sum(axis=2)
         poles[rows] += 2j * rank * apart[rows]
         gaps[rows] = _gaps(poles[rows])
+    # Nothing may sit on the line where the response is read.
+    poles.real = np.where((poles.real == 0) & ~at_zero, -1e-14 * np.abs(poles), poles.real)
     residues = evaluate(numerator, poles.T).T / (denominator[-1][:, None] * gaps.prod(axis=2))
     return poles, residues, integrators
 
