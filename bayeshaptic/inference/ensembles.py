@@ -80,13 +80,13 @@ def warmed_up(
         start = _spread_start(density, adapted, rng)
         ensemble = Ensemble(density, adapted.proposal, 0.6, start, _state(own))
         chain, _ = ensemble.advance(_WARM_UP)
-        histories.append(chain[_WARM_UP // 2 :: 4].reshape(-1, chain.shape[2]))
+        histories.append(chain[_WARM_UP // 2 :: 2].reshape(-1, chain.shape[2]))
         warm.append((ensemble.positions, later))
     found = np.concatenate(histories)
     rng = np.random.default_rng(seeds[-1])
-    proposal = fit_student_mixture(found, np.ones(len(found)), _COMPONENTS, 6.0, rng)
+    proposal = fit_student_mixture(found, np.ones(len(found)), _COMPONENTS, 10.0, rng)
     proposal = proposal.with_component(adapted.proposal, 0.1)
-    return [Ensemble(density, proposal, 0.8, positions, _state(s)) for positions, s in warm]
+    return [Ensemble(density, proposal, 0.75, positions, _state(s)) for positions, s in warm]
 
 
 def _spread_start(

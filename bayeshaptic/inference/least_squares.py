@@ -15,6 +15,7 @@ from bayeshaptic.models import Model
 from bayeshaptic.models.start import informed, starting_points
 from bayeshaptic.recordings.etfe import Etfe
 from bayeshaptic.recordings.windows import Windows, compress
+from bayeshaptic.threads import single_threaded
 
 Floats = NDArray[np.float64]
 
@@ -77,6 +78,7 @@ class Fit:
         return self.model.response(self.theta, frequency_hz)
 
 
+@single_threaded
 def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None = None) -> Fit:
     """Fit `model` to `etfe` by weighted least squares from several starts.
 

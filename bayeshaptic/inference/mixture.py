@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +39,16 @@ class StudentMixture:
         normal /= np.sqrt(rng.chisquare(self.freedom, count) / self.freedom)[:, None]
         return self.means[component] + np.einsum("bpq,bq->bp", self.roots[component], normal)
 
+    @cached_property
+    def _whitening(self) -> Floats:
+        """Inverses of the roots, shape (C, P, P)."""
+        eye = np.eye(self.means.shape[1])
+        return np.stack([solve_triangular(root, eye, lower=True) for root in self.roots])
+
     def distances(self, x: Floats) -> Floats:
         """Squared Mahalanobis distances to every component, shape (C, B)."""
-        out = np.empty((len(self.weights), len(x)))
-        for c, (mean, root) in enumerate(zip(self.means, self.roots, strict=True)):
-            out[c] = np.sum(solve_triangular(root, (x - mean).T, lower=True) ** 2, axis=0)
-        return out
+        white = (x - self.means[:, None, :]) @ self._whitening.transpose(0, 2, 1)
+        return np.einsum("cbp,cbp->cb", white, white)
 
     def component_log_densities(self, x: Floats) -> Floats:
         """Weighted log density of every component, shape (C, B)."""
@@ -108,7 +113,7 @@ def fit_student_mixture(
         np.repeat(overall.roots, components, axis=0),
         freedom,
     )
-    ridge = 1e-3 * np.diag(overall.roots[0] @ overall.roots[0].T)
+    ridge = 1e-3 * overall.roots[0] @ overall.roots[0].T  # in the shape of the whole
     for _ in range(rounds):
         logs = mixture.component_log_densities(x)
         share = np.exp(logs - logsumexp(logs, axis=0)) * w
@@ -121,7 +126,7 @@ def fit_student_mixture(
         for c in range(components):
             off = x - means[c]
             scatter = (off * pull[c][:, None]).T @ off / total[c]
-            roots.append(_root(scatter + np.diag(ridge)))
+            roots.append(_root(scatter + ridge))
         mixture = StudentMixture(total / total.sum(), means, np.stack(roots), freedom)
     return mixture
 

@@ -19,6 +19,7 @@ from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.threads import single_threaded
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -29,6 +30,7 @@ _FIRST_STEPS = 100
 _MOST_STEPS = 20_000
 
 
+@single_threaded
 def sample(
     model: Model,
     etfe: Etfe,

@@ -1,0 +1,124 @@
+"""Choosing between rigid, free and grasped, and saying why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.devices import Device
+from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.models import Prior, build_model
+from bayeshaptic.models.structures import STRUCTURES
+from bayeshaptic.recordings.etfe import Etfe
+
+_WORDS = {
+    "rigid": "one rigid mass",
+    "free": "two masses and a transmission, held by nobody",
+    "grasped": "a device held by a user",
+}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A base model that was tried.
+
+    Attributes
+    ----------
+    fit : Fit
+    score : float
+        Bayesian information criterion, with the residual of the best candidate as the noise where
+        that exceeds the noise (a quasi-likelihood); smaller is better.
+    """
+
+    fit: Fit
+    score: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The chosen base model and the reason in words.
+
+    Attributes
+    ----------
+    fit : Fit
+    reason : str
+    candidates : mapping
+        Name of the model to what it scored.
+    """
+
+    fit: Fit
+    reason: str
+    candidates: Mapping[str, Candidate]
+
+
+def choose_model(
+    etfe: Etfe,
+    device: Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    prior: Mapping[str, Prior] | None = None,
+    held: bool | None = None,
+    seed: int = 0,
+) -> Choice:
+    """Fit the rigid, the free and the grasped model and choose by an information criterion.
+
+    Parameters
+    ----------
+    etfe : Etfe
+    device : Device, optional
+    delay_s, delay_sd_s : float, optional
+        The loop delay and its standard deviation, where they are known.
+    prior : mapping, optional
+        The user's own priors; those that a candidate has no parameter for are left aside.
+    held : bool, optional
+        Whether somebody held the device, where the study says so: then it is not a question.
+    seed : int
+
+    Returns
+    -------
+    Choice
+    """
+    names = {None: list(STRUCTURES), True: ["grasped"], False: ["rigid", "free"]}[held]
+    fits = {}
+    for name in names:
+        model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
+        own = {key: value for key, value in (prior or {}).items() if key in model.names}
+        fits[name] = least_squares(model.with_prior(own), etfe, seed=seed)
+    noise = max(1.0, min(fit.reduced_chi_square for fit in fits.values()))
+    candidates = {name: Candidate(fit, _score(fit, noise)) for name, fit in fits.items()}
+    best = min(candidates, key=lambda name: candidates[name].score)
+    return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
+
+
+def _score(fit: Fit, noise: float) -> float:
+    numbers = 2 * len(fit.residual)
+    deviance = 2 * float(np.sum(np.abs(fit.residual) ** 2)) / noise
+    return deviance + fit.model.size * np.log(numbers)
+
+
+def _reason(best: str, candidates: Mapping[str, Candidate], noise: float, held: bool | None) -> str:
+    chosen = candidates[best].fit
+    said = ""
+    if held is not None:
+        said = "The study says that somebody held it. " if held else "The study names no user. "
+    text = (
+        f"{said}Chosen: {best} ({_WORDS[best]}, {chosen.model.size} parameters), "
+        f"reduced chi-square {chosen.reduced_chi_square:.3g}."
+    )
+    for name, other in candidates.items():
+        if name == best:
+            continue
+        behind = other.score - candidates[best].score
+        text += (
+            f" {name.capitalize()} ({other.fit.model.size} parameters) has "
+            f"{other.fit.reduced_chi_square:.3g} and an information criterion (BIC) {behind:.1f} "
+            "worse."
+        )
+    if noise > 1.3:
+        text += (
+            f" The scores take {noise:.3g} times the noise variance as noise, because no candidate "
+            "reaches the noise itself."
+        )
+    return text
