@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.devices import Device
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.recordings.etfe import Etfe
 
+_MATERIAL = 2.0  # a richer model that misfits too must cut the squared residual by this factor
 _WORDS = {
     "rigid": "one rigid mass",
     "free": "two masses and a transmission, held by nobody",
@@ -88,8 +89,24 @@ def choose_model(
         fits[name] = least_squares(model.with_prior(own), etfe, seed=seed)
     noise = max(1.0, min(fit.reduced_chi_square for fit in fits.values()))
     candidates = {name: Candidate(fit, _score(fit, noise)) for name, fit in fits.items()}
-    best = min(candidates, key=lambda name: candidates[name].score)
+    best = _best(candidates, noise)
     return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
+
+
+def _best(candidates: Mapping[str, Candidate], noise: float) -> str:
+    """The simplest model that no richer one beats.
+
+    Where no candidate reaches the noise, more parameters always help a little, by standing in for
+    something else; then a richer model must also halve the squared residual.
+    """
+    ordered = sorted(candidates, key=lambda name: candidates[name].fit.model.size)
+    best = ordered[0]
+    for name in ordered[1:]:
+        better = candidates[name].score < candidates[best].score
+        gain = candidates[best].fit.reduced_chi_square / candidates[name].fit.reduced_chi_square
+        if better and (noise < MISFIT or gain > _MATERIAL):
+            best = name
+    return best
 
 
 def _score(fit: Fit, noise: float) -> float:
@@ -113,12 +130,13 @@ def _reason(best: str, candidates: Mapping[str, Candidate], noise: float, held: 
         behind = other.score - candidates[best].score
         text += (
             f" {name.capitalize()} ({other.fit.model.size} parameters) has "
-            f"{other.fit.reduced_chi_square:.3g} and an information criterion (BIC) {behind:.1f} "
-            "worse."
+            f"{other.fit.reduced_chi_square:.3g}, and an information criterion (BIC) "
+            f"{abs(behind):.3g} {'worse' if behind > 0 else 'better'}."
         )
-    if noise > 1.3:
+    if noise >= MISFIT:
         text += (
-            f" The scores take {noise:.3g} times the noise variance as noise, because no candidate "
-            "reaches the noise itself."
+            f" No candidate reaches the noise: the criterion takes {noise:.3g} times its variance, "
+            "and a richer model must also halve the squared residual, or it only stands in for "
+            "what is missing."
         )
     return text

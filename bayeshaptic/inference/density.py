@@ -47,7 +47,7 @@ class Density:
         value = self._log_prior(inner)
         for index in np.flatnonzero(walls):
             if np.any(behind[:, index] < 0):
-                slope, bend = self._prior_at_wall(index)
+                slope, bend = self._prior_at_wall(int(index))
                 value += slope * behind[:, index] + 0.5 * bend * behind[:, index] ** 2
         with np.errstate(all="ignore"):
             value += self.likelihood(self.coordinates.natural(phi))

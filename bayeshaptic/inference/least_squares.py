@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from bayeshaptic.threads import single_threaded
 Floats = NDArray[np.float64]
 
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
+MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
 _REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
 _KEPT_STARTS = 24
 _REWINDOWINGS = 2
@@ -115,7 +117,7 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
     best = phi[[np.argmin(cost)]]
     for _ in range(_REWINDOWINGS):
         fitted = here.natural(best)[0]
-        windows = compress(etfe, lambda f, fitted=fitted: model.response(fitted, f))
+        windows = compress(etfe, partial(model.response, fitted))
         likelihood = Likelihood(model, windows)
         residuals = weighted_residuals(likelihood, here)
         best, cost = minimise(residuals, best, low, high, steps=60, tolerance=1e-8)
@@ -161,7 +163,9 @@ def _summarise(
     chi_square = float(likelihood.reduced_chi_square(theta)[0])
     covariance = np.full((model.size, model.size), np.nan)
     inner = np.flatnonzero(~bound)
-    within = np.linalg.pinv(slope[:, inner].T @ slope[:, inner], hermitian=True)
+    # A direction that the data do not see at all gets a width of 50 coordinate units, not zero.
+    curvature = slope[:, inner].T @ slope[:, inner] + np.eye(len(inner)) / 50.0**2
+    within = np.linalg.inv(curvature)
     stretch = np.where(here.log, theta[0], here.scale)[inner]
     covariance[np.ix_(inner, inner)] = within * np.outer(stretch, stretch) * max(1.0, chi_square)
     residual = likelihood.normalised(theta)[0].ravel()

@@ -1,0 +1,1 @@
+"""From a measurement to everything a report shows: analysis, residual, tracing."""

@@ -1,0 +1,220 @@
+"""The analysis of one measurement: everything that one report shows."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+from bayeshaptic.devices import Device, load_device
+from bayeshaptic.errors import Notice
+from bayeshaptic.inference.choose import Choice, choose_model
+from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampler import sample
+from bayeshaptic.models import Model, Prior, build_model
+from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
+from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
+
+Progress = Callable[[float, str], None]
+
+# Effective draws that a report asks for: with them 20 lie below the stiffness of 0.1 % risk.
+REPORT_ESS = 8000
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What is known of one device from one measurement.
+
+    Attributes
+    ----------
+    recording : Recording or None
+        None for a table of a frequency response.
+    etfe : Etfe
+    device : Device or None
+    model : Model
+        The fitted model, with the priors that were used.
+    choice : Choice or None
+        Why this base model; None where it was asked for.
+    fit : Fit
+    posterior : Posterior
+    limit : CriticalStiffness
+    etfe_limit : EtfeCriticalStiffness
+        Read from the measured response without a model.
+    notices : tuple of Notice
+    seconds : mapping
+        Stage to the time it took.
+    noise_scale : float
+        Factor on the noise variance in the posterior: the reduced chi-square where the model
+        misfits, 1 elsewhere.
+    lever_m : float or None
+    """
+
+    recording: Recording | None
+    etfe: Etfe
+    device: Device | None
+    model: Model
+    choice: Choice | None
+    fit: Fit
+    posterior: Posterior
+    limit: CriticalStiffness
+    etfe_limit: EtfeCriticalStiffness
+    notices: tuple[Notice, ...]
+    seconds: Mapping[str, float]
+    noise_scale: float = 1.0
+    lever_m: float | None = None
+
+
+@dataclass
+class _Clock:
+    """How long each stage took."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        began = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - began
+
+
+def analyse(
+    measurement: Recording | Etfe,
+    model: str | Model = "auto",
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    band_hz: tuple[float, float] | None = None,
+    prior: Mapping[str, Prior] | None = None,
+    held: bool | None = None,
+    lever_m: float | None = None,
+    ess: float = REPORT_ESS,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Fit, sample, and find the critical stiffness of one measurement.
+
+    Parameters
+    ----------
+    measurement : Recording or Etfe
+        An `Etfe` where there is no recording (a table of a frequency response).
+    model : {"auto", "rigid", "free", "grasped"} or Model
+    device : str or Device, optional
+        By default the recording's, where it names a device that is known.
+    delay_s, delay_sd_s : float, optional
+        Loop delay and its standard deviation, s; by default the device's, else free.
+    band_hz : (low, high), optional
+        By default chosen from the data.
+    prior : mapping, optional
+        Your own priors by parameter name.
+    held : bool, optional
+        Whether somebody held the device; unknown by default.
+    lever_m : float, optional
+        From the axis to the tip; by default the device's.
+    ess : float
+        Effective draws of every parameter.
+    seed : int
+    progress : callable, optional
+        Called with the share done and a word about it.
+
+    Returns
+    -------
+    Analysis
+
+    Raises
+    ------
+    InputError
+        Where the measurement cannot be used, or the model does not fit it in kind.
+    """
+    report = progress or (lambda share, word: None)
+    clock = _Clock()
+    if isinstance(device, str):
+        device = load_device(device)
+    if device is None and isinstance(model, Model):
+        device = model.device
+    notices: tuple[Notice, ...] = ()
+    if isinstance(measurement, Recording):
+        with clock.stage("checks"):
+            report(0.0, "checking the recording")
+            notices = check_recording(measurement, device)
+        with clock.stage("frequency response"):
+            report(0.03, "estimating the frequency response")
+            etfe = estimate_etfe(measurement, band_hz)
+    else:
+        etfe = measurement
+    notices += etfe.notices
+    with clock.stage("least squares"):
+        report(0.06, "fitting")
+        fit, choice = _fit(etfe, model, device, delay_s, delay_sd_s, dict(prior or {}), held, seed)
+    scale = fit.reduced_chi_square if fit.reduced_chi_square > MISFIT else 1.0
+    with clock.stage("sampling"):
+        posterior = sample(
+            fit.model,
+            etfe,
+            start=_with_noise(fit, scale),
+            ess=ess,
+            seed=seed,
+            progress=lambda share, word: report(0.1 + 0.7 * share, word),
+        )
+    with clock.stage("critical stiffness"):
+        report(0.8, "critical stiffness")
+        limit = critical_stiffness(posterior)
+        etfe_limit = etfe_critical_stiffness(etfe, seed=seed)
+    report(0.9, "writing the report")
+    return Analysis(
+        recording=etfe.recording,
+        etfe=etfe,
+        device=device,
+        model=fit.model,
+        choice=choice,
+        fit=fit,
+        posterior=posterior,
+        limit=limit,
+        etfe_limit=etfe_limit,
+        notices=notices + limit.notices + _misfit_notice(scale),
+        seconds=clock.seconds,
+        noise_scale=scale,
+        lever_m=lever_m if lever_m is not None else (device.lever_m if device else None),
+    )
+
+
+def _fit(
+    etfe: Etfe,
+    model: str | Model,
+    device: Device | None,
+    delay_s: float | None,
+    delay_sd_s: float | None,
+    prior: Mapping[str, Prior],
+    held: bool | None,
+    seed: int,
+) -> tuple[Fit, Choice | None]:
+    """The fit of the model that was asked for, or of the chosen one."""
+    if isinstance(model, Model):
+        return least_squares(model.with_prior(prior), etfe, seed=seed), None
+    if model == "auto":
+        choice = choose_model(etfe, device, delay_s, delay_sd_s, prior, held, seed)
+        return choice.fit, choice
+    built = build_model(model, device, delay_s, delay_sd_s, etfe.period_s, prior)
+    return least_squares(built, etfe, seed=seed), None
+
+
+def _with_noise(fit: Fit, scale: float) -> Fit:
+    """The fit with `scale` times the noise variance in its windows."""
+    windows = replace(fit.windows, scatter=fit.windows.scatter * scale)
+    return replace(fit, windows=windows)
+
+
+def _misfit_notice(scale: float) -> tuple[Notice, ...]:
+    if scale == 1.0:
+        return ()
+    text = (
+        f"The residual is {scale**0.5:.3g} times the noise (reduced chi-square {scale:.3g}): the "
+        "model lacks something that this device has. The posterior takes that much noise, so that "
+        "its intervals are not narrower than the misfit allows, but the misfit is not noise: the "
+        "critical stiffness may be wrong by more than its interval."
+    )
+    return (Notice("warning", "misfit", text),)
