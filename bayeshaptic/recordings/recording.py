@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import Notice
 
 FORCE_UNITS = ("N", "Nm", "A")
 POSITION_UNITS = ("m", "rad")
@@ -47,6 +47,8 @@ class Recording:
         Standard deviation of the recorded time steps over the period; None without time stamps.
     source : Path or None
         The file it was read from.
+    notices : tuple of Notice
+        What was found and assumed when it was read.
     """
 
     force: NDArray[np.float64] = field(repr=False)
@@ -63,6 +65,7 @@ class Recording:
     encoder_resolution: float | None = None
     time_jitter: float | None = None
     source: Path | None = None
+    notices: tuple[Notice, ...] = ()
 
     @property
     def kind(self) -> str:

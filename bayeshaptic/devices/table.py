@@ -1,0 +1,96 @@
+"""TOML tables read with care: every slip is one line that names file, place and cure."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from bayeshaptic.errors import InputError
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """`` (did you mean 'x'?)`` where something known is close to `word`, otherwise nothing."""
+    by_lower_case = {name.lower(): name for name in known}
+    found = difflib.get_close_matches(word.lower(), by_lower_case, n=1, cutoff=0.6)
+    return f" (did you mean '{by_lower_case[found[0]]}'?)" if found else ""
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The content of a TOML file.
+
+    Raises
+    ------
+    InputError
+        Where the file is missing, not text, or not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as text ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+
+
+class Table:
+    """A TOML table that remembers where it stands, for messages.
+
+    Parameters
+    ----------
+    content : object
+        What TOML gave; anything but a table is refused.
+    where : str
+        File and table name, the beginning of every message.
+    known : iterable of str or None
+        The keys it may have; None where any key will do.
+    """
+
+    def __init__(self, content: object, where: str, known: Iterable[str] | None = None) -> None:
+        if not isinstance(content, Mapping):
+            raise InputError(f"{where} must be a table of 'key = value' lines, not {content!r}")
+        self.content: Mapping[str, Any] = content
+        self.where = where
+        if known is not None:
+            self._refuse_unknown(tuple(known))
+
+    def _refuse_unknown(self, known: tuple[str, ...]) -> None:
+        for key in self.content:
+            if key not in known:
+                raise InputError(
+                    f"{self.where} has an unknown key '{key}'{nearest(key, known)}; "
+                    f"known keys: {', '.join(known)}"
+                )
+
+    def wrong(self, key: str, expected: str) -> InputError:
+        """The error for a value of the wrong type."""
+        return InputError(f"{self.where}: {key} must be {expected}, not {self.content[key]!r}")
+
+    def number(self, key: str, lowest: float = -math.inf, above: bool = False) -> float | None:
+        """A finite number of at least `lowest` (`above`: larger than it), or None where absent."""
+        value = self.content.get(key)
+        if value is None:
+            return None
+        usable = isinstance(value, int | float) and not isinstance(value, bool)
+        usable = usable and math.isfinite(value)
+        if not usable or value < lowest or (above and value == lowest):
+            bound = (
+                "" if lowest == -math.inf else f" {'above' if above else 'of at least'} {lowest:g}"
+            )
+            raise self.wrong(key, f"a number{bound}")
+        return float(value)
+
+    def text(self, key: str, choices: tuple[str, ...] = ()) -> str | None:
+        """A piece of text, one of `choices` where they are given, or None where absent."""
+        value = self.content.get(key)
+        if value is None:
+            return None
+        if not isinstance(value, str) or not value.strip():
+            raise self.wrong(key, "text")
+        if choices and value not in choices:
+            raise self.wrong(key, " or ".join(f"'{choice}'" for choice in choices))
+        return value

@@ -1,0 +1,268 @@
+"""Whether a recording can be used, and what a reader of its report should know about it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.devices import Device
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.causality import causality
+from bayeshaptic.recordings.raw_signals import increment_unit
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.timing import NOTABLE_JITTER
+
+# Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
+FEWEST_SAMPLES = 1000
+USUAL_SECONDS = 30
+# Slips of units: thousands, and degrees for radians; with the cure for each.
+_SLIPS = {
+    1e3: "is it in thousandths of the unit, such as mm? Write [mm] or *1e-3",
+    1e-3: "is it scaled by 1e-3 twice, or in another unit?",
+    1e6: "is it in millionths of the unit, such as um? Write [um] or *1e-6",
+    1e-6: "is it scaled by 1e-6 twice, or in another unit?",
+    180 / np.pi: "is it in degrees? Write [deg]",
+    np.pi / 180: "is it radians, scaled as degrees?",
+}
+
+
+def check_recording(recording: Recording, device: Device | None = None) -> tuple[Notice, ...]:
+    """Refuse what cannot be used; say what should be known.
+
+    Parameters
+    ----------
+    recording : Recording
+    device : Device or None
+        What is known of the device, to compare units, resolution and period with.
+
+    Returns
+    -------
+    tuple of Notice
+        Those of the recording itself, then by topic: "units", "time stamps", "resolution",
+        "coherence", "alignment", and "feedback" where the force was computed from the motion.
+
+    Raises
+    ------
+    InputError
+        For a recording that is too short, holds NaN or infinity, whose force or position is
+        constant, whose columns are swapped, or that is not of the device's kind.
+    """
+    where = str(recording.source or recording.name)
+    _refuse_unusable(recording, where)
+    if device is not None and device.kind != recording.kind:
+        raise InputError(
+            f"{where}: a {recording.kind} recording (position in {recording.position_unit}), but "
+            f"the device {device.name} is {device.kind}; give the position's unit with "
+            f"--columns, as in position=NAME[{device.position_unit}]"
+        )
+    return (
+        *recording.notices,
+        *_period(recording, device),
+        *_mixed_units(recording),
+        *_resolution(recording, device),
+        *_response(recording, device),
+        *_causality(recording, where),
+    )
+
+
+def _refuse_unusable(recording: Recording, where: str) -> None:
+    samples = recording.samples
+    if len(recording.position) != samples:
+        raise InputError(
+            f"{where}: {samples} samples of force and {len(recording.position)} of position"
+        )
+    if samples < FEWEST_SAMPLES:
+        raise InputError(
+            f"{where}: {samples} samples ({recording.duration_s:.3g} s) are too few: at least "
+            f"{FEWEST_SAMPLES} ({FEWEST_SAMPLES * recording.period_s:.3g} s at this period) are "
+            f"needed, and {USUAL_SECONDS} s are usual"
+        )
+    for what, signal in (("force", recording.force), ("position", recording.position)):
+        bad = np.flatnonzero(~np.isfinite(signal))
+        if len(bad):
+            raise InputError(
+                f"{where}: the {what} is {signal[bad[0]]} in row {bad[0] + 1} ({len(bad)} such "
+                "rows)"
+            )
+    if np.ptp(recording.force) == 0:
+        raise InputError(
+            f"{where}: the force is constant ({recording.force[0]:g} {recording.force_unit}); "
+            "nothing can be learnt without an excitation: is it the right column?"
+        )
+    if np.ptp(recording.position) == 0:
+        raise InputError(
+            f"{where}: the position never changes ({recording.position[0]:g} "
+            f"{recording.position_unit}): is the encoder connected, and is it the right column?"
+        )
+
+
+def _period(recording: Recording, device: Device | None) -> list[Notice]:
+    notices = []
+    period = recording.period_s
+    if not 2e-6 < period < 0.1:
+        text = (
+            f"The sampling period is {period:g} s, which no haptic loop has: is the time in ms "
+            "or us? Write time=NAME[ms] or time=NAME[us] in --columns."
+        )
+        notices.append(Notice("warning", "units", text))
+    if recording.time_jitter is not None and recording.time_jitter > NOTABLE_JITTER:
+        text = (
+            f"The time steps vary by {100 * recording.time_jitter:.2g} % of the period (standard "
+            "deviation): either the stamps are late, or the samples are; then the noise rises "
+            "with the speed."
+        )
+        notices.append(Notice("warning", "time stamps", text))
+    if device is not None and device.period_s and abs(period / device.period_s - 1) > 0.01:
+        text = (
+            f"The recording's period is {period:g} s, the device's {device.period_s:g} s; K_CR "
+            "is that of a loop with the recording's period."
+        )
+        notices.append(Notice("warning", "period", text))
+    return notices
+
+
+def _mixed_units(recording: Recording) -> list[Notice]:
+    if (recording.force_unit, recording.position_unit) not in (("N", "rad"), ("Nm", "m")):
+        return []
+    text = (
+        f"The force is in {recording.force_unit} and the position in {recording.position_unit}: "
+        f"stiffness is then in {recording.stiffness_unit}, and masses are not in kg or kg m^2. "
+        "Give the units with --columns, as in force=NAME[Nm]."
+    )
+    return [Notice("warning", "units", text)]
+
+
+def _resolution(recording: Recording, device: Device | None) -> list[Notice]:
+    """Compare the steps in which the position moves with the encoder's count."""
+    unit = recording.position_unit
+    step = increment_unit(recording.position)
+    notices = []
+    if step is not None and np.ptp(recording.position) < 20 * step:
+        text = (
+            f"The position moves over {np.ptp(recording.position) / step:.0f} counts of {step:.3g} "
+            f"{unit} only; excite the device more, or little can be learnt."
+        )
+        notices.append(Notice("warning", "resolution", text))
+    known = recording.encoder_resolution
+    if known is None and device is not None:
+        known = device.encoder_resolution
+    if step is None or known is None or abs(step / known - 1) < 0.05:
+        return notices
+    slip = _slip(step / known, 1.05)
+    if slip is not None:
+        text = (
+            f"The position moves in steps of {step:.3g} {unit}, {slip:.3g} times the encoder's "
+            f"resolution of {known:.3g} {unit}: {_SLIPS[slip]} in --columns."
+        )
+        notices.append(Notice("warning", "units", text))
+    elif step > known:
+        text = (
+            f"The position moves in steps of {step:.3g} {unit}, the encoder's resolution is said "
+            f"to be {known:.3g} {unit}."
+        )
+        notices.append(Notice("note", "resolution", text))
+    return notices
+
+
+def _slip(ratio: float, tolerance: float) -> float | None:
+    """The slip of units that a ratio shows, within a factor; None where it shows none."""
+    nearest = min(_SLIPS, key=lambda slip: abs(np.log(ratio / slip)))
+    return nearest if 1 / tolerance < ratio / nearest < tolerance else None
+
+
+def _response(recording: Recording, device: Device | None) -> list[Notice]:
+    """Compare a rough frequency response with no response at all, and with the device's masses."""
+    frequency, response, coherence = _rough_response(recording)
+    if np.quantile(coherence, 0.9) < 0.3:
+        text = (
+            f"The position hardly answers to the force: their coherence is below "
+            f"{np.quantile(coherence, 0.9):.2f} on nine lines in ten. Are these the right columns?"
+        )
+        return [Notice("warning", "coherence", text)]
+    masses = {} if device is None else _masses(device)
+    clear = coherence > 0.7
+    clear &= frequency > np.sqrt(frequency[0] * frequency[-1])
+    if not masses or recording.force_unit == "A" or np.count_nonzero(clear) < 5:
+        return []
+    # Above the rigid-body frequencies the response is about 1 / (m w^2), up to its resonances.
+    found = float(np.median(1 / ((2 * np.pi * frequency[clear]) ** 2 * np.abs(response[clear]))))
+    low, high = min(masses.values()), sum(masses.values())
+    if low / 30 < found < 30 * high:
+        return []
+    assert device is not None
+    mass_unit = "kg" if device.kind == "translational" else "kg m^2"
+    text = (
+        f"The recording shows a mass of about {found:.2g} {mass_unit}, the device {device.name} "
+        f"has {low:.2g} to {high:.2g} {mass_unit}: the force or the position is off by a factor "
+        f"of about {_round_factor(found / np.sqrt(low * high)):g}. Give the units with "
+        "--columns, as in position=NAME[mm]."
+    )
+    return [Notice("warning", "units", text)]
+
+
+def _round_factor(ratio: float) -> float:
+    return float(10.0 ** np.round(np.log10(ratio)))
+
+
+def _masses(device: Device) -> dict[str, float]:
+    """The masses of the largest model that the device file describes."""
+    for structure in ("grasped", "free", "rigid"):
+        values = device.parameters.get(structure, {})
+        masses = {name: value for name, value in values.items() if name.startswith("m")}
+        if masses:
+            return masses
+    return {}
+
+
+def _rough_response(
+    recording: Recording,
+) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64]]:
+    """Frequency, response and coherence by averaged segments, where the force has power."""
+    from scipy.signal import csd, welch
+
+    segment = int(min(4096, recording.samples // 12))
+    options = {"fs": 1 / recording.period_s, "nperseg": segment, "detrend": "linear"}
+    frequency, force_power = welch(recording.force, **options)
+    _, position_power = welch(recording.position, **options)
+    _, cross = csd(recording.force, recording.position, **options)
+    excited = force_power > 1e-4 * force_power.max()
+    excited[:3] = False  # the window smears drift over the first lines
+    if not np.any(excited):
+        excited[3:] = True
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coherence = np.nan_to_num(np.abs(cross) ** 2 / (force_power * position_power))
+        response = cross / force_power
+    return frequency[excited], response[excited], coherence[excited]
+
+
+def _causality(recording: Recording, where: str) -> list[Notice]:
+    found = causality(recording)
+    if found.swapped:
+        raise InputError(
+            f"{where}: force and position look swapped: the past position predicts the force (it "
+            f"removes {100 * found.feedback:.0f} % of the error), the past force does not "
+            "predict the position; exchange them with --columns force=...,position=..."
+        )
+    if found.relay:
+        text = (
+            "The force switches between two levels with the sign of the position: a relay "
+            "recording. 'bayeshaptic relay' reads the gain margin from it; the ETFE and the fit "
+            "are biased."
+        )
+        return [Notice("warning", "feedback", text)]
+    if found.has_feedback:
+        text = (
+            "The force was computed from the motion (the past position removes "
+            f"{100 * found.feedback:.0f} % of the error of predicting it): the recording was "
+            "made in closed loop, so the ETFE, the fit and K_CR are biased. Excite the device "
+            "with a force that does not depend on the motion."
+        )
+        return [Notice("warning", "feedback", text)]
+    if found.early_position:
+        text = (
+            "The position answers to the force within the same sample: it seems to be recorded "
+            "one sample early, and the delay will come out up to one period too short. Pair "
+            "each force with the position that was read before it was commanded."
+        )
+        return [Notice("warning", "alignment", text)]
+    return []

@@ -1,0 +1,198 @@
+"""Which of a file's arrays is the time, the force and the position: the ``--columns`` mapping."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.devices.table import nearest
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.readers import Arrays
+
+RECORDING_ROLES = ("time", "force", "position")
+FRF_ROLES = ("frequency", "gain_db", "phase_deg", "sd", "coherence", "averages")
+ROLES = (*RECORDING_ROLES, *FRF_ROLES)
+
+# Headers that need no mapping, with the unit they say.
+DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
+    "time": {"time_s": "s"},
+    "force": {"force_n": "N", "torque_nm": "Nm", "current_a": "A"},
+    "position": {"position_m": "m", "angle_rad": "rad"},
+    "frequency": {"frequency_hz": None},
+    **{role: {role: None} for role in FRF_ROLES[1:]},
+}
+
+_EXAMPLE = "time=t,force=u,position=q"
+_EXPRESSION = re.compile(
+    r"(?P<name>.+?)"
+    r"(?:\s*(?P<sign>[*/])\s*(?P<factor>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?))?"
+    r"\s*(?:\[(?P<unit>[^\[\]]*)\])?"
+)
+
+
+@dataclass(frozen=True)
+class Column:
+    """One term of the mapping: ``name``, ``name*factor`` or ``name/factor``, and maybe ``[unit]``.
+
+    Attributes
+    ----------
+    text : str
+        The term as written.
+    names : tuple of str
+        What the array may be called, most literal first: names may hold the signs of the mapping.
+    factors : tuple of float
+        The factor that goes with each of the names.
+    unit : str or None
+    """
+
+    text: str
+    names: tuple[str, ...]
+    factors: tuple[float, ...]
+    unit: str | None
+
+
+def parse_columns(columns: str | Mapping[str, str] | None) -> dict[str, Column]:
+    """The mapping as written: ``"time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"``.
+
+    Parameters
+    ----------
+    columns : str, mapping of role to term, or None
+
+    Raises
+    ------
+    InputError
+        For a term without ``=``, an unknown role, a role given twice, or a factor of zero.
+    """
+    if columns is None:
+        return {}
+    if isinstance(columns, str):
+        terms = [term.partition("=") for term in columns.split(",") if term.strip()]
+        pairs = [(role, term) for role, _, term in terms]
+    elif isinstance(columns, Mapping):
+        pairs = list(columns.items())
+    else:
+        raise InputError(f"columns must be text like '{_EXAMPLE}', not {columns!r}")
+    parsed: dict[str, Column] = {}
+    for role, term in ((str(role).strip(), str(term).strip()) for role, term in pairs):
+        if role not in ROLES:
+            raise InputError(
+                f"columns: '{role}' is none of {', '.join(ROLES)}{nearest(role, ROLES)}; "
+                f"write {_EXAMPLE}"
+            )
+        if role in parsed:
+            raise InputError(f"columns: '{role}' is given twice")
+        if not term:
+            raise InputError(f"columns: '{role}' has no name after '='; write {_EXAMPLE}")
+        parsed[role] = _parse_term(term)
+    return parsed
+
+
+def _parse_term(term: str) -> Column:
+    match = _EXPRESSION.fullmatch(term)
+    if match is None:
+        raise InputError(
+            f"columns: cannot read '{term}'; write name, name*factor or name*factor[unit]"
+        )
+    name, sign, factor, unit = match.group("name", "sign", "factor", "unit")
+    literal = term[: match.start("unit") - 1].strip() if unit is not None else term
+    number = float(factor) if factor else 1.0
+    if number == 0 or not np.isfinite(number):
+        raise InputError(f"columns: the factor in '{term}' must be a number other than zero")
+    return Column(
+        term, (term, literal, name), (1.0, 1.0, 1 / number if sign == "/" else number), unit
+    )
+
+
+def is_frequency_response(arrays: Arrays, mapping: Mapping[str, Column]) -> bool:
+    """Whether a file is a table of a frequency response and not a recording."""
+    if any(role in mapping for role in FRF_ROLES):
+        return True
+    return not any(role in mapping for role in RECORDING_ROLES) and "frequency_hz" in arrays
+
+
+def pick(
+    arrays: Arrays, role: str, mapping: Mapping[str, Column], path: Path, required: bool = True
+) -> tuple[NDArray[np.float64], str | None] | None:
+    """The array that plays a role, times its factor, and the unit that was written for it.
+
+    Parameters
+    ----------
+    arrays : dict
+        The file's arrays by name.
+    role : str
+        One of `ROLES`.
+    mapping : mapping
+        From `parse_columns`; a role it lacks is looked for under its default headers.
+    path : Path
+        For messages.
+    required : bool
+        Otherwise None is handed back where nothing plays the role.
+
+    Raises
+    ------
+    InputError
+        Where the array is not there (the message lists what is), or holds text.
+    """
+    if role not in mapping:
+        defaults = [name for name in DEFAULT_HEADERS[role] if name in arrays]
+        if len(defaults) > 1:
+            raise InputError(
+                f"{path}: both {' and '.join(defaults)}; say which with --columns {role}=..."
+            )
+        if defaults:
+            name = defaults[0]
+            return as_numbers(arrays[name], f"{path}: '{name}'"), DEFAULT_HEADERS[role][name]
+        if not required:
+            return None
+        raise InputError(
+            f"{path}: no column for the {role} ({' or '.join(DEFAULT_HEADERS[role])}); "
+            f"the file has {listing(arrays)}; name what to use, as in --columns {_EXAMPLE}"
+        )
+    column = mapping[role]
+    for name, factor in zip(column.names, column.factors, strict=True):
+        if name in arrays:
+            return as_numbers(arrays[name], f"{path}: '{name}'") * factor, column.unit
+    name = column.names[-1]
+    raise InputError(
+        f"{path}: no column '{name}' for the {role}{nearest(name, arrays)}; "
+        f"the file has {listing(arrays)}"
+    )
+
+
+def listing(arrays: Arrays, most: int = 20) -> str:
+    """The names of a file's arrays and their lengths, the longest first, single numbers not."""
+    names = sorted(
+        (name for name in arrays if len(arrays[name]) > 1), key=lambda n: -len(arrays[n])
+    )
+    shown = [f"{name} ({len(arrays[name])})" for name in names[:most]]
+    return ", ".join(shown) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:
+    """The array in double precision.
+
+    Raises
+    ------
+    InputError
+        Where something in it is not a number: the first such row, counted from 1 after the header.
+    """
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        row, text = next((i, v) for i, v in enumerate(values, start=1) if not _is_number(v))
+    what = f"'{text}' is not a number" if str(text).strip() else "there is no number"
+    raise InputError(f"{where}: {what} in row {row}; mend or remove the row")
+
+
+def _is_number(value: object) -> bool:
+    try:
+        float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return False
+    return True

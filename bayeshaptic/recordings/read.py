@@ -1,0 +1,249 @@
+"""Recordings and frequency responses from files and from arrays."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.columns import (
+    Column,
+    as_numbers,
+    is_frequency_response,
+    parse_columns,
+    pick,
+)
+from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.frf_table import frf_from_arrays
+from bayeshaptic.recordings.readers import Arrays, read_arrays
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.timing import sampling_period
+from bayeshaptic.recordings.units import base_unit, choose_units
+
+Columns = str | Mapping[str, str] | None
+
+
+def read_recording(
+    path: str | os.PathLike[str],
+    columns: Columns = None,
+    period_s: float | None = None,
+    encoder_resolution: float | None = None,
+    name: str | None = None,
+    kind: str | None = None,
+) -> Recording:
+    """A recording from a file: CSV (also gzipped), MAT, HDF5 or NPZ.
+
+    Parameters
+    ----------
+    path : str or path
+    columns : str, mapping or None
+        Which array is the time, the force and the position, with factors and units:
+        ``"time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"``, or the same as a mapping.
+        Headers ``time_s``, ``force_n`` / ``torque_nm`` / ``current_a`` and ``position_m`` /
+        ``angle_rad`` need none.
+    period_s : float or None
+        Sampling period; None takes it from the time stamps. Given, no time is needed.
+    encoder_resolution : float or None
+        One encoder count in m or rad.
+    name : str or None
+        The recording's name in reports; the file's by default.
+    kind : {"translational", "rotational"} or None
+        Decides for N and m or Nm and rad where no units are written.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be read or used, in one line: file, place and cure.
+    """
+    path = Path(path)
+    mapping = parse_columns(columns)
+    arrays = read_arrays(path)
+    if is_frequency_response(arrays, mapping):
+        raise InputError(
+            f"{path}: a table of a frequency response, not a recording; use read_frf or "
+            "read_measurement"
+        )
+    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind)
+
+
+def read_measurement(
+    path: str | os.PathLike[str],
+    columns: Columns = None,
+    period_s: float | None = None,
+    encoder_resolution: float | None = None,
+    name: str | None = None,
+    kind: str | None = None,
+    default_period_s: float | None = None,
+) -> Recording | Etfe:
+    """A recording, or a frequency response where the file's columns are those of one.
+
+    Parameters
+    ----------
+    path, columns, period_s, encoder_resolution, name, kind
+        See `read_recording`. A frequency response needs a period (see `read_frf`).
+    default_period_s : float or None
+        The period where the file has no time stamps, as a device file gives it; stamps come before
+        it.
+
+    Returns
+    -------
+    Recording or Etfe
+
+    Raises
+    ------
+    InputError
+        See `read_recording` and `read_frf`.
+    """
+    path = Path(path)
+    mapping = parse_columns(columns)
+    arrays = read_arrays(path)
+    if is_frequency_response(arrays, mapping):
+        return frf_from_arrays(path, arrays, mapping, period_s or default_period_s, kind=kind)
+    if period_s is None and pick(arrays, "time", mapping, path, required=False) is None:
+        period_s = default_period_s
+    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind)
+
+
+def recording_from_arrays(
+    force: ArrayLike,
+    position: ArrayLike,
+    period_s: float | None = None,
+    time: ArrayLike | None = None,
+    force_unit: str | None = None,
+    position_unit: str | None = None,
+    kind: str | None = None,
+    name: str = "recording",
+    encoder_resolution: float | None = None,
+    source: Path | None = None,
+) -> Recording:
+    """A recording from arrays in memory.
+
+    Parameters
+    ----------
+    force, position : array_like, shape (N,)
+        Commanded force and measured position; (N, 1) and (1, N) will do.
+    period_s : float or None
+        Sampling period in seconds, or:
+    time : array_like, shape (N,), or None
+        Time stamps in seconds.
+    force_unit : {"N", "Nm", "A"} or None
+    position_unit : {"m", "rad"} or None
+    kind : {"translational", "rotational"} or None
+        Decides where the units are None; otherwise N and m.
+    name : str
+    encoder_resolution : float or None
+        One encoder count, in the position's unit.
+    source : Path or None
+        The file, for messages and reports.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        For arrays that differ in length, are empty or hold NaN or infinity (with the row, counted
+        from 1), and for time stamps that show no even sampling.
+    """
+    where = str(source) if source is not None else name
+    force = _signal(force, "force", where)
+    position = _signal(position, "position", where)
+    stamps = None if time is None else _signal(time, "time", where)
+    lengths = {"force": len(force), "position": len(position)}
+    if stamps is not None:
+        lengths["time"] = len(stamps)
+    if len(set(lengths.values())) > 1:
+        counts = ", ".join(f"{role} has {length}" for role, length in lengths.items())
+        raise InputError(f"{where}: the arrays differ in length: {counts} samples")
+    if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
+        raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
+    timing = sampling_period(stamps, period_s, where)
+    unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind)
+    notices = timing.notices
+    if force_unit is None and position_unit is None:
+        text = (
+            f"No units were given: the force is taken to be in {unit_of_force}, the position in "
+            f"{unit_of_position}. Say otherwise with --columns, as in position=q[mm]."
+        )
+        notices += (Notice("note", "units", text),)
+    return Recording(
+        force=force,
+        position=position,
+        period_s=timing.period_s,
+        force_unit=unit_of_force,
+        position_unit=unit_of_position,
+        name=name,
+        encoder_resolution=encoder_resolution,
+        time_jitter=timing.jitter,
+        source=source,
+        notices=notices,
+    )
+
+
+def _recording(
+    path: Path,
+    arrays: Arrays,
+    mapping: Mapping[str, Column],
+    period_s: float | None,
+    encoder_resolution: float | None,
+    name: str | None,
+    kind: str | None,
+) -> Recording:
+    for role in mapping:
+        if role not in ("time", "force", "position"):
+            raise InputError(
+                f"{path}: '{role}' belongs to a frequency response, not to a recording"
+            )
+    signals: dict[str, NDArray[np.float64]] = {}
+    units: dict[str, str | None] = {}
+    for role in ("force", "position", "time"):
+        found = pick(arrays, role, mapping, path, required=role != "time" or period_s is None)
+        if found is None:
+            continue
+        values, unit = found
+        units[role], factor = (None, 1.0) if unit is None else base_unit(role, unit)
+        signals[role] = values * factor if factor != 1.0 else values
+    return recording_from_arrays(
+        signals["force"],
+        signals["position"],
+        period_s=period_s,
+        time=signals.get("time"),
+        force_unit=units["force"],
+        position_unit=units["position"],
+        kind=kind,
+        name=name or recording_name(path),
+        encoder_resolution=encoder_resolution,
+        source=path,
+    )
+
+
+def recording_name(path: Path) -> str:
+    """The file's name without its endings: ``lhifam-user`` for ``lhifam-user.csv.gz``."""
+    return path.name.removesuffix(".gz").rsplit(".", 1)[0] or path.name
+
+
+def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
+    """One signal: a vector of finite numbers of its own, so that nobody changes it from outside."""
+    signal = np.squeeze(as_numbers(np.array(values), f"{where}: {what}"))
+    if signal.ndim != 1 or signal.size == 0:
+        shape = np.shape(values)
+        raise InputError(
+            f"{where}: {what} must be one row of samples, not an array of shape {shape}"
+        )
+    bad = np.flatnonzero(~np.isfinite(signal))
+    if len(bad):
+        raise InputError(
+            f"{where}: {what} is {signal[bad[0]]} in row {bad[0] + 1} ({len(bad)} such rows); "
+            "mend or cut them out"
+        )
+    signal.setflags(write=False)
+    return signal

@@ -1,0 +1,249 @@
+"""A study: one device and all its recordings, as a TOML file says."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from bayeshaptic.devices import Device, device_from_table, device_names, load_device
+from bayeshaptic.devices.table import Table, nearest, read_toml
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.columns import parse_columns
+from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.read import Columns, read_measurement
+from bayeshaptic.recordings.recording import Recording
+
+STUDY_KEYS = ("device", "prior", "recording")
+ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns")
+PRIOR_KEYS = ("median", "log_sd", "scale", "mean", "sd", "low", "high", "log")
+
+
+@dataclass(frozen=True)
+class StudyEntry:
+    """One ``[[recording]]`` table of a study.
+
+    Attributes
+    ----------
+    path : Path
+    user : str or None
+        Nobody holds the device where it is None.
+    configuration : float or str or None
+        A coordinate, or a name.
+    trial : int or str or None
+    level : float or None
+        Excitation level.
+    columns : str, mapping or None
+        This file's own mapping; None means the device's.
+    """
+
+    path: Path
+    user: str | None = None
+    configuration: float | str | None = None
+    trial: int | str | None = None
+    level: float | None = None
+    columns: Columns = None
+
+
+@dataclass(frozen=True)
+class Study:
+    """One device: its facts and all its recordings.
+
+    Attributes
+    ----------
+    name : str
+        The study file's name.
+    path : Path
+    device : Device
+    columns : str, mapping or None
+        Mapping of the recordings' columns.
+    prior : mapping of str to mapping of str to float (or bool)
+        By parameter name, for example ``{"m1": {"median": 0.2, "log_sd": 0.3}}``; see `read_study`.
+    entries : tuple of StudyEntry
+    notices : tuple of Notice
+    """
+
+    name: str
+    path: Path
+    device: Device
+    entries: tuple[StudyEntry, ...]
+    columns: Columns = None
+    prior: Mapping[str, Mapping[str, float | bool]] = field(default_factory=dict)
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def users(self) -> tuple[str, ...]:
+        """Users in the order in which they first appear."""
+        return tuple(dict.fromkeys(entry.user for entry in self.entries if entry.user is not None))
+
+    def read(self, entry: StudyEntry) -> Recording | Etfe:
+        """The measurement of one entry, with what the study declares about it.
+
+        Time stamps come before the device's period, which serves where a file has none.
+
+        Raises
+        ------
+        InputError
+            See `read_measurement`.
+        """
+        columns = entry.columns if entry.columns is not None else self.columns
+        measurement = read_measurement(
+            entry.path,
+            columns=columns,
+            encoder_resolution=self.device.encoder_resolution,
+            kind=self.device.kind,
+            default_period_s=self.device.period_s,
+        )
+        if not isinstance(measurement, Recording):
+            return measurement
+        return replace(
+            measurement,
+            device=self.device.name,
+            user=entry.user,
+            configuration=entry.configuration,
+            trial=entry.trial,
+            level=entry.level,
+        )
+
+    def read_all(self) -> tuple[Recording | Etfe, ...]:
+        """The measurements of all entries, in their order."""
+        return tuple(self.read(entry) for entry in self.entries)
+
+
+def read_study(path: str | os.PathLike[str]) -> Study:
+    """A study from its TOML file.
+
+    The file has a ``[device]`` table: a `name` of a known device, or the `file` of a device file,
+    or the facts themselves (`kind` is then needed); what is written beside a name or a file
+    overrides it; and `columns`. An optional ``[prior]`` table has a line a parameter: ``m1 = {
+    median = 0.2, log_sd = 0.3 }``, ``b1 = { scale = 5 }`` (half-normal), ``kc = { mean = 6e4, sd =
+    1e3 }``, ``m2 = { low = 1, high = 9 }`` (uniform; with ``log = true`` in the logarithm). Each
+    ``[[recording]]`` table has a `file`, relative to the study, and where they apply `user`,
+    `configuration` (a number or a name), `trial`, `level`, and `columns` of its own. Recordings are
+    looked for but not read; `Study.read` does that.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        For a missing file, unknown keys (with the nearest known one), wrong types and impossible
+        values.
+    """
+    path = Path(path)
+    table = Table(read_toml(path), str(path), known=STUDY_KEYS)
+    if "device" not in table.content:
+        raise InputError(
+            f"{path}: no [device] table; it needs at least a name, or a kind and a name"
+        )
+    device, columns, notices = _device(table.content["device"], path)
+    entries = table.content.get("recording")
+    if not isinstance(entries, list) or not entries:
+        raise InputError(
+            f"{path}: no recordings; add a [[recording]] table with file = '...' for each"
+        )
+    return Study(
+        name=path.stem,
+        path=path,
+        device=device,
+        entries=tuple(
+            _entry(entry, f"{path}, recording {number}", path.parent)
+            for number, entry in enumerate(entries, start=1)
+        ),
+        columns=columns,
+        prior=_prior(table.content.get("prior", {}), f"{path}, [prior]"),
+        notices=notices,
+    )
+
+
+def _device(content: object, path: Path) -> tuple[Device, Columns, tuple[Notice, ...]]:
+    where = f"{path}, [device]"
+    table = Table(content, where)
+    file, name, names = table.text("file"), table.text("name"), device_names()
+    base: Device | None = None
+    notices: tuple[Notice, ...] = ()
+    if file is not None:
+        base = load_device(path.parent / file)
+    elif name is not None and name.lower() in names:
+        base = load_device(name)
+    elif name is not None and "kind" not in table.content:
+        raise InputError(
+            f"{where}: no device '{name}' is known{nearest(name, names)}: there are "
+            f"{', '.join(names)}; a device of your own needs kind = 'translational' or kind = "
+            "'rotational'"
+        )
+    elif name is not None and nearest(name, names):
+        text = f"No device '{name}' is known{nearest(name, names)}; only the study's facts hold."
+        notices = (Notice("note", "device", text),)
+    device = device_from_table(table.content, where, base=base, other_keys=("file", "columns"))
+    return device, _columns(table.content.get("columns"), where), notices
+
+
+def _columns(columns: object, where: str) -> Columns:
+    """The mapping, refused here and not at the first recording where it cannot be understood."""
+    if columns is None:
+        return None
+    try:
+        parse_columns(columns)  # type: ignore[arg-type]
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return columns  # type: ignore[return-value]
+
+
+def _entry(content: object, where: str, folder: Path) -> StudyEntry:
+    table = Table(content, where, known=ENTRY_KEYS)
+    file = table.text("file")
+    if file is None:
+        raise InputError(f"{where} needs a file: file = 'recording.csv'")
+    path = folder / file
+    if not path.is_file():
+        raise InputError(f"{where}: no such file: {path}")
+    return StudyEntry(
+        path=path,
+        user=_label(table, "user"),
+        configuration=_coordinate(table, "configuration"),
+        trial=_trial(table),
+        level=table.number("level"),
+        columns=_columns(table.content.get("columns"), where),
+    )
+
+
+def _label(table: Table, key: str) -> str | None:
+    """A name; a whole number will do for one."""
+    value = table.content.get(key)
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value)
+    return table.text(key)
+
+
+def _coordinate(table: Table, key: str) -> float | str | None:
+    return table.text(key) if isinstance(table.content.get(key), str) else table.number(key)
+
+
+def _trial(table: Table) -> int | str | None:
+    value = table.content.get("trial")
+    if value is None or (isinstance(value, int) and not isinstance(value, bool)):
+        return value
+    return table.text("trial")
+
+
+def _prior(content: object, where: str) -> dict[str, dict[str, float | bool]]:
+    """Priors as plain tables of numbers; what they mean is the models' business."""
+    priors: dict[str, dict[str, float | bool]] = {}
+    for parameter, prior in Table(content, where).content.items():
+        table = Table(prior, f"{where}, {parameter}", known=PRIOR_KEYS)
+        log = table.content.get("log", False)
+        if not isinstance(log, bool):
+            raise table.wrong("log", "true or false")
+        numbers = {key: table.number(key) for key in table.content if key != "log"}
+        priors[parameter] = {key: value for key, value in numbers.items() if value is not None}
+        if log:
+            priors[parameter]["log"] = True
+    return priors

@@ -1,0 +1,147 @@
+"""The sampling period from time stamps, and whether the samples are evenly spaced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.errors import InputError, Notice
+
+# Standard deviation of the time steps over the period beyond which samples are not evenly spaced:
+# at 10 % the error at a tenth of the Nyquist frequency is 3 % of the signal, more than any device
+# can be known to.
+MOST_JITTER = 0.1
+# From here on the stamps' jitter is worth a warning.
+NOTABLE_JITTER = 0.005
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What the time stamps say.
+
+    Attributes
+    ----------
+    period_s : float
+        The sampling period.
+    jitter : float or None
+        Standard deviation of the time steps over the period; zero where the stamps are those of an
+        even clock, rounded; None without stamps.
+    notices : tuple of Notice
+    """
+
+    period_s: float
+    jitter: float | None = None
+    notices: tuple[Notice, ...] = ()
+
+
+def sampling_period(
+    time_s: NDArray[np.float64] | None, period_s: float | None = None, where: str = "recording"
+) -> Timing:
+    """The period that the time stamps show, or the one that was given.
+
+    A given period is believed: what contradicts it in the stamps becomes a warning. Without one,
+    stamps that are missing, run back, leave gaps or are uneven are errors.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (N,), or None
+        Time stamps in seconds.
+    period_s : float or None
+    where : str
+        Beginning of messages.
+
+    Raises
+    ------
+    InputError
+        For an impossible period; without a period for stamps that show no even sampling (with the
+        row, counted from 1).
+    """
+    if period_s is not None and not (np.isfinite(period_s) and period_s > 0):
+        raise InputError(f"{where}: the period must be a number of seconds above 0, not {period_s}")
+    if time_s is None:
+        if period_s is None:
+            raise InputError(
+                f"{where}: no time and no period; name the time with --columns time=NAME "
+                "or give the sampling period with --period-s"
+            )
+        return Timing(float(period_s))
+    if period_s is None:
+        return _from_stamps(time_s, where)
+    try:
+        stamps = _from_stamps(time_s, where)
+    except InputError as error:
+        text = f"{error}. The period given, {period_s:g} s, is used and the time stamps are not."
+        return Timing(float(period_s), None, (Notice("warning", "time stamps", text),))
+    if abs(stamps.period_s / period_s - 1) > 0.01:
+        text = (
+            f"The time stamps show a period of {stamps.period_s:.6g} s; the period given, "
+            f"{period_s:g} s, is used."
+        )
+        return Timing(float(period_s), stamps.jitter, (Notice("warning", "time stamps", text),))
+    return Timing(float(period_s), stamps.jitter)
+
+
+def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
+    if len(time_s) < 3:
+        raise InputError(f"{where}: {len(time_s)} time stamps; a period needs at least 3")
+    bad = np.flatnonzero(~np.isfinite(time_s))
+    if len(bad):
+        raise InputError(f"{where}: the time in row {bad[0] + 1} is {time_s[bad[0]]}")
+    slope, scatter = _clock(time_s)
+    if slope > 0 and scatter <= 0.75 * _rounding(time_s):
+        return Timing(slope, 0.0)
+    steps = np.diff(time_s)
+    back = np.flatnonzero(steps <= 0)
+    if len(back):
+        raise InputError(
+            f"{where}: time does not advance from row {back[0] + 1} to row {back[0] + 2} "
+            f"({time_s[back[0]]:.9g} s, {time_s[back[0] + 1]:.9g} s; {len(back)} such places); "
+            "cut the recording there, or give the period with --period-s if only the stamps are "
+            "wrong"
+        )
+    period = float(np.median(steps))
+    _refuse_gaps(time_s, period, where)
+    jitter = float(np.std(steps)) / period
+    if jitter > MOST_JITTER:
+        raise InputError(
+            f"{where}: time steps are not even: they vary by {100 * jitter:.0f} % (standard "
+            f"deviation), from {steps.min():.6g} s to {steps.max():.6g} s; resample to an even "
+            "period, or give the period with --period-s if only the stamps are wrong"
+        )
+    return Timing(slope, jitter)
+
+
+def _clock(time_s: NDArray[np.float64]) -> tuple[float, float]:
+    """Slope of the straight line through the stamps, and the largest distance from it."""
+    index = np.arange(len(time_s)) - (len(time_s) - 1) / 2
+    centred = time_s - time_s.mean()
+    slope = float(index @ centred / (index @ index))
+    # Nine digits: more is rounding, and 0.001 is what people expect to read.
+    slope = float(f"{slope:.9g}")
+    return slope, float(np.abs(centred - slope * index).max())
+
+
+def _rounding(time_s: NDArray[np.float64]) -> float:
+    """The power of ten to which the stamps were rounded; zero where there is none."""
+    for digits in range(10):
+        scaled = (time_s - time_s[0]) * 10.0**digits
+        if np.abs(scaled - np.round(scaled)).max() < 0.05:
+            return float(10.0**-digits)
+    return 0.0
+
+
+def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None:
+    """Refuse missing samples; a late stamp that the next step makes up for is no gap."""
+    steps = np.diff(time_s)
+    pairs = np.append(time_s[2:] - time_s[:-2], np.inf)
+    gaps = np.flatnonzero((steps > 1.5 * period) & (pairs > 2.5 * period))
+    # Many long steps are uneven sampling, not gaps.
+    if 0 < len(gaps) <= max(3, len(steps) // 100):
+        first = gaps[0]
+        raise InputError(
+            f"{where}: about {round(steps[first] / period) - 1} samples are missing after row "
+            f"{first + 1} (a step of {steps[first]:.6g} s where the period is {period:.6g} s; "
+            f"{len(gaps)} such places); use the longest part without a gap"
+        )

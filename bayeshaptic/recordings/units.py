@@ -1,0 +1,85 @@
+"""Units of what is recorded: the base units of the package, and multiples turned into them."""
+
+from __future__ import annotations
+
+import math
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.recording import FORCE_UNITS, POSITION_UNITS
+
+# unit -> (base unit, factor)
+_TIME = {"s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "ns": ("s", 1e-9)}
+_FORCE = {
+    "N": ("N", 1.0),
+    "mN": ("N", 1e-3),
+    "kN": ("N", 1e3),
+    "Nm": ("Nm", 1.0),
+    "mNm": ("Nm", 1e-3),
+    "Nmm": ("Nm", 1e-3),
+    "A": ("A", 1.0),
+    "mA": ("A", 1e-3),
+}
+_POSITION = {
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "um": ("m", 1e-6),
+    "nm": ("m", 1e-9),
+    "rad": ("rad", 1.0),
+    "mrad": ("rad", 1e-3),
+    "urad": ("rad", 1e-6),
+    "deg": ("rad", math.pi / 180),
+}
+_BY_ROLE = {"time": _TIME, "force": _FORCE, "position": _POSITION}
+
+
+def base_unit(role: str, unit: str) -> tuple[str, float]:
+    """Base unit and factor of a unit as it was written.
+
+    Parameters
+    ----------
+    role : {"time", "force", "position"}
+    unit : str
+        For example "mm", "N m" or "µs".
+
+    Raises
+    ------
+    InputError
+        For a unit that is not one of the role's; the message lists them.
+    """
+    plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg")
+    for sign in (" ", "*", "\u00b7", "."):
+        plain = plain.replace(sign, "")
+    known = _BY_ROLE[role]
+    if plain not in known:
+        cure = ""
+        if role == "force":
+            cure = "; multiply other units by the force constant, as in force=volts*35.15[N]"
+        raise InputError(f"'{unit}' is no unit of {role}: use {', '.join(known)}{cure}")
+    return known[plain]
+
+
+def choose_units(
+    force_unit: str | None, position_unit: str | None, kind: str | None = None
+) -> tuple[str, str]:
+    """The units of force and position where one of them, or both, are not said.
+
+    A position alone decides for N or Nm, a force in N or Nm alone for m or rad; otherwise the kind
+    of device ("translational" or "rotational") decides, and without it N and m.
+
+    Raises
+    ------
+    InputError
+        For units that are not among the base units.
+    """
+    for unit, known, what in (
+        (force_unit, FORCE_UNITS, "force_unit"),
+        (position_unit, POSITION_UNITS, "position_unit"),
+    ):
+        if unit is not None and unit not in known:
+            raise InputError(f"{what} is '{unit}'; use {', '.join(known)}")
+    if position_unit is None:
+        rotational = {"N": False, "Nm": True}.get(force_unit or "", kind == "rotational")
+        position_unit = "rad" if rotational else "m"
+    if force_unit is None:
+        force_unit = "Nm" if position_unit == "rad" else "N"
+    return force_unit, position_unit
