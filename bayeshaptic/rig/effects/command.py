@@ -1,0 +1,39 @@
+"""Effects between the commanded force and the actuator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.plant import Array
+
+
+@register
+@dataclass(frozen=True)
+class ActuatorSaturation(Effect):
+    """The actuator gives no more than +-`limit`."""
+
+    name: ClassVar[str] = "actuator_saturation"
+    limit: float = 6.0
+
+    @classmethod
+    def typical(cls, scales: Scales) -> ActuatorSaturation:
+        return cls(1.5 * scales.force)
+
+    def command(self, force: Array, progress: Array, time_s: Array) -> Array:
+        return np.clip(force, -self.limit, self.limit)
+
+
+@register
+@dataclass(frozen=True)
+class GainDrift(Effect):
+    """The actuator's gain goes from 1 to `ratio` during the recording, as it warms up."""
+
+    name: ClassVar[str] = "gain_drift"
+    ratio: float = 0.85
+
+    def command(self, force: Array, progress: Array, time_s: Array) -> Array:
+        return force * (1 + (self.ratio - 1) * progress)

@@ -1,0 +1,136 @@
+"""What an effect on the bench may change, and the registry of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.rig.plant import Array
+from bayeshaptic.rig.structure import Structure
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Sizes that make an effect's default strength sensible on a bench.
+
+    Attributes
+    ----------
+    force : float
+        Root mean square of the usual excitation.
+    position, velocity : float
+        Root mean square of the motor's motion under it, without effects.
+    stretch, stretch_rate : float
+        The same of the connection between m1 and m2; 0 without m2.
+    resolution : float
+        One count of the encoder.
+    """
+
+    force: float
+    position: float
+    velocity: float
+    stretch: float
+    stretch_rate: float
+    resolution: float
+    period_s: float
+    parameters: Mapping[str, float]
+
+    @property
+    def held(self) -> bool:
+        return "mh" in self.parameters
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What the encoder is about to read: stamps, positions and velocities, shape (samples,)."""
+
+    time_s: Array
+    position: Array
+    velocity: Array
+
+
+@dataclass(frozen=True)
+class Log:
+    """What is written down: time stamps, commands and positions, shape (samples,)."""
+
+    time_s: Array
+    force: Array
+    position: Array
+
+    def rows(self, index: Array) -> Log:
+        return Log(self.time_s[index], self.force[index], self.position[index])
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Something that happens on the bench beside the plain chain; override what it touches.
+
+    An effect is a frozen dataclass with a `name`. Of the hooks below, `build`, `parameters`,
+    `command`, `sense` and `resolution` act inside a closed loop too; `log` acts on what is written
+    down.
+    """
+
+    name: ClassVar[str]
+    varies: ClassVar[bool] = False
+
+    @classmethod
+    def typical(cls, scales: Scales) -> Effect:
+        """The effect at a strength that is clear, but not absurd, on a bench with these scales."""
+        return cls()
+
+    def parameters(self, values: Mapping[str, float], progress: float) -> Mapping[str, float]:
+        """The mechanism's parameters when a part `progress` (0..1) of the recording is over."""
+        return values
+
+    def build(self, structure: Structure) -> None:
+        """Add to the structure: masses, links, laws, lags, filters, delay."""
+
+    def command(self, force: Array, progress: Array, time_s: Array) -> Array:
+        """What the actuator gets of the commands."""
+        return force
+
+    def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
+        """What the encoder gets to see, before it is rounded to counts."""
+        return samples
+
+    def resolution(self, resolution: float) -> float:
+        """The encoder's count."""
+        return resolution
+
+    def log(self, log: Log, rng: np.random.Generator) -> Log:
+        """What is written down."""
+        return log
+
+
+REGISTRY: dict[str, type[Effect]] = {}
+EffectType = TypeVar("EffectType", bound=type[Effect])
+
+
+def register(effect: EffectType) -> EffectType:
+    """Class decorator: make an effect known by its name."""
+    REGISTRY[effect.name] = effect
+    return effect
+
+
+def make_effect(name: str, scales: Scales, **changes: Any) -> Effect:
+    """A registered effect at its typical strength, with `changes` to its fields.
+
+    Raises
+    ------
+    InputError
+        For a name that is not registered, or a field that the effect does not have.
+    """
+    if name not in REGISTRY:
+        raise InputError(f"unknown effect '{name}'; the bench knows {', '.join(sorted(REGISTRY))}")
+    effect = REGISTRY[name].typical(scales)
+    try:
+        return replace(effect, **changes)
+    except TypeError:
+        known = [field.name for field in fields(effect)]
+        unknown = sorted(set(changes) - set(known))
+        raise InputError(
+            f"effect '{name}' has no {', '.join(unknown)}; it has {', '.join(known) or 'no fields'}"
+        ) from None

@@ -1,0 +1,76 @@
+"""Dry friction between a mass and the frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.laws import Dahl, DryFriction
+from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
+
+SHARE = 0.15
+
+
+@register
+@dataclass(frozen=True)
+class CoulombFriction(Effect):
+    """A constant force against the motion; at rest whatever holds, up to `force`."""
+
+    name: ClassVar[str] = "coulomb_friction"
+    force: float = 0.6
+    on: str = "m1"
+
+    @classmethod
+    def typical(cls, scales: Scales) -> CoulombFriction:
+        return cls(SHARE * scales.force)
+
+    def build(self, structure: Structure) -> None:
+        structure.check(self.on)
+        law = DryFriction(self.force, self.force)
+        structure.laws.append(NodeLaw(self.on, FRAME, law))
+
+
+@register
+@dataclass(frozen=True)
+class StribeckFriction(Effect):
+    """Dry friction that falls from `static` to `force` as the velocity passes `velocity`.
+
+    force + (static - force) exp(-(v/velocity)^2)
+    """
+
+    name: ClassVar[str] = "stribeck_friction"
+    force: float = 0.6
+    static: float = 1.0
+    velocity: float = 0.005
+    on: str = "m1"
+
+    @classmethod
+    def typical(cls, scales: Scales) -> StribeckFriction:
+        level = SHARE * scales.force
+        return cls(level, 1.6 * level, 0.3 * scales.velocity)
+
+    def build(self, structure: Structure) -> None:
+        structure.check(self.on)
+        law = DryFriction(self.force, self.static, self.velocity)
+        structure.laws.append(NodeLaw(self.on, FRAME, law))
+
+
+@register
+@dataclass(frozen=True)
+class DahlFriction(Effect):
+    """Friction that begins as a spring: F' = -stiffness (v + |v| F/force)."""
+
+    name: ClassVar[str] = "dahl_friction"
+    force: float = 0.6
+    stiffness: float = 3e3
+    on: str = "m1"
+
+    @classmethod
+    def typical(cls, scales: Scales) -> DahlFriction:
+        level = SHARE * scales.force
+        return cls(level, level / (0.01 * scales.velocity))
+
+    def build(self, structure: Structure) -> None:
+        structure.check(self.on)
+        structure.laws.append(NodeLaw(self.on, FRAME, Dahl(self.force, self.stiffness)))

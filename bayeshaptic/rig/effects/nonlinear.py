@@ -1,0 +1,113 @@
+"""Nonlinear springs, play, cogging, drag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.laws import Drag as DragLaw
+from bayeshaptic.rig.laws import Gap, PowerSpring, Ripple
+from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
+
+# Root mean square of x^3 over the cube of that of x, for a Gaussian x.
+CUBE = 15.0**0.5
+
+
+@register
+@dataclass(frozen=True)
+class HardeningSpring(Effect):
+    """A cubic spring from a mass to the frame, -stiffness x^3; negative softens."""
+
+    name: ClassVar[str] = "hardening_spring"
+    stiffness: float = 5e6
+    on: str = "m1"
+
+    @classmethod
+    def typical(cls, scales: Scales) -> HardeningSpring:
+        return cls(0.2 * scales.force / (CUBE * scales.position**3))
+
+    def build(self, structure: Structure) -> None:
+        structure.check(self.on)
+        structure.laws.append(NodeLaw(self.on, FRAME, PowerSpring(self.stiffness)))
+
+
+@register
+@dataclass(frozen=True)
+class HardeningConnection(Effect):
+    """A cubic spring beside the connection m1-m2, -stiffness d^3; negative softens."""
+
+    name: ClassVar[str] = "hardening_connection"
+    stiffness: float = 1e12
+
+    @classmethod
+    def typical(cls, scales: Scales) -> HardeningConnection:
+        return cls(0.2 * scales.force / (CUBE * scales.stretch**3)) if scales.stretch else cls()
+
+    def build(self, structure: Structure) -> None:
+        structure.link("m1", "m2")
+        structure.laws.append(NodeLaw("m1", "m2", PowerSpring(self.stiffness)))
+
+
+@register
+@dataclass(frozen=True)
+class Backlash(Effect):
+    """Play in the connection m1-m2: its spring begins `gap` to either side of the middle.
+
+    Attributes
+    ----------
+    gap : float
+        Half the play, m or rad.
+    free_damping : float
+        Part of the connection's damping that is absent inside the play, 0 to 1.
+    """
+
+    name: ClassVar[str] = "backlash"
+    gap: float = 3e-5
+    free_damping: float = 0.0
+
+    @classmethod
+    def typical(cls, scales: Scales) -> Backlash:
+        return cls(0.4 * scales.stretch) if scales.stretch else cls()
+
+    def build(self, structure: Structure) -> None:
+        link = structure.link("m1", "m2")
+        law = Gap(link.stiffness, self.gap, self.free_damping * link.damping)
+        structure.laws.append(NodeLaw("m1", "m2", law))
+
+
+@register
+@dataclass(frozen=True)
+class ForceRipple(Effect):
+    """A force on the motor that repeats with the position: amplitude sin(2 pi x/pitch + phase)."""
+
+    name: ClassVar[str] = "force_ripple"
+    amplitude: float = 0.4
+    pitch: float = 0.01
+    phase: float = 0.0
+
+    @classmethod
+    def typical(cls, scales: Scales) -> ForceRipple:
+        return cls(0.05 * scales.force, scales.position)
+
+    def build(self, structure: Structure) -> None:
+        law = Ripple(self.amplitude, self.pitch, self.phase)
+        structure.laws.append(NodeLaw(structure.motor, FRAME, law))
+
+
+@register
+@dataclass(frozen=True)
+class Drag(Effect):
+    """A resistance -coefficient v |v| on a mass."""
+
+    name: ClassVar[str] = "drag"
+    coefficient: float = 500.0
+    on: str = "m1"
+
+    @classmethod
+    def typical(cls, scales: Scales) -> Drag:
+        return cls(0.2 * scales.force / (3.0**0.5 * scales.velocity**2))
+
+    def build(self, structure: Structure) -> None:
+        structure.check(self.on)
+        structure.laws.append(NodeLaw(self.on, FRAME, DragLaw(self.coefficient)))
