@@ -6,6 +6,7 @@ the number of cores.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from functools import wraps
 from typing import ParamSpec, TypeVar
@@ -25,3 +26,12 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
             return function(*args, **kwargs)
 
     return limited
+
+
+def one_thread_from_the_start() -> None:
+    """Ask for one BLAS thread by the environment, for this process and those it starts.
+
+    It works only before NumPy is loaded, and leaves alone what the user has set.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")

@@ -1,0 +1,136 @@
+"""How stiff a virtual wall may be on a haptic device, and how sure of it one can be.
+
+The names below are the public interface; each is imported from its module on first use, so that
+``import bayeshaptic`` and the command line's help cost nothing::
+
+    import bayeshaptic as bh
+
+    recording = bh.read_recording("lhifam-user.csv")
+    etfe = bh.estimate_etfe(recording)
+    model = bh.grasped(device="lhifam")
+    fit = bh.least_squares(model, etfe)
+    posterior = bh.sample(model, etfe, start=fit)
+    limit = bh.critical_stiffness(posterior)
+    limit.safe(0.01)  # the stiffness with one per cent probability of instability
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bayeshaptic.devices import Device, device_names, load_device
+    from bayeshaptic.diagnosis.analysis import Analysis, analyse
+    from bayeshaptic.errors import BayeshapticWarning, InputError, Notice
+    from bayeshaptic.inference import Fit, Posterior, least_squares, load_posterior, sample
+    from bayeshaptic.inference.choose import Choice, choose_model
+    from bayeshaptic.models import (
+        HalfNormal,
+        LogNormal,
+        LogUniform,
+        Model,
+        Normal,
+        Uniform,
+        free,
+        grasped,
+        rigid,
+    )
+    from bayeshaptic.recordings import (
+        Recording,
+        Study,
+        read_frf,
+        read_measurement,
+        read_recording,
+        read_study,
+        recording_from_arrays,
+    )
+    from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
+    from bayeshaptic.report import write_report
+    from bayeshaptic.stability import CriticalStiffness, critical_stiffness
+
+__version__ = "0.1.0"
+
+# Where each name lives: the same imports as above, done on first use (PEP 562).
+_HOMES = {
+    "bayeshaptic.devices": ("Device", "device_names", "load_device"),
+    "bayeshaptic.diagnosis.analysis": ("Analysis", "analyse"),
+    "bayeshaptic.errors": ("BayeshapticWarning", "InputError", "Notice"),
+    "bayeshaptic.inference": ("Fit", "Posterior", "least_squares", "load_posterior", "sample"),
+    "bayeshaptic.inference.choose": ("Choice", "choose_model"),
+    "bayeshaptic.models": (
+        "HalfNormal",
+        "LogNormal",
+        "LogUniform",
+        "Model",
+        "Normal",
+        "Uniform",
+        "free",
+        "grasped",
+        "rigid",
+    ),
+    "bayeshaptic.recordings": (
+        "Recording",
+        "Study",
+        "read_frf",
+        "read_measurement",
+        "read_recording",
+        "read_study",
+        "recording_from_arrays",
+    ),
+    "bayeshaptic.recordings.etfe": ("Etfe", "estimate_etfe"),
+    "bayeshaptic.report": ("write_report",),
+    "bayeshaptic.stability": ("CriticalStiffness", "critical_stiffness"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Analysis",
+    "BayeshapticWarning",
+    "Choice",
+    "CriticalStiffness",
+    "Device",
+    "Etfe",
+    "Fit",
+    "HalfNormal",
+    "InputError",
+    "LogNormal",
+    "LogUniform",
+    "Model",
+    "Normal",
+    "Notice",
+    "Posterior",
+    "Recording",
+    "Study",
+    "Uniform",
+    "analyse",
+    "choose_model",
+    "critical_stiffness",
+    "device_names",
+    "estimate_etfe",
+    "free",
+    "grasped",
+    "least_squares",
+    "load_device",
+    "load_posterior",
+    "read_frf",
+    "read_measurement",
+    "read_recording",
+    "read_study",
+    "recording_from_arrays",
+    "rigid",
+    "sample",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'bayeshaptic' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,117 @@
+"""The command line: parse, run one command, and turn every error into one line and a status.
+
+Exit status: 0 done; 1 a study of a batch failed, or a defect in bayeshaptic; 2 input or options
+that cannot be used; 130 interrupted. A command is one module of ``bayeshaptic.commands``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import NoReturn
+
+from bayeshaptic import __version__
+from bayeshaptic.commands import COMMANDS
+from bayeshaptic.commands.talk import complain
+from bayeshaptic.errors import BayeshapticWarning, InputError, describe
+from bayeshaptic.threads import one_thread_from_the_start
+
+DESCRIPTION = """\
+Uncertainty reports for haptic devices: how stiff a virtual wall may be before it shakes the
+user's hand, from a recording of commanded force and measured position, as a probability
+distribution instead of one number."""
+
+EPILOG = """\
+example:
+  bayeshaptic report lhifam-user.csv.gz -o out/
+
+Every command has its own help: bayeshaptic COMMAND --help. With --debug, or BAYESHAPTIC_DEBUG=1 in
+the environment, errors come with their traceback."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """An ArgumentParser whose usage errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole command line, one subparser a module of `bayeshaptic.commands`."""
+    parser = _Parser(
+        prog="bayeshaptic",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"bayeshaptic {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+    for command in COMMANDS:
+        subparser = commands.add_parser(
+            command.NAME,
+            help=command.SUMMARY,
+            description=command.DESCRIPTION,
+            epilog=f"example{'s' if command.EXAMPLES.count(chr(10)) else ''}:\n{command.EXAMPLES}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.add_arguments(subparser)
+        subparser.add_argument(
+            "--debug", action="store_true", help="show the traceback of an error"
+        )
+        subparser.set_defaults(run=command.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status; never a traceback unless asked for."""
+    one_thread_from_the_start()
+    parser = build_parser()
+    arguments = parser.parse_args(argv)
+    if not hasattr(arguments, "run"):
+        parser.print_help(sys.stderr)
+        return 2
+    debug = arguments.debug or bool(os.environ.get("BAYESHAPTIC_DEBUG"))
+    try:
+        with _warnings_in_one_line():
+            return arguments.run(arguments)
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return 130
+    except (InputError, OSError) as error:
+        if debug:
+            traceback.print_exc()
+        complain(f"error: {describe(error)}")
+        return 2
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        complain(
+            f"error: this is a defect in bayeshaptic ({describe(error)}); please report it with "
+            "the output of the same command and --debug"
+        )
+        return 1
+
+
+@contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: object = None,
+        line: str | None = None,
+    ) -> None:
+        place = "" if issubclass(category, BayeshapticWarning) else f"{category.__name__}: "
+        complain(f"warning: {place}{' '.join(str(message).split())}")
+
+    with warnings.catch_warnings():
+        # ArviZ 0.23 announces its successor once a day.
+        warnings.filterwarnings("ignore", category=FutureWarning, module="arviz")
+        warnings.showwarning = show
+        yield

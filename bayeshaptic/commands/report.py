@@ -1,0 +1,67 @@
+"""``bayeshaptic report``: from a recording or a study to an uncertainty report."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from bayeshaptic.commands.options import add_analysis_options, add_quiet, settings_from
+
+NAME = "report"
+SUMMARY = "report how stiff a wall may be, from a recording or a study"
+DESCRIPTION = """\
+Fit a model of the device to a recording of commanded force and measured position, with the
+uncertainty of every parameter, and report the critical stiffness: how stiff a virtual wall may be
+before it goes unstable, and what is safe at 5, 1 and 0.1 per cent risk.
+
+The folder gets report.html (one page, works offline), summary.json, posterior.nc (ArviZ) and the
+figures as PNG. Of a study, every recording has a folder of its own, and index.html lists them."""
+EXAMPLES = """\
+  bayeshaptic report lhifam-user.csv.gz --device lhifam -o out/
+  bayeshaptic report bench.mat --columns "time=t*1e-6,force=iq[A],position=theta[rad]" --model free
+  bayeshaptic report response.csv --period-s 0.001
+  bayeshaptic report study.toml -o study-report/"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The source, the folder, and how to read and analyse."""
+    parser.add_argument(
+        "source",
+        type=Path,
+        metavar="RECORDING_OR_STUDY",
+        help="a recording (.csv, .csv.gz, .mat, .h5, .npz) with columns time_s, force_n, "
+        "position_m or time_s, torque_nm, angle_rad; a table of a frequency response; or a "
+        "study (.toml)",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder for the report, made if need be; an older report in it is replaced "
+        "(default: ./NAME-report, NAME being the source's name without its endings)",
+    )
+    add_analysis_options(parser)
+    parser.add_argument(
+        "--no-loop",
+        action="store_true",
+        help="fit the model as declared, without looking for what it lacks (as yet, the report "
+        "never looks: it says how far the residual is above the noise)",
+    )
+    add_quiet(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the report; 0, or 1 where a recording of a study failed."""
+    from bayeshaptic.batch import Job, report_source
+    from bayeshaptic.commands.talk import Talk
+    from bayeshaptic.recordings.read import recording_name
+
+    folder = arguments.output or Path(f"{recording_name(arguments.source)}-report")
+    job = Job(arguments.source, folder, settings_from(arguments))
+    with Talk(arguments.quiet) as talk:
+        done = report_source(job, talk.progress)
+        failed = talk.tell(done)
+        if len(done) > 1:
+            talk.say(f"all: {folder / 'index.html'}")
+    return 1 if failed else 0

@@ -1,0 +1,178 @@
+"""``bayeshaptic simulate``: a recording from the virtual bench."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bayeshaptic.commands.options import add_quiet, band, non_negative, positive, seed
+from bayeshaptic.errors import InputError
+
+if TYPE_CHECKING:
+    from bayeshaptic.rig.bench import Bench
+    from bayeshaptic.rig.excitation import Excitation
+
+NAME = "simulate"
+SUMMARY = "record a simulated device, with or without a hand on it"
+DESCRIPTION = """\
+Record a simulated experiment: a device of known parameters, perhaps held by a user whose hand
+trembles and wanders, is shaken by a commanded force and read by an encoder. The truth is known, so
+this is how to try the report, and how well it finds what is there."""
+EXAMPLES = """\
+  bayeshaptic simulate lhifam --held -o lhifam-user.csv.gz
+  bayeshaptic simulate phantom --excitation multisine --seconds 20 -o multisine.npz
+  bayeshaptic simulate lhifam --effect coulomb_friction=force:1.5 -o rubbing.csv"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The device, the file, and what is simulated."""
+    parser.add_argument(
+        "device", metavar="DEVICE", help="lhifam, phantom, or the path of a device file (TOML)"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="the recording: .csv, .csv.gz, .npz, .h5 or .mat",
+    )
+    hand = parser.add_mutually_exclusive_group()
+    hand.add_argument("--held", action="store_true", help="a user holds the device")
+    hand.add_argument(
+        "--free", dest="held", action="store_false", help="nobody holds it (the default)"
+    )
+    parser.add_argument(
+        "--seconds", type=positive, default=30.0, metavar="S", help="duration (default: 30)"
+    )
+    parser.add_argument(
+        "--period-s", type=positive, metavar="T", help="sampling period (default: the device's)"
+    )
+    parser.add_argument(
+        "--delay-s", type=non_negative, metavar="SECONDS", help="loop delay (default: the device's)"
+    )
+    parser.add_argument(
+        "--encoder-resolution",
+        type=positive,
+        metavar="Q",
+        help="one encoder count, in m or rad (default: the device's)",
+    )
+    parser.add_argument(
+        "--excitation",
+        choices=("noise", "multisine"),
+        default="noise",
+        help="white noise in the band, or a multisine with lines 1 Hz apart (default: noise)",
+    )
+    parser.add_argument(
+        "--force-rms",
+        type=positive,
+        metavar="F",
+        help="root mean square of the excitation, N or N m (default: what is usual for the device)",
+    )
+    parser.add_argument(
+        "--band",
+        type=band,
+        metavar="LOW,HIGH",
+        help="of the excitation, in Hz (default: the device's)",
+    )
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME[=FIELD:VALUE,...]",
+        help="something that the plain model lacks, at a typical strength or with the fields "
+        "given; may come more than once. An unknown name or field lists the known ones",
+    )
+    parser.add_argument(
+        "--seed",
+        type=seed,
+        default=0,
+        metavar="N",
+        help="the same seed gives the same recording (default: 0)",
+    )
+    add_quiet(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the recording; 0."""
+    from bayeshaptic.commands.talk import Talk
+    from bayeshaptic.rig.recording import write_recording
+    from bayeshaptic.rig.simulate import simulate
+
+    refuse_place(arguments.output)
+    bench = bench_from(arguments)
+    recording = simulate(bench, excitation_from(arguments, bench), seed=arguments.seed)
+    path = write_recording(arguments.output, recording)
+    with Talk(arguments.quiet) as talk:
+        talk.say(
+            f"{path}: {len(recording.time_s)} samples every {1e3 * recording.period_s:g} ms; "
+            f"truth: {bench.mechanism}, critical stiffness {bench.true_critical_stiffness():.5g} "
+            f"{'N/m' if bench.force_unit == 'N' else 'N m/rad'}"
+        )
+    return 0
+
+
+def bench_from(arguments: argparse.Namespace) -> Bench:
+    """The bench that the options describe."""
+    from bayeshaptic.rig.bench import Bench
+
+    options = {
+        "period_s": arguments.period_s,
+        "delay_s": arguments.delay_s,
+        "encoder_resolution": arguments.encoder_resolution,
+        "force_rms": arguments.force_rms,
+        "band_hz": arguments.band,
+    }
+    changes = {name: value for name, value in options.items() if value is not None}
+    bench = Bench.from_device(arguments.device, held=arguments.held, **changes)
+    for text in arguments.effect:
+        name, fields = parse_effect(text)
+        bench = bench.with_effect(name, **fields)
+    return bench
+
+
+def excitation_from(arguments: argparse.Namespace, bench: Bench) -> Excitation:
+    """White noise, or a multisine of the same level and band."""
+    from bayeshaptic.rig.excitation import Multisine, WhiteNoise
+
+    low, high = bench.band_hz
+    if arguments.excitation == "noise":
+        return WhiteNoise(bench.force_rms, high, low, arguments.seconds)
+    periods = max(round(arguments.seconds), 1)
+    return Multisine(bench.force_rms, low, high, spacing_hz=1.0, periods=periods)
+
+
+def parse_effect(text: str) -> tuple[str, dict[str, float]]:
+    """``name=field:value,field:value`` as the name and the fields' values.
+
+    Raises
+    ------
+    InputError
+        Where a field has no value, or one that is not a number.
+    """
+    name, _, rest = text.partition("=")
+    fields: dict[str, float] = {}
+    for part in filter(None, rest.split(",")):
+        key, colon, value = part.partition(":")
+        try:
+            fields[key.strip()] = float(value)
+        except ValueError:
+            raise InputError(
+                f"--effect {text}: '{part}' is not FIELD:VALUE with a number, for example force:1.5"
+            ) from None
+    return name.strip(), fields
+
+
+def refuse_place(path: Path) -> None:
+    """Say before any work that a file cannot be written there.
+
+    Raises
+    ------
+    InputError
+        Where `path` is a folder, or its folder does not exist.
+    """
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name a file, such as {path / 'recording.csv.gz'}")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"{path.parent}: no such folder; make it first")

@@ -1,0 +1,82 @@
+"""What the command line says while it works and when it is done."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bayeshaptic.report.index import Reported
+
+MOST_WARNINGS = 3
+
+
+def complain(message: str) -> None:
+    """One line on stderr, with the program's name before it."""
+    print(f"bayeshaptic: {message}", file=sys.stderr)
+
+
+class Talk:
+    """A progress bar on stderr where that is a terminal; results on stdout, failures on stderr.
+
+    Parameters
+    ----------
+    quiet : bool
+        No bar and no results; failures still show.
+    """
+
+    def __init__(self, quiet: bool) -> None:
+        self.quiet = quiet
+        self._bar: Any = None
+        if not quiet and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            form = "{percentage:3.0f} % |{bar}| {elapsed}, {remaining} to go; {desc}"
+            self._bar = tqdm(total=1.0, leave=False, dynamic_ncols=True, bar_format=form)
+
+    def __enter__(self) -> Talk:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def progress(self, share: float, word: str) -> None:
+        """Show that a `share` (0 to 1) of the work is done, and a `word` about what comes now."""
+        if self._bar is not None:
+            self._bar.set_description_str(word, refresh=False)
+            self._bar.update(max(share - self._bar.n, 0.0))
+
+    def say(self, line: str) -> None:
+        """A line of the results."""
+        if not self.quiet:
+            self._between_bars(lambda: print(line, flush=True))
+
+    def complain(self, line: str) -> None:
+        """A failure that does not end the command."""
+        self._between_bars(lambda: complain(f"error: {line}"))
+
+    def tell(self, done: Iterable[Reported]) -> int:
+        """What became of each recording, in a few lines each; how many failed."""
+        failed = 0
+        for reported in done:
+            if reported.headline is None:
+                self.complain(f"{reported.name}: {reported.error}")
+                failed += 1
+                continue
+            self.say(f"{reported.name}: {reported.headline.sentence}")
+            for warning in reported.warnings[:MOST_WARNINGS]:
+                self.say(f"  warning: {warning}")
+            more = len(reported.warnings) - MOST_WARNINGS
+            if more > 0:
+                self.say(f"  and {more} more in the report")
+            self.say(f"  report: {reported.page}")
+        return failed
+
+    def _between_bars(self, write: Any) -> None:
+        if self._bar is None:
+            write()
+        else:
+            with self._bar.external_write_mode(file=sys.stderr):
+                write()
