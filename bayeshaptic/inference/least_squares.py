@@ -94,7 +94,7 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
     etfe : Etfe
     seed : int
         For the starting points.
-    start : ndarray, shape (P,), optional
+    start : ndarray, shape (P,) or (S, P), optional
         Begin here and nowhere else.
 
     Returns
@@ -107,13 +107,10 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
     likelihood = Likelihood(model, compress(etfe))
     residuals = weighted_residuals(likelihood, here)
     if start is None:
-        points = starting_points(model, etfe, np.random.default_rng(seed))
-        phi = np.clip(here.coordinate(points), low, high)
-        phi, cost = _best_of_many(residuals, phi, low, high)
-        agreeing = int(np.sum(cost < cost.min() + 0.5))
-    else:
-        phi, agreeing = here.coordinate(np.atleast_2d(start)), 1
-        cost = np.zeros(1)
+        start = starting_points(model, etfe, np.random.default_rng(seed))
+    phi = np.clip(here.coordinate(np.atleast_2d(start)), low, high)
+    phi, cost = _best_of_many(residuals, phi, low, high)
+    agreeing = int(np.sum(cost < cost.min() + 0.5))
     best = phi[[np.argmin(cost)]]
     for _ in range(_REWINDOWINGS):
         fitted = here.natural(best)[0]

@@ -1,0 +1,64 @@
+"""What an effect is: a physical phenomenon that the base model lacks.
+
+Every effect is one small frozen dataclass with a name, a title, a family, and its parameters with
+priors; the families differ in what it does with them:
+
+linear
+    `LinearEffect.apply` extends the mechanism or the loop.
+nonlinear
+    `NonlinearEffect` adds an internal force built from the motion; the loop's large-amplitude
+    limit is that of the linear rest.
+time-varying
+    parameters that differ between parts of the recording.
+measurement
+    the data or the noise change, the device does not.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.models import LinearSystem, Model, Parameter
+from bayeshaptic.recordings.etfe import Etfe
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearEffect(ABC):
+    """An effect that extends the linear model.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+        With priors, in the units of the model it was made for.
+    """
+
+    parameters: tuple[Parameter, ...]
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    family: ClassVar[str] = "linear"
+    ties: ClassVar[tuple[str, ...]] = ()
+    """Effects that one recording may not tell from this one."""
+    told_apart_by: ClassVar[str] = ""
+    """The measurement that would separate the ties, in words."""
+
+    @classmethod
+    @abstractmethod
+    def candidates(cls, model: Model, etfe: Etfe) -> tuple[LinearEffect, ...]:
+        """Its variants that make sense on `model`, with priors; none where it makes no sense."""
+
+    @abstractmethod
+    def starting_values(self, model: Model, etfe: Etfe) -> Floats:
+        """Where a fit should start, natural values, shape (S, number of parameters)."""
+
+    @abstractmethod
+    def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
+        """The system with the effect; `values` holds every parameter of the model, shape (B,)."""

@@ -1,0 +1,5 @@
+"""Imports every effect of this package, so that it is registered."""
+
+from bayeshaptic.effects import extra_delay
+
+__all__ = ["extra_delay"]
