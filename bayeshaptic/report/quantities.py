@@ -87,13 +87,12 @@ def interval(low: float | None, high: float | None, unit: str, sd: float | None 
     return f"{row.number(low, spread)} to {row.number(high, spread)} {row.unit}".rstrip()
 
 
-def rounded_down(value: float, sd: float) -> float:
-    """`value` cut to two digits of `sd`, downwards: a safe stiffness must not be rounded up."""
-    if not (value > 0.0 and math.isfinite(value)):
-        return value
-    step = 10.0 ** -_decimals(value, sd, 3)
-    cut = math.floor(value / step * (1.0 + 1e-12)) * step
-    return cut if cut > 0.0 else value
+def estimate(middle: float, low: float, high: float, unit: str) -> str:
+    """A value and its interval with the same digits: ``"22.3 (21.9 to 22.7) kN/m"``."""
+    row = scale((low, middle, high), unit)
+    spread = (high - low) / 3.3 or None
+    numbers = [row.number(value, spread) for value in (middle, low, high)]
+    return f"{numbers[0]} ({numbers[1]} to {numbers[2]}) {row.unit}".rstrip()
 
 
 def percent(probability: float) -> str:

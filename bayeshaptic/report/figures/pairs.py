@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 SHOWN = 6
-POINTS = 1500
+POINTS = 800
 LEVELS = (0.9, 0.5)
 
 

@@ -63,7 +63,8 @@ def draw(analysis: Analysis) -> Figure:
     worst = max(float(np.nanmax(np.abs(parts))), 4.0)
     if worst > 10:
         _symlog(top, worst)
-    top.set_ylim(-1.25 * worst, 1.25 * worst)
+    # Room for the legend above the highest point.
+    top.set_ylim(-1.25 * worst, (2.5 if worst > 10 else 1.35) * worst)
     style.legend(top, loc="upper left", ncols=3)
     style.panel(bottom, y="rms per third\noctave / noise")
     bands = third_octaves(frequency, residual)

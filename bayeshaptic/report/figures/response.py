@@ -26,7 +26,8 @@ def draw(analysis: Analysis) -> Figure:
     heights = (2.8, 2.0, 1.7, 1.0) if known else (2.8, 2.0, 1.7)
     figure = style.new_figure(0.95 * sum(heights))
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
-    unit = f"{etfe.position_unit}/{pretty_unit(etfe.force_unit)}"
+    force = pretty_unit(etfe.force_unit)
+    unit = f"{etfe.position_unit}/({force})" if " " in force else f"{etfe.position_unit}/{force}"
     gain = style.panel(panels[0], y=f"gain, dB re 1 {unit}")
     phase = style.panel(panels[1], y="phase, degrees")
     relative = etfe.relative_sd

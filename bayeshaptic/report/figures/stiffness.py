@@ -94,7 +94,7 @@ def _lines(axes: Axes, analysis: Analysis, row: Scale) -> None:
         if safe is not None and low <= safe * row.factor <= high:
             axes.axvline(safe * row.factor, color=style.DATA, linewidth=1.0,
                          linestyle=style.DASHES[1:][number],
-                         label=f"safe at {percent(risk)} risk")  # fmt: skip
+                         label=f"{percent(risk)} risk of instability")  # fmt: skip
     for witness in witnesses(analysis):
         if witness.middle is None or not low <= witness.middle * row.factor <= high:
             continue

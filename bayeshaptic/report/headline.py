@@ -1,0 +1,190 @@
+"""The one large sentence: a stiffness to act on, or the plain reason why there is none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic.report.limits import decibel
+from bayeshaptic.report.quantities import estimate, percent, quantity
+from bayeshaptic.report.summary import analysis_of, has_feedback, tip_limit
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+HEADLINE_RISKS = (0.01, 0.05)
+# Clean recordings reach a reduced chi-square of 1.1; beyond this the model lacks something.
+CLEAN_EXCESS = 0.2
+_CHANCE_SDS = 4.0
+# Below this the two ways to read the limit agree well enough for any use.
+_AGREEMENT_DB = 0.3
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What a reader takes home.
+
+    Attributes
+    ----------
+    status : {"safe", "caution", "untrusted"}
+        "untrusted" where no stiffness can be recommended.
+    sentence : str
+        The recommendation, or that there is none and why.
+    details : tuple of str
+        Sentences below it: the tip, what limits it, what to beware of.
+    """
+
+    status: str
+    sentence: str
+    details: tuple[str, ...]
+
+
+def headline(result: Any) -> Headline:
+    """The recommendation of an analysis, or of what closing the loop returns."""
+    analysis = analysis_of(result)
+    objections = _objections(analysis, getattr(result, "diagnosis", None))
+    if objections:
+        return _untrusted(analysis, objections)
+    limit = analysis.limit
+    if limit.quantile(0.05) == math.inf:
+        return Headline("caution", "Nothing limits the stiffness: the model is stable with any.", ())
+    risk = next((r for r in HEADLINE_RISKS if limit.safe(r) is not None), None)
+    if risk is None:
+        few = (
+            "the sampler's draws are too few to state a risk of "
+            f"{percent(HEADLINE_RISKS[-1])} (fewer than 20 of them lie below any such stiffness)"
+        )
+        return _untrusted(analysis, (few,))
+    return _recommended(analysis, risk, getattr(result, "diagnosis", None) or {})
+
+
+def misfit_is_clear(analysis: Analysis) -> bool:
+    """Whether the residual is beyond what noise does, by chance with so few lines included."""
+    points = max(len(analysis.fit.residual), 1)
+    excess = max(CLEAN_EXCESS, _CHANCE_SDS / math.sqrt(points))
+    return not analysis.fit.reduced_chi_square <= 1.0 + excess
+
+
+def misfit_factor(analysis: Analysis) -> str:
+    """How many times the noise the residual is, for a sentence."""
+    factor = math.sqrt(analysis.fit.reduced_chi_square)
+    return f"{factor:.0f}" if factor >= 10 else f"{factor:.2g}"
+
+
+def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
+    """Why no stiffness can be recommended; empty where one can."""
+    found = []
+    verdict = (diagnosis or {}).get("verdict")
+    if verdict is None and misfit_is_clear(analysis):
+        found.append(
+            "the model does not explain the data: what it leaves over is "
+            f"{misfit_factor(analysis)} times the noise (reduced chi-square "
+            f"{analysis.fit.reduced_chi_square:.3g})"
+        )
+    if has_feedback(analysis):
+        found.append(
+            "the force was computed from the motion (feedback), which biases the response that "
+            "everything here is read from"
+        )
+    if not analysis.posterior.converged:
+        found.append("the sampler has not converged, so the interval may be too narrow")
+    if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
+        found.append("the closed loop's poles do not confirm some of the limits")
+    never = float((analysis.limit.samples <= 0).mean())
+    if never > min(HEADLINE_RISKS):
+        found.append(
+            f"with probability {percent(never)} the loop is unstable however soft the wall is"
+        )
+    return tuple(found)
+
+
+def _untrusted(analysis: Analysis, objections: tuple[str, ...]) -> Headline:
+    limit = analysis.limit
+    sentence = f"Do not ship a stiffness from this report: {_joined(objections)}."
+    middle, low, high = (limit.quantile(p) for p in (0.5, 0.05, 0.95))
+    details = [
+        f"The model's limit and its interval, {estimate(middle, low, high, limit.unit)}, are not to "
+        "be trusted; they stand below for comparison only."
+    ]
+    own = analysis.etfe_limit
+    if own is not None and own.q50 is not None and not has_feedback(analysis):
+        details.append(
+            "The measured response itself, without a model, puts the limit at "
+            f"{estimate(own.q50, own.q05, own.q95, limit.unit)}."
+        )
+    return Headline("untrusted", sentence, tuple(details))
+
+
+def _recommended(analysis: Analysis, risk: float, diagnosis: Any) -> Headline:
+    limit = analysis.limit
+    safe = limit.safe(risk)
+    assert safe is not None
+    sd = (limit.quantile(0.95) - limit.quantile(0.05)) / 3.29
+    cap = _lower_witness(analysis, safe)
+    stiffness, shown = _cut(safe if cap is None else cap, limit.unit, sd)
+    if cap is None:
+        sentence = (
+            f"Render walls of at most {shown}: the risk that the loop is unstable there is "
+            f"{percent(risk)}."
+        )
+    else:
+        sentence = (
+            f"Stay below {shown}: the measured response itself puts the limit lower than the model "
+            f"does ({quantity(safe, limit.unit)} at {percent(risk)} risk), and the two must agree "
+            "before the model's figure is used."
+        )
+    details = []
+    tip = tip_limit(analysis)
+    if tip is not None and analysis.lever_m is not None:
+        lever = analysis.lever_m
+        _, at_tip = _cut(stiffness / lever**2, tip.unit, sd / lever**2)
+        details.append(f"At the tip, {quantity(lever, 'm')} from the axis, that is {at_tip}.")
+    details.append(_what_binds(analysis))
+    warnings = [n.text for n in analysis.notices if n.level == "warning"]
+    unexplained = diagnosis.get("verdict") == "unexplained"
+    status = "caution" if warnings or unexplained or cap is not None else "safe"
+    if unexplained:
+        details.append(
+            "Something in this recording remains unexplained, and the interval is widened for it."
+        )
+    if warnings:
+        details.append("Beware: " + " ".join(_sentence(text) for text in warnings))
+    return Headline(status, sentence, tuple(details))
+
+
+def _cut(stiffness: float, unit: str, sd: float) -> tuple[float, str]:
+    """`stiffness` rounded down to three digits, or one digit of its sd, and how it is written."""
+    exponent = math.floor(math.log10(stiffness))
+    last = min(exponent - 2, math.floor(math.log10(sd)) if sd > 0 else exponent - 2)
+    step = 10.0 ** max(last, exponent - 4)
+    cut = math.floor(stiffness / step * (1 + 1e-12)) * step
+    digits = exponent - round(math.log10(step)) + 1
+    return cut, f"{quantity(cut, unit, digits=digits)} ({decibel(cut):.1f} dB)"
+
+
+def _lower_witness(analysis: Analysis, safe: float) -> float | None:
+    """The measurement's own lower end, where it contradicts the model on the unsafe side."""
+    own = analysis.etfe_limit
+    if own is None or own.q05 is None or own.q95 is None or own.q05 <= 0:
+        return None
+    apart = own.q95 < analysis.limit.quantile(0.05)
+    if not apart or decibel(safe) - decibel(own.q50) < _AGREEMENT_DB:
+        return None
+    return min(float(own.q05), safe)
+
+
+def _what_binds(analysis: Analysis) -> str:
+    named = [f"{c.label} ({percent(c.probability)})" for c in analysis.limit.crossings]
+    if len(named) == 1:
+        return f"What limits it: {analysis.limit.crossings[0].label}."
+    return f"What limits it: {', or '.join(named)}."
+
+
+def _joined(reasons: tuple[str, ...]) -> str:
+    return reasons[0] if len(reasons) == 1 else "; and ".join(reasons)
+
+
+def _sentence(text: str) -> str:
+    text = text.strip()
+    return text if text.endswith((".", "!", "?")) else text + "."

@@ -1,0 +1,97 @@
+"""`report.html`: one file without scripts and without the network."""
+
+from __future__ import annotations
+
+import base64
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic import __version__
+from bayeshaptic.report import tables, words
+from bayeshaptic.report.assumptions import assumptions, priors, versions
+from bayeshaptic.report.figures import PICTURES
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.summary import analysis_of
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.errors import Notice
+
+HERE = Path(__file__).parent
+_LABELS = {
+    "safe": "Recommendation",
+    "caution": "Recommendation, with caution",
+    "untrusted": "No recommendation",
+}
+
+
+@dataclass(frozen=True)
+class EmbeddedPicture:
+    """A PNG inside of the page."""
+
+    name: str
+    alternative: str
+    source: str
+    width: int
+    height: int
+
+
+def render(result: Any, pictures: Mapping[str, bytes]) -> str:
+    """The page of an analysis (or of what closing the loop returns) with its PNG pictures."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    analysis = analysis_of(result)
+    environment = Environment(
+        loader=FileSystemLoader(HERE, encoding="utf-8"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    head = headline(result)
+    return environment.get_template("report.jinja").render(
+        title=title(analysis),
+        style=(HERE / "report.css").read_text(encoding="utf-8"),
+        version=__version__,
+        written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        analysis=analysis,
+        headline=head,
+        label=_LABELS[head.status],
+        notices=unique(analysis.notices),
+        pictures={name: _embedded(name, png) for name, png in pictures.items()},
+        words=words,
+        tables=tables,
+        assumptions=assumptions(analysis),
+        priors=priors(analysis),
+        versions=versions(),
+    )
+
+
+def title(analysis: Analysis) -> str:
+    """What the report is about: the device and who held it, or the recording's name."""
+    recording = analysis.recording
+    device = None if analysis.device is None else analysis.device.name
+    if recording is None:
+        return device or "a frequency response"
+    name = recording.device or device
+    if name is None:
+        return recording.name
+    held = f", held by {recording.user}" if recording.user else ""
+    return f"{name}{held}"
+
+
+def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+    """Warnings first, without repetitions."""
+    once = tuple(dict.fromkeys(notices))
+    return tuple(sorted(once, key=lambda notice: notice.level != "warning"))
+
+
+def _embedded(name: str, png: bytes) -> EmbeddedPicture:
+    width, height = struct.unpack(">II", png[16:24])  # of the PNG's header
+    alternative = next((p.alternative for p in PICTURES if p.name == name), name)
+    source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+    return EmbeddedPicture(name, alternative, source, width, height)

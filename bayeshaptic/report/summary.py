@@ -1,0 +1,189 @@
+"""`summary.json`: the numbers of one report, every key always there, null where missing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bayeshaptic import __version__
+from bayeshaptic.report.limits import RISKS, finite
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.stability.critical import CriticalStiffness
+
+QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+
+_ERROR = {
+    "weighted_rms": None,
+    "held_out_weighted_rms": None,
+    "gain_db_rms": None,
+    "phase_deg_rms": None,
+    "critical_stiffness": dict.fromkeys(QUANTILES),
+    "critical_stiffness_db": None,
+}
+_DIAGNOSIS = dict.fromkeys(("verdict", "residual_class", "effects", "candidates"))
+
+
+def summary(result: Any) -> dict[str, Any]:
+    """Everything that `summary.json` holds, as plain dictionaries, lists, strings and floats.
+
+    Parameters
+    ----------
+    result : Analysis, or what closing the loop returns
+        The latter has `analysis` (of the model with its effects) and the mappings `diagnosis`,
+        `before` and `after` in the form of the file; without it those are null.
+
+    Returns
+    -------
+    dict
+        SI units; None for what is missing, and for numbers that are infinite or not a number.
+    """
+    analysis = analysis_of(result)
+    error = {name: getattr(result, name, None) for name in ("before", "after")}
+    return plain(
+        {
+            "version": __version__,
+            "recording": _recording(analysis),
+            "etfe": _etfe(analysis),
+            "model": {
+                "name": analysis.model.name,
+                "effects": [effect.name for effect in analysis.model.effects],
+                "parameters": list(analysis.model.names),
+            },
+            "least_squares": _least_squares(analysis),
+            "posterior": _posterior(analysis),
+            "critical_stiffness": _critical_stiffness(analysis),
+            "diagnosis": _DIAGNOSIS | dict(getattr(result, "diagnosis", None) or {}),
+            "error": {name: _ERROR | dict(given or {}) for name, given in error.items()},
+        }
+    )
+
+
+def summary_json(result: Any) -> str:
+    """`summary` as text; strict JSON, without NaN and infinity."""
+    return json.dumps(summary(result), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def analysis_of(result: Any) -> Analysis:
+    """The analysis itself, of an analysis or of what closing the loop returns."""
+    return getattr(result, "analysis", result)
+
+
+def plain(value: Any) -> Any:
+    """`value` in the types of JSON: NumPy scalars unwrapped, NaN and infinities as None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return finite(value)
+    return value
+
+
+def _recording(analysis: Analysis) -> dict[str, Any]:
+    recording, etfe = analysis.recording, analysis.etfe
+    facts = dict.fromkeys(("file", "device", "user", "configuration"))
+    facts |= {
+        "period_s": etfe.period_s,
+        "samples": None,
+        "kind": etfe.kind,
+        "excitation_rms": None,
+        "feedback": None,
+    }
+    if analysis.device is not None:
+        facts["device"] = analysis.device.name
+    if recording is None:
+        return facts
+    return facts | {
+        "file": recording.name if recording.source is None else recording.source.as_posix(),
+        "device": recording.device or facts["device"],
+        "user": recording.user,
+        "configuration": recording.configuration,
+        "samples": recording.samples,
+        "excitation_rms": np.sqrt(np.mean(np.square(recording.force))),
+        "feedback": has_feedback(analysis),
+    }
+
+
+def has_feedback(analysis: Analysis) -> bool:
+    """Whether a warning says that the force was computed from the motion."""
+    return any(n.topic == "feedback" and n.level == "warning" for n in analysis.notices)
+
+
+def _etfe(analysis: Analysis) -> dict[str, Any]:
+    etfe = analysis.etfe
+    return {
+        "lines": etfe.lines,
+        "frequency_hz": list(etfe.band_hz),
+        "median_relative_sd": np.median(etfe.relative_sd),
+        "period_lines": etfe.period_lines,
+    }
+
+
+def _least_squares(analysis: Analysis) -> dict[str, Any]:
+    fit = analysis.fit
+    sd = fit.sd
+    return {
+        "parameters": {
+            name: {"value": fit.theta[i], "sd": sd[i], "unit": fit.model.unit(name)}
+            for i, name in enumerate(fit.model.names)
+        },
+        "reduced_chi_square": fit.reduced_chi_square,
+    }
+
+
+def _posterior(analysis: Analysis) -> dict[str, Any]:
+    posterior = analysis.posterior
+    return {
+        "parameters": posterior.summary(),
+        "draws": len(posterior.draws),
+        "ess_min": min(posterior.ess_bulk.min(), posterior.ess_tail.min()),
+        "rhat_max": posterior.rhat.max(),
+        "seconds": posterior.seconds,
+    }
+
+
+def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
+    limit, own = analysis.limit, analysis.etfe_limit
+    tip = tip_limit(analysis)
+    return {
+        "unit": limit.unit,
+        **_quantiles(limit),
+        "db": {name: limit.db(p) for name, p in QUANTILES.items()},
+        "frequency_hz": _frequency(limit),
+        "tip": None if tip is None else {"unit": tip.unit, **_quantiles(tip)},
+        "crossings": [
+            {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
+            for c in limit.crossings
+        ],
+        "etfe": {name: None if own is None else getattr(own, name) for name in QUANTILES},
+        "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
+    }
+
+
+def tip_limit(analysis: Analysis) -> CriticalStiffness | None:
+    """The limit at the tip in N/m; None without a lever arm or without a torque in N m."""
+    if analysis.lever_m is None or analysis.limit.unit != "N m/rad":
+        return None
+    return analysis.limit.tip(analysis.lever_m)
+
+
+def _quantiles(limit: CriticalStiffness) -> dict[str, Any]:
+    return {name: limit.quantile(p) for name, p in QUANTILES.items()}
+
+
+def _frequency(limit: CriticalStiffness) -> dict[str, Any]:
+    known = limit.frequency_hz[np.isfinite(limit.frequency_hz)]
+    return {
+        name: np.quantile(known, p) if len(known) else None for name, p in QUANTILES.items()
+    }

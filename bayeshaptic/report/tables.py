@@ -1,0 +1,196 @@
+"""The rows of the report's tables, as text that needs no further formatting."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bayeshaptic.report.limits import RISKS, decibel, finite, witnesses
+from bayeshaptic.report.quantities import interval, percent, pretty_unit, quantity, scale
+from bayeshaptic.report.summary import QUANTILES, tip_limit
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+Rows = tuple[tuple[str, ...], ...]
+_DASH = "\N{EN DASH}"
+_OUTCOMES = {
+    "at a bound": "least squares stopped at its bound: no error bar",
+    "prior-dominated": "the data alone do not decide it",
+}
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One parameter: all numbers in the unit of the row.
+
+    `reference` is the device file's value, a dash without one.
+    """
+
+    name: str
+    title: str
+    unit: str
+    least_squares: str
+    posterior: str
+    range: str
+    reference: str
+    ess: str
+    rhat: str
+    remarks: str
+
+
+def parameters(analysis: Analysis) -> tuple[ParameterRow, ...]:
+    """Least squares beside the posterior, a row a parameter."""
+    fit, posterior, model = analysis.fit, analysis.posterior, analysis.model
+    rows = []
+    for i, (name, found) in enumerate(posterior.summary().items()):
+        row = scale((found["q50"], found["q95"]), found["unit"])
+        value, sd = float(fit.theta[i]), finite(fit.sd[i])
+        numbers = [row.number(found[q], found["sd"]) for q in ("q05", "q95")]
+        remarks = [_OUTCOMES.get(fit.outcome.get(name, ""), "")]
+        if found["prior_dominated"]:
+            remarks.append("the prior decides this one")
+        rows.append(
+            ParameterRow(
+                name,
+                model.parameter(name).title,
+                row.unit,
+                row.number(value, sd or found["sd"]) + (f" ± {row.number(sd, sd)}" if sd else ""),
+                f"{row.number(found['mean'], found['sd'])} ± {row.number(found['sd'], found['sd'])}",
+                " to ".join(numbers),
+                row.number(model.reference.get(name)),
+                f"{min(found['ess_bulk'], found['ess_tail']):.0f}",
+                f"{found['rhat']:.3f}",
+                "; ".join(text for text in remarks if text),
+            )
+        )
+    return tuple(rows)
+
+
+def limit(analysis: Analysis) -> Rows:
+    """Quantiles of the limit: (what, 5 %, median, 95 %)."""
+    stiffness, tip = analysis.limit, tip_limit(analysis)
+    levels = tuple(QUANTILES.values())
+    rows = [("critical stiffness", *_scaled([stiffness.quantile(p) for p in levels], stiffness.unit))]
+    rows.append((f"in dB re 1 {stiffness.unit}", *(_db(stiffness.quantile(p)) for p in levels)))
+    if tip is not None:
+        rows.append(("at the tip", *_scaled([tip.quantile(p) for p in levels], tip.unit)))
+        rows.append((f"at the tip in dB re 1 {tip.unit}", *(_db(tip.quantile(p)) for p in levels)))
+    known = stiffness.frequency_hz[np.isfinite(stiffness.frequency_hz)]
+    if len(known):
+        hertz = [float(v) for v in np.quantile(known, levels)]
+        rows.append(("frequency of the binding crossing", *_scaled(hertz, "Hz")))
+    return tuple(rows)
+
+
+def safe(analysis: Analysis) -> Rows:
+    """The stiffness at each risk: (risk, stiffness, dB), and at the tip where there is a lever."""
+    tip = tip_limit(analysis)
+    rows = []
+    for risk in RISKS:
+        found = analysis.limit.safe(risk)
+        if found is None:
+            row = [percent(risk), "too few draws to say", _DASH]
+        else:
+            row = [percent(risk), quantity(found, analysis.limit.unit, digits=4), _db(found)]
+        if tip is not None:
+            row.append(_DASH if found is None else quantity(tip.quantile(risk), tip.unit, digits=4))
+        rows.append(tuple(row))
+    return tuple(rows)
+
+
+def crossings(analysis: Analysis) -> Rows:
+    """Which crossing binds: (label, median frequency, probability)."""
+    return tuple(
+        (c.label, quantity(c.frequency_hz, "Hz", digits=4), percent(c.probability))
+        for c in analysis.limit.crossings
+    )
+
+
+def comparison(analysis: Analysis) -> Rows:
+    """Every estimate of the limit: (name, 5 %, middle, 95 %, dB, difference in dB, remark)."""
+    found = witnesses(analysis)
+    ours = decibel(found[0].middle or 0.0)
+    rows = []
+    for witness in found:
+        middle = witness.middle
+        numbers = _scaled([witness.low, middle, witness.high], analysis.limit.unit)
+        level = _DASH if not middle else f"{decibel(middle):.2f}"
+        apart = _DASH
+        if middle and np.isfinite(ours) and witness.key != "posterior":
+            apart = f"{decibel(middle) - ours:+.2f}".replace("-", "\N{MINUS SIGN}")
+        rows.append((witness.label, *numbers, level, apart, witness.remark))
+    return tuple(rows)
+
+
+def measured(analysis: Analysis) -> Rows:
+    """What was measured: (what, value)."""
+    recording, etfe = analysis.recording, analysis.etfe
+    unit = pretty_unit(etfe.force_unit)
+    rows: list[tuple[str, ...]] = []
+    if recording is None:
+        rows.append(("Measurement", "a frequency response table, without its recording"))
+    else:
+        rows.append(("Recording", recording.name))
+        rows.append(("Held by", recording.user or "no user named"))
+        for title, value in (
+            ("Configuration", recording.configuration),
+            ("Trial", recording.trial),
+            ("Level", recording.level),
+        ):
+            if value is not None:
+                rows.append((title, str(value)))
+        rows.append(
+            ("Samples", f"{recording.samples:,} in {quantity(recording.duration_s, 's')}")
+        )
+        rms = float(np.sqrt(np.mean(np.square(recording.force))))
+        rows.append(("Excitation", f"{quantity(rms, unit)} rms ({_excitation(analysis)})"))
+        if recording.encoder_resolution is not None:
+            count = quantity(recording.encoder_resolution, recording.position_unit)
+            rows.append(("One encoder count", count))
+    rate = quantity(1 / etfe.period_s, "Hz")
+    rows.append(("Sampling period", f"{quantity(etfe.period_s, 's')} ({rate})"))
+    rows.append(("Units", f"force in {unit}, position in {etfe.position_unit}"))
+    rows.append(("Frequencies used", f"{interval(*etfe.band_hz, 'Hz')}, {etfe.lines:,} lines"))
+    error = 100 * float(np.median(etfe.relative_sd))
+    rows.append(("Error of the response", f"{error:.2g} % of its magnitude (median sd)"))
+    if analysis.device is not None:
+        rows.insert(1, ("Device file", analysis.device.name))
+    elif recording is not None and recording.device:
+        rows.insert(1, ("Device", recording.device))
+    return tuple(rows)
+
+
+def provenance(analysis: Analysis) -> Rows:
+    """Where the numbers come from: the file and its hash, and the time each step took."""
+    rows: list[tuple[str, ...]] = []
+    source = None if analysis.recording is None else analysis.recording.source
+    if source is not None:
+        rows.append(("File", source.as_posix()))
+        if source.is_file():
+            rows.append(("SHA-256", hashlib.sha256(source.read_bytes()).hexdigest()))
+    took = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in analysis.seconds.items())
+    if took:
+        rows.append(("Time taken", took))
+    return tuple(rows)
+
+
+def _excitation(analysis: Analysis) -> str:
+    lines = analysis.etfe.period_lines
+    return "random" if lines is None else f"periodic, {lines} excited lines"
+
+
+def _scaled(values: list[float | None], unit: str) -> tuple[str, ...]:
+    """Numbers of one row with the same prefix, digits by their spread."""
+    known = [float(v) for v in values if v is not None and np.isfinite(v)]
+    row = scale(known, unit)
+    spread = (max(known) - min(known)) / 3.29 if len(known) > 1 else None
+    return tuple(row.quantity(v, spread or None) if v is not None else _DASH for v in values)
+
+
+def _db(stiffness: float) -> str:
+    level = decibel(stiffness)
+    return f"{level:.2f} dB" if np.isfinite(level) else _DASH

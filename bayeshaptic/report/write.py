@@ -1,0 +1,72 @@
+"""Writing a report: everything or nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import uuid
+from pathlib import Path
+from typing import Any
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.report.figures import draw_pictures
+from bayeshaptic.report.html import render
+from bayeshaptic.report.summary import analysis_of, summary_json
+
+# Whoever waits for a report looks for its summary: it arrives when the rest is there.
+_LAST = "summary.json"
+
+
+def write_report(result: Any, out_dir: str | Path) -> Path:
+    """Write report.html, summary.json, posterior.nc and the figures into a folder.
+
+    The files are made in a hidden folder and moved when all of them are there: an interrupted run
+    leaves what was there before. Other files in `out_dir` stay.
+
+    Parameters
+    ----------
+    result : Analysis, or what closing the loop returns
+    out_dir : str or Path
+        Made where it is missing, with its parents.
+
+    Returns
+    -------
+    Path
+        Of report.html.
+
+    Raises
+    ------
+    InputError
+        If `out_dir` is a file.
+    """
+    out = Path(out_dir).resolve()
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out_dir}: is a file; name a folder for the report.")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    hidden = f".report-{uuid.uuid4().hex[:12]}"
+    draft = out / hidden if out.exists() else out.with_name(hidden)
+    draft.mkdir()
+    try:
+        _write_all(result, draft)
+        _move(draft, out)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+    return out / "report.html"
+
+
+def _write_all(result: Any, folder: Path) -> None:
+    analysis = analysis_of(result)
+    pictures = draw_pictures(analysis)
+    for name, png in pictures.items():
+        (folder / f"{name}.png").write_bytes(png)
+    analysis.posterior.save(folder / "posterior.nc")
+    (folder / "report.html").write_text(render(result, pictures), encoding="utf-8", newline="\n")
+    (folder / _LAST).write_text(summary_json(result), encoding="utf-8", newline="\n")
+
+
+def _move(draft: Path, out: Path) -> None:
+    if not out.exists():
+        draft.rename(out)
+        return
+    for path in sorted(draft.iterdir(), key=lambda path: path.name == _LAST):
+        os.replace(path, out / path.name)
