@@ -123,11 +123,11 @@ def dask(address: str) -> Executor:
                 client.submit(_attempt, job, item, pure=False, retries=0): item for item in items
             }
             for future in distributed.as_completed(futures):
-                error = future.exception()
-                if error is None:
+                problem = future.exception()
+                if problem is None:
                     yield future.result()
                 else:
-                    yield Outcome(futures[future], error=describe(error))
+                    yield Outcome(futures[future], error=describe(problem))
 
     return run
 

@@ -76,7 +76,7 @@ class Fit:
         return Likelihood(self.model, self.windows)
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
-        """The fitted sampled response, shape (L,)."""
+        """The fitted sampled response at `frequency_hz`, shape (L,)."""
         return self.model.response(self.theta, frequency_hz)
 
 

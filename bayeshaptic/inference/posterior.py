@@ -83,7 +83,7 @@ class Posterior:
         return self.diagnostics.ess_tail
 
     def quantile(self, p: float | Floats) -> Floats:
-        """Quantiles of every parameter, shape (..., P)."""
+        """Quantiles of every parameter at the probabilities `p`, shape (..., P)."""
         return np.quantile(self.draws, p, axis=0)
 
     @cached_property
@@ -129,7 +129,7 @@ class Posterior:
         return to_arviz(self)
 
     def save(self, path: str | Path) -> Path:
-        """Write it as netCDF; `load_posterior` reads it back.  Never leaves half a file."""
+        """Write it to `path` as netCDF; `load_posterior` reads it back.  Never leaves half a file."""
         from bayeshaptic.inference.arviz_io import save_posterior
 
         return save_posterior(self, Path(path))

@@ -101,15 +101,18 @@ class Model:
         return np.array([self.reference[name] for name in self.names])
 
     def parameter(self, name: str) -> Parameter:
+        """The sampled parameter called `name`."""
         return self.parameters[self.names.index(name)]
 
     def prior(self, name: str) -> Prior:
+        """The prior of the parameter called `name`; an InputError where it is not set yet."""
         prior = self.parameter(name).prior
         if prior is None:
             raise InputError(f"the prior of {name} is not set: fit the model to data first.")
         return prior
 
     def unit(self, name: str) -> str:
+        """Unit of the parameter called `name`, for example "N s/m"."""
         dimension = self.parameter(name).dimension
         return unit_of(dimension, self.force_unit, self.position_unit)
 
@@ -160,7 +163,7 @@ class Model:
         return response[0] if np.ndim(theta) == 1 else response
 
     def log_prior(self, theta: ArrayLike) -> Floats:
-        """Log prior density of parameter vectors of shape (B, P); shape (B,)."""
+        """Log prior density of parameter vectors `theta` of shape (B, P); shape (B,)."""
         theta = np.atleast_2d(np.asarray(theta, float))
         total = np.zeros(len(theta))
         for name, column in zip(self.names, theta.T, strict=True):
@@ -168,6 +171,7 @@ class Model:
         return total
 
     def with_period(self, period_s: float) -> Model:
+        """With the sampling period `period_s`, in seconds."""
         return replace(self, period_s=period_s)
 
     def with_prior(self, priors: Mapping[str, Prior]) -> Model:

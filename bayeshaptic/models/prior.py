@@ -25,16 +25,21 @@ class Prior(Protocol):
     """What every prior offers: density, quantiles, support, and the coordinate to sample in."""
 
     @property
-    def coordinate(self) -> str: ...
+    def coordinate(self) -> str:
+        """ "log" or "linear": in what the parameter is sampled."""
 
     @property
-    def support(self) -> tuple[float, float]: ...
+    def support(self) -> tuple[float, float]:
+        """Lowest and highest possible value."""
 
-    def log_density(self, x: ArrayLike) -> Floats: ...
+    def log_density(self, x: ArrayLike) -> Floats:
+        """Log of the density at natural values `x`, of any shape; -inf outside the support."""
 
-    def quantile(self, p: ArrayLike) -> Floats: ...
+    def quantile(self, p: ArrayLike) -> Floats:
+        """The values that the parameter is below with probabilities `p`, of any shape."""
 
-    def describe(self, unit: str) -> str: ...
+    def describe(self, unit: str) -> str:
+        """The prior in words, with numbers in the parameter's `unit`."""
 
 
 def draw(prior: Prior, rng: np.random.Generator, size: int) -> Floats:
@@ -43,7 +48,7 @@ def draw(prior: Prior, rng: np.random.Generator, size: int) -> Floats:
 
 
 @dataclass(frozen=True)
-class LogNormal:
+class LogNormal(Prior):
     """log(x) is normal around log(median) with standard deviation `log_sd`."""
 
     median: float
@@ -71,8 +76,8 @@ class LogNormal:
 
 
 @dataclass(frozen=True)
-class HalfNormal:
-    """|z| with z normal around zero: for dampers, which may be zero."""
+class HalfNormal(Prior):
+    """|z|, z normal around zero with standard deviation `scale`: for dampers, which may be zero."""
 
     scale: float
     coordinate = "linear"
@@ -95,8 +100,8 @@ class HalfNormal:
 
 
 @dataclass(frozen=True)
-class Normal:
-    """Normal around `mean`, cut off below `low` (by default not at all)."""
+class Normal(Prior):
+    """Normal around `mean` with standard deviation `sd`, cut off below `low` (by default not)."""
 
     mean: float
     sd: float
@@ -131,7 +136,7 @@ class Normal:
 
 
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(Prior):
     """Every value between `low` and `high` alike."""
 
     low: float
@@ -159,7 +164,7 @@ class Uniform:
 
 
 @dataclass(frozen=True)
-class LogUniform:
+class LogUniform(Prior):
     """Every factor between `low` and `high` alike."""
 
     low: float

@@ -78,7 +78,7 @@ class Study:
         return tuple(dict.fromkeys(entry.user for entry in self.entries if entry.user is not None))
 
     def read(self, entry: StudyEntry) -> Recording | Etfe:
-        """The measurement of one entry, with what the study declares about it.
+        """The measurement of one `entry`, with what the study declares about it.
 
         Time stamps come before the device's period, which serves where a file has none.
 

@@ -80,7 +80,7 @@ class CriticalStiffness:
         return float(quantile) if levels.ndim == 0 else quantile
 
     def db(self, p: ArrayLike = 0.5) -> Any:
-        """The same in decibels, 20 log10 of the number in `unit`."""
+        """`quantile` of `p` in decibels, 20 log10 of the number in `unit`."""
         with np.errstate(divide="ignore"):
             return 20 * np.log10(self.quantile(p))
 
@@ -102,7 +102,7 @@ class CriticalStiffness:
         return float(stiffness)
 
     def tip(self, lever_m: float) -> CriticalStiffness:
-        """The same at the tip of a lever arm on a rotational device: K / lever^2, in N/m.
+        """The same at the tip of a rotational device's lever arm `lever_m`: K / lever^2, in N/m.
 
         Raises
         ------
