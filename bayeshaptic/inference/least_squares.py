@@ -102,23 +102,44 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
     Fit
     """
     model = informed(model, etfe)
-    here = coordinates(model)
-    low, high = (here.coordinate(bound) for bound in reach(model, _REACH_SDS))
-    likelihood = Likelihood(model, compress(etfe))
-    residuals = weighted_residuals(likelihood, here)
     if start is None:
         start = starting_points(model, etfe, np.random.default_rng(seed))
+    theta, agreeing = refine(model, compress(etfe), start)
+    for _ in range(_REWINDOWINGS):
+        windows = compress(etfe, partial(model.response, theta))
+        theta = polish(model, windows, theta)
+    return summarise(model, windows, theta, agreeing)
+
+
+def refine(model: Model, windows: Windows, start: Floats) -> tuple[Floats, int]:
+    """The best fit to `windows` from many starting vectors, shape (S, P).
+
+    Returns
+    -------
+    theta : ndarray, shape (P,)
+    agreeing : int
+        How many of those refined to the end found the same optimum.
+    """
+    here, low, high = _search_box(model)
+    residuals = weighted_residuals(Likelihood(model, windows), here)
     phi = np.clip(here.coordinate(np.atleast_2d(start)), low, high)
     phi, cost = _best_of_many(residuals, phi, low, high)
-    agreeing = int(np.sum(cost < cost.min() + 0.5))
     best = phi[[np.argmin(cost)]]
-    for _ in range(_REWINDOWINGS):
-        fitted = here.natural(best)[0]
-        windows = compress(etfe, partial(model.response, fitted))
-        likelihood = Likelihood(model, windows)
-        residuals = weighted_residuals(likelihood, here)
-        best, cost = minimise(residuals, best, low, high, steps=60, tolerance=1e-8)
-    return _summarise(likelihood, here, best[0], low, high, agreeing)
+    return here.natural(best)[0], int(np.sum(cost < cost.min() + 0.5))
+
+
+def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
+    """The optimum nearest to one vector, shape (P,)."""
+    here, low, high = _search_box(model)
+    residuals = weighted_residuals(Likelihood(model, windows), here)
+    phi, _ = minimise(residuals, here.coordinate(theta[None]), low, high, 60, 1e-8)
+    return np.asarray(here.natural(phi)[0])
+
+
+def _search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
+    here = coordinates(model)
+    low, high = (here.coordinate(bound) for bound in reach(model, _REACH_SDS))
+    return here, low, high
 
 
 def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[Floats], Floats]:
@@ -144,38 +165,32 @@ def _best_of_many(
     return minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
 
 
-def _summarise(
-    likelihood: Likelihood,
-    here: Coordinates,
-    phi: Floats,
-    low: Floats,
-    high: Floats,
-    agreeing: int,
-) -> Fit:
-    model, windows = likelihood.model, likelihood.windows
-    theta = here.natural(phi[None])
-    slope = jacobian(weighted_residuals(likelihood, here), phi[None])[0]
+def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) -> Fit:
+    """The fit at `theta`, with its covariance and outcomes."""
+    here, low, high = _search_box(model)
+    likelihood = Likelihood(model, windows)
+    phi = here.coordinate(theta[None])
+    slope = jacobian(weighted_residuals(likelihood, here), phi)[0]
     width = high - low
-    bound = (phi - low < 1e-6 * width) | (high - phi < 1e-6 * width)
-    chi_square = float(likelihood.reduced_chi_square(theta)[0])
+    bound = (phi[0] - low < 1e-6 * width) | (high - phi[0] < 1e-6 * width)
+    chi_square = float(likelihood.reduced_chi_square(theta[None])[0])
     covariance = np.full((model.size, model.size), np.nan)
     inner = np.flatnonzero(~bound)
     # A direction that the data do not see at all gets a width of 50 coordinate units, not zero.
     curvature = slope[:, inner].T @ slope[:, inner] + np.eye(len(inner)) / 50.0**2
     within = np.linalg.inv(curvature)
-    stretch = np.where(here.log, theta[0], here.scale)[inner]
+    stretch = np.where(here.log, theta, here.scale)[inner]
     covariance[np.ix_(inner, inner)] = within * np.outer(stretch, stretch) * max(1.0, chi_square)
-    residual = likelihood.normalised(theta)[0].ravel()
     return Fit(
         model,
-        theta[0],
+        theta,
         covariance,
-        _outcomes(model, theta[0], np.sqrt(np.diag(covariance)), bound),
+        _outcomes(model, theta, np.sqrt(np.diag(covariance)), bound),
         chi_square,
-        float(likelihood(theta)[0]),
+        float(likelihood(theta[None])[0]),
         windows,
         windows.frequency_hz.ravel(),
-        residual,
+        likelihood.normalised(theta[None])[0].ravel(),
         agreeing,
     )
 

@@ -48,11 +48,14 @@ class Likelihood:
         return out
 
     def pointwise(self, theta: Floats) -> Floats:
-        """Log likelihood of every window, up to a constant; shape (B, W)."""
+        """Log likelihood of every window, up to a constant of the data; shape (B, W).
+
+        The constant does not depend on the reference that the windows were compressed around.
+        """
         left = self.deviations(theta)
         power = np.einsum("bwk,bwk->bw", left.real, left.real)
         power += np.einsum("bwk,bwk->bw", left.imag, left.imag)
-        return -(self.windows.lines - 1) * np.log1p(power / self.windows.scatter)
+        return -(self.windows.lines - 1) * np.log(self.windows.scatter + power)
 
     def __call__(self, theta: Floats) -> Floats:
         """Log likelihood of parameter vectors of shape (B, P); shape (B,)."""

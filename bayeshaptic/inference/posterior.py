@@ -129,7 +129,7 @@ class Posterior:
         return to_arviz(self)
 
     def save(self, path: str | Path) -> Path:
-        """Write it to `path` as netCDF; `load_posterior` reads it back.  Never leaves half a file."""
+        """Write it to `path` as netCDF for `load_posterior`; never leaves half a file."""
         from bayeshaptic.inference.arviz_io import save_posterior
 
         return save_posterior(self, Path(path))

@@ -25,7 +25,9 @@ class Spectra(Protocol):
     def lines(self) -> int:
         """Number of DFT lines, or rows of a table."""
 
-    def windows(self, reference: Reference | None = None) -> Windows:
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
         """The windows of the likelihood."""
 
 
@@ -38,6 +40,7 @@ class _Block(NamedTuple):
     position: NDArray[Any]  # (W, w) leakage projected out
     leakage: NDArray[Any]  # (W, w, 5) orthonormal
     weights: NDArray[Any]  # (W, w, 3) of the nodes
+    inside: NDArray[Any]  # (W, w) False in the padding
 
 
 @dataclass(frozen=True)
@@ -104,9 +107,12 @@ class RandomSpectra:
             position=_project_out(leakage, position[..., None])[..., 0],
             leakage=leakage,
             weights=interpolation(x),
+            inside=inside,
         )
 
-    def windows(self, reference: Reference | None = None) -> Windows:
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
         """The windows of the likelihood.
 
         The ratio of the response to the reference is a parabola in each window, through its
@@ -115,6 +121,8 @@ class RandomSpectra:
         Parameters
         ----------
         reference : callable, optional
+        inputs : complex ndarray, shape (J, L), optional
+            Further columns at the lines: motions that add to the position with a coefficient each.
 
         Returns
         -------
@@ -124,13 +132,17 @@ class RandomSpectra:
         reference = reference or self.reference
         at_lines = np.asarray(reference(self.frequency_hz))
         at_nodes = np.asarray(reference(self.nodes_hz.ravel())).reshape(self.nodes_hz.shape)
-        count, k = self.nodes_hz.shape
+        further = np.zeros((0, self.lines), complex) if inputs is None else np.asarray(inputs)
+        count, k = len(self.nodes_hz), self.nodes_hz.shape[1] + len(further)
         design = np.empty((count, k, k), dtype=complex)
         target = np.empty((count, k), dtype=complex)
         scatter = np.empty(count)
         for block in self._blocks:
             response = at_lines[block.line, None] * block.weights / at_nodes[block.window, None, :]
-            column = _project_out(block.leakage, block.force[..., None] * response)
+            columns = [block.force[..., None] * response]
+            # The padding of a block has no force and must have no input either.
+            columns += [(row[block.line] * block.inside)[..., None] for row in further]
+            column = _project_out(block.leakage, np.concatenate(columns, axis=-1))
             q, design[block.window] = np.linalg.qr(column)
             z = np.einsum("wlk,wl->wk", q.conj(), block.position)
             rest = block.position - np.einsum("wlk,wk->wl", q, z)
@@ -180,11 +192,14 @@ class PeriodicSpectra:
     def lines(self) -> int:
         return len(self.frequency_hz)
 
-    def windows(self, reference: Reference | None = None) -> Windows:
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
         """One window an excited line; the reference is not needed."""
+        columns = [self.force] if inputs is None else [self.force, *inputs]
         return Windows(
             frequency_hz=self.frequency_hz[:, None],
-            design=self.force[:, None, None],
+            design=np.stack(columns, axis=-1)[:, None, :],
             target=self.position[:, None],
             scatter=self.scatter,
             lines=self.freedom,
@@ -214,8 +229,10 @@ class TableSpectra:
     def lines(self) -> int:
         return len(self.frequency_hz)
 
-    def windows(self, reference: Reference | None = None) -> Windows:
-        """One window a row; the reference is not needed."""
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
+        """One window a row; the reference is not needed, and there can be no inputs."""
         lines = np.minimum(self.averages, 1e6)
         return Windows(
             frequency_hz=self.frequency_hz[:, None],

@@ -28,9 +28,10 @@ class Windows:
     ----------
     frequency_hz : ndarray, shape (W, k)
         Nodes where the model is evaluated, Hz; k = 3 for random excitation, 1 otherwise.
-    design : complex ndarray, shape (W, k, k)
-        R.
-    target : complex ndarray, shape (W, k)
+    design : complex ndarray, shape (W, r, k + J)
+        R; its last J columns are those of further inputs, whose coefficients follow g. r = k + J
+        for random excitation, 1 otherwise.
+    target : complex ndarray, shape (W, r)
         z.
     scatter : ndarray, shape (W,)
         s0 > 0: what no smooth response explains.
@@ -44,8 +45,25 @@ class Windows:
     scatter: NDArray[Any]
     lines: NDArray[Any]
 
+    @property
+    def inputs(self) -> int:
+        """J, the number of further inputs."""
+        return self.design.shape[2] - self.frequency_hz.shape[1]
 
-def compress(etfe: Etfe, reference: Reference | None = None) -> Windows:
+    def part(self, chosen: NDArray[Any]) -> Windows:
+        """Some of the windows, by a mask or an index."""
+        return Windows(
+            self.frequency_hz[chosen],
+            self.design[chosen],
+            self.target[chosen],
+            self.scatter[chosen],
+            self.lines[chosen],
+        )
+
+
+def compress(
+    etfe: Etfe, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+) -> Windows:
     """The windows that the likelihood uses.
 
     Parameters
