@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -71,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; never a traceback unless asked for."""
     one_thread_from_the_start()
     parser = build_parser()
-    arguments = parser.parse_args(argv)
+    arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
     if not hasattr(arguments, "run"):
         parser.print_help(sys.stderr)
         return 2
@@ -95,6 +96,17 @@ def main(argv: Sequence[str] | None = None) -> int:
             "the output of the same command and --debug"
         )
         return 1
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """``--delay-s -1e-3`` as ``--delay-s=-1e-3``: argparse takes such a value for an option."""
+    joined: list[str] = []
+    for argument in argv:
+        if joined and joined[-1].startswith("--") and re.match(r"-\.?\d", argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 @contextmanager

@@ -1,0 +1,579 @@
+"""The command line: what it says, where it writes, and how it fails."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import signal
+import stat
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bayeshaptic
+from bayeshaptic import batch, cli, executors
+from bayeshaptic.commands import COMMANDS
+from bayeshaptic.commands.simulate import parse_effect
+from bayeshaptic.devices import device_names
+from bayeshaptic.diagnosis import analysis
+from bayeshaptic.errors import InputError
+from bayeshaptic.report import summary_json
+
+Run = Callable[..., tuple[int, str, str]]
+# The quickest analysis: two parameters, below the first mode.
+RIGID = ("--model", "rigid", "--device", "phantom", "--band", "1,25")
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    """The command line in an empty folder: exit status, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("BAYESHAPTIC_DEBUG", raising=False)
+
+    def call(*arguments: str | Path) -> tuple[int, str, str]:
+        try:
+            status = cli.main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        out, err = capfd.readouterr()
+        return status, out, err
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def phantom(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five seconds of the PHANToM without a hand."""
+    path = tmp_path_factory.mktemp("recordings") / "phantom.csv"
+    assert cli.main(["simulate", "phantom", "--seconds", "5", "-o", str(path), "--quiet"]) == 0
+    return path
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few draws and no figures: for tests that are about other things."""
+
+    def write(result: Any, folder: Path) -> Path:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "summary.json").write_text(summary_json(result))
+        (folder / "report.html").write_text("<!DOCTYPE html>")
+        return folder / "report.html"
+
+    monkeypatch.setattr(analysis, "analyse", partial(analysis.analyse, ess=50))
+    monkeypatch.setattr("bayeshaptic.report.write_report", write)
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    header, *rows = path.read_text().splitlines()
+    return dict(zip(header.split(","), np.loadtxt(rows, delimiter=",").T, strict=True))
+
+
+def write_columns(path: Path, **values: Any) -> Path:
+    rows = zip(*values.values(), strict=True)
+    lines = [",".join(f"{v:.12g}" if not isinstance(v, str) else v for v in row) for row in rows]
+    path.write_text("\n".join([",".join(values), *lines, ""]))
+    return path
+
+
+# --- help ---------------------------------------------------------------------------------------
+
+
+def test_help_lists_every_command(run: Run) -> None:
+    status, out, err = run("--help")
+    assert status == 0 and not err
+    for command in COMMANDS:
+        assert command.NAME in out and command.SUMMARY in out
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.NAME)
+def test_help_of_a_command_says_what_defaults_and_examples(run: Run, command: Any) -> None:
+    status, out, _ = run(command.NAME, "--help")
+    assert status == 0
+    assert command.DESCRIPTION in out and command.EXAMPLES in out
+    assert max(len(line) for line in out.splitlines()) <= 100
+    parser = cli.build_parser()
+    for line in command.EXAMPLES.strip().splitlines():  # every example is understood
+        program, *arguments = shlex.split(line)
+        assert program == "bayeshaptic" and parser.parse_args(arguments).run is command.run
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.NAME)
+def test_every_option_has_help(command: Any) -> None:
+    parser = cli._Parser()
+    command.add_arguments(parser)
+    assert all(action.help for action in parser._actions)
+    help_text = parser.format_help()
+    if "--device" in help_text:
+        assert all(name in help_text for name in device_names())
+
+
+def test_without_a_command_the_help_is_shown(run: Run) -> None:
+    status, out, err = run()
+    assert status == 2 and not out and "commands:" in err
+
+
+def test_version(run: Run) -> None:
+    assert run("--version") == (0, f"bayeshaptic {bayeshaptic.__version__}\n", "")
+
+
+def test_the_package_runs_as_a_module() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "bayeshaptic", "--version"], capture_output=True, text=True
+    )
+    assert done.returncode == 0 and bayeshaptic.__version__ in done.stdout
+
+
+# --- options that cannot be ---------------------------------------------------------------------
+
+
+def only_line(err: str) -> str:
+    assert "Traceback" not in err
+    (line,) = err.strip().splitlines()
+    return line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["repotr", "a.csv"], "repotr"),
+        (["report"], "RECORDING_OR_STUDY"),
+        (["report", "a.csv", "--band", "5"], "LOW,HIGH"),
+        (["report", "a.csv", "--band", "200,5"], "LOW < HIGH"),
+        (["report", "a.csv", "--band", "a,5"], "'a' is not a number"),
+        (["report", "a.csv", "--band", "-1,5"], "LOW < HIGH"),
+        (["report", "a.csv", "--delay-s", "-1e-3"], "must not be negative"),
+        (["report", "a.csv", "--delay-s", "nan"], "finite"),
+        (["report", "a.csv", "--period-s", "0"], "above zero"),
+        (["report", "a.csv", "--model", "gasped"], "gasped"),
+        (["report", "a.csv", "--seed", "1.5"], "whole number"),
+        (["report", "a.csv", "--unknown"], "--unknown"),
+        (["batch", "a.toml", "--workers", "0"], "above zero"),
+        (["batch", "a.toml", "--workers", "2", "--dask", "tcp://x:1"], "not allowed with"),
+        (["simulate", "phantom"], "-o"),
+        (["simulate", "phantom", "-o", "a.csv", "--held", "--free"], "not allowed with"),
+        (["simulate", "phantom", "-o", "a.csv", "--seconds", "-3"], "above zero"),
+    ],
+)
+def test_wrong_options_are_one_line(run: Run, arguments: list[str], part: str) -> None:
+    status, out, err = run(*arguments)
+    assert status == 2 and not out
+    assert part in only_line(err) and "--help" in err
+
+
+# --- input that cannot be used ------------------------------------------------------------------
+
+
+def spoil(recording: Path, target: Path, how: str) -> None:
+    """Write the recording to `target` with one thing wrong."""
+    data = columns(recording)
+    names = list(data)
+    time_s, force, position = names
+    rng = np.random.default_rng(0)
+    if how == "empty":
+        target.write_text("")
+        return
+    if how == "missing column":
+        del data[position]
+    elif how == "NaN":
+        data[force][123] = np.nan
+    elif how == "text in a number":
+        data[position] = data[position].astype("U25")
+        data[position][77] = "oops"
+    elif how == "non-uniform time":
+        data[time_s] = np.cumsum(rng.uniform(0.1e-3, 4e-3, len(data[time_s])))
+    elif how == "constant force":
+        data[force][:] = 0.5
+    elif how == "50 samples":
+        data = {name: values[:50] for name, values in data.items()}
+    elif how == "swapped columns":
+        data[force], data[position] = data[position], data[force]
+    elif how == "zero variance":
+        data[position][:] = 0.01
+    elif how == "header only":
+        data = {name: values[:0] for name, values in data.items()}
+    elif how == "cut off":
+        whole = recording.read_text()
+        target.write_text(whole[: len(whole) // 2].rsplit(",", 1)[0] + "\n")
+        return
+    write_columns(target, **data)
+
+
+@pytest.mark.parametrize(
+    ("how", "part"),
+    [
+        ("empty", "empty"),
+        ("header only", "no rows"),
+        ("missing column", "angle_rad"),
+        ("NaN", "row 124"),
+        ("text in a number", "oops"),
+        ("non-uniform time", "time"),
+        ("constant force", "constant"),
+        ("50 samples", "too few"),
+        ("swapped columns", "swapped"),
+        ("zero variance", "never changes"),
+        ("cut off", "fields"),
+    ],
+)
+def test_bad_recordings_are_one_line_and_leave_nothing(
+    run: Run, phantom: Path, tmp_path: Path, how: str, part: str
+) -> None:
+    bad = tmp_path / "bad.csv"
+    spoil(phantom, bad, how)
+    status, out, err = run("report", bad, "-o", "out")
+    assert status == 2 and not out
+    assert part in only_line(err)
+    assert err.startswith("bayeshaptic: error: ")
+    assert sorted(os.listdir(tmp_path)) == ["bad.csv"]
+
+
+def test_units_wrong_by_a_thousand_are_a_warning(
+    run: Run, quick: None, phantom: Path, tmp_path: Path
+) -> None:
+    data = columns(phantom)
+    data["angle_rad"] *= 1000
+    milli = write_columns(tmp_path / "milli.csv", **data)
+    status, out, _ = run("report", milli, *RIGID)
+    assert status == 0
+    assert re.search(r"warning: .*(thousandths|factor of about 0.001)", out), out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["report", "missing.csv"], "no such file"),
+        (["report", "missing.toml"], "no such file"),
+        (["report", "."], "folder"),
+        (["report", "{phantom}", "--device", "fantom"], "did you mean 'phantom'?"),
+        (["report", "{phantom}", "--device", "lhifam"], "rotational"),
+        (["report", "{phantom}", "--columns", "force=nothing"], "nothing"),
+        (["report", "{phantom}", "--band", "600,700"], "Hz"),
+        (["simulate", "fantom", "-o", "a.csv"], "did you mean 'phantom'?"),
+        (["simulate", "phantom", "-o", "a.wav"], ".csv"),
+        (["simulate", "phantom", "-o", "no/such/folder/a.csv"], "no such folder"),
+        (["simulate", "phantom", "-o", "."], "folder"),
+        (["simulate", "phantom", "-o", "a.csv", "--effect", "magic"], "coulomb_friction"),
+        (["simulate", "phantom", "-o", "a.csv", "--effect", "extra_delay=x"], "FIELD:VALUE"),
+        (["batch", "a/same.csv", "b/same.csv"], "rename one"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    run: Run, phantom: Path, tmp_path: Path, arguments: list[str], part: str
+) -> None:
+    filled = [argument.replace("{phantom}", str(phantom)) for argument in arguments]
+    status, out, err = run(*filled)
+    assert status == 2 and not out
+    assert part in only_line(err)
+    assert not os.listdir(tmp_path)
+
+
+def test_an_output_that_is_a_file_is_refused_before_any_work(
+    run: Run, phantom: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "out").write_text("mine")
+    for folder in ("out", "out/deeper"):
+        status, _, err = run("report", phantom, "-o", folder)
+        assert status == 2 and "is a file" in only_line(err)
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0, reason="everything is permitted to root"
+)
+def test_a_folder_without_permission_is_one_line(run: Run, phantom: Path, tmp_path: Path) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir()
+    locked.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    status, _, err = run("report", phantom, "-o", locked / "out")
+    locked.chmod(stat.S_IRWXU)
+    assert status == 2 and "permission" in only_line(err)
+
+
+def test_no_permission_is_told_from_the_system(
+    run: Run, phantom: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    status, _, err = run("report", phantom, "-o", "out")
+    assert status == 2 and "no permission" in only_line(err)
+
+
+# --- errors that nobody expects -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("raised", "status", "part"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (
+            PermissionError(13, "Permission denied", "/some/file"),
+            2,
+            "/some/file: Permission denied",
+        ),
+        (OSError(28, "No space left on device"), 2, "error: No space left on device"),
+        (InputError("line one\nline two"), 2, "error: line one line two"),
+        (ZeroDivisionError("division by zero"), 1, "defect in bayeshaptic (ZeroDivisionError: "),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
+)
+def test_whatever_is_raised_becomes_one_line(
+    run: Run, monkeypatch: pytest.MonkeyPatch, raised: BaseException, status: int, part: str
+) -> None:
+    def fail(*_: Any) -> None:
+        raise raised
+
+    monkeypatch.setattr(batch, "report_source", fail)
+    got, out, err = run("report", "a.csv")
+    assert got == status and not out and part in only_line(err)
+    if status in (1, 2):
+        for arguments, debug in ((["--debug"], ""), ([], "1")):
+            monkeypatch.setenv("BAYESHAPTIC_DEBUG", debug)
+            got, _, err = run("report", "a.csv", *arguments)
+            assert got == status and "Traceback" in err
+
+
+def test_warnings_are_one_line_each(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    import warnings
+
+    def warn(*_: Any) -> tuple[()]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.warn("twice\nthe lines", bayeshaptic.BayeshapticWarning, stacklevel=1)
+        return ()
+
+    monkeypatch.setattr(batch, "report_source", warn)
+    status, _, err = run("report", "a.csv")
+    assert status == 0 and err == "bayeshaptic: warning: twice the lines\n"
+
+
+WAITING = """
+import sys, time
+from bayeshaptic import batch, cli
+
+def wait(*_):
+    print("working", flush=True)
+    time.sleep(60)
+
+batch.report_source = wait
+sys.exit(cli.main(["report", "a.csv"]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for child processes on Windows")
+def test_an_interrupt_ends_a_process_without_traceback(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", WAITING],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None and process.stdout.readline() == "working\n"
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and not out
+    assert only_line(err) == "bayeshaptic: interrupted"
+    assert not os.listdir(tmp_path)
+
+
+# --- report -------------------------------------------------------------------------------------
+
+
+def test_report_writes_everything_and_says_what_to_do(
+    run: Run, phantom: Path, tmp_path: Path
+) -> None:
+    status, out, err = run("report", phantom, "--device", "phantom", "--model", "free", "-o", "out")
+    assert status == 0 and not err
+    folder = tmp_path / "out"
+    assert {"report.html", "summary.json", "posterior.nc"} <= set(os.listdir(folder))
+    assert list(folder.glob("*.png"))
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["model"]["name"] == "free"
+    # The file's own K_CR, 13.215 N m/rad, to within what five seconds can tell.
+    assert summary["critical_stiffness"]["q50"] == pytest.approx(13.215, rel=0.02)
+    first, *others = out.splitlines()
+    assert first.startswith("phantom: ") and "N m/rad" in first
+    assert others[-1] == f"  report: {folder / 'report.html'}" and len(others) <= 4
+
+
+@pytest.mark.usefixtures("quick")
+class TestReport:
+    """`report` and `batch` with quick analyses."""
+
+    def test_default_folder_quiet_and_the_same_seed(
+        self, run: Run, phantom: Path, tmp_path: Path
+    ) -> None:
+        status, out, _ = run("report", phantom, *RIGID, "--seed", "3")
+        assert status == 0 and out
+        assert run("report", phantom, *RIGID, "--seed", "3", "-o", "b", "--quiet") == (0, "", "")
+        first, second = (
+            json.loads((tmp_path / folder / "summary.json").read_text())
+            for folder in ("phantom-report", "b")
+        )
+        del first["posterior"]["seconds"], second["posterior"]["seconds"]
+        assert first == second
+
+    def test_options_reach_the_analysis(
+        self, run: Run, phantom: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        seen: dict[str, Any] = {}
+
+        def spy(measurement: Any, **options: Any) -> None:
+            seen.update(options, measurement=measurement)
+            raise InputError("seen enough")
+
+        monkeypatch.setattr(analysis, "analyse", spy)
+        status, _, _ = run(
+            "report", phantom, "--model", "free", "--device", "phantom", "--delay-s", "2e-4",
+            "--delay-sd-s", "1e-5", "--band", "1,150", "--encoder-resolution", "1e-3",
+            "--seed", "7",
+        )  # fmt: skip
+        assert status == 2
+        assert seen["model"] == "free" and seen["device"].name == "phantom" and seen["seed"] == 7
+        assert (seen["delay_s"], seen["delay_sd_s"]) == (2e-4, 1e-5)
+        assert seen["band_hz"] == (1.0, 150.0)
+        assert seen["measurement"].encoder_resolution == 1e-3
+        assert seen["measurement"].device == "phantom" and seen["held"] is None
+
+    def test_study(self, run: Run, phantom: Path, tmp_path: Path) -> None:
+        (tmp_path / "bad.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
+        (tmp_path / "study.toml").write_text(
+            f"""
+            [device]
+            name = "phantom"
+            [prior]
+            m1 = {{ median = 0.9e-3, log_sd = 0.2 }}
+            [[recording]]
+            file = "{phantom.as_posix()}"
+            configuration = 0.25
+            [[recording]]
+            file = "bad.csv"
+            [[recording]]
+            file = "{phantom.as_posix()}"
+            """
+        )
+        status, out, err = run("report", "study.toml")
+        folder = tmp_path / "study-report"
+        assert status == 1
+        assert "error: bad: " in only_line(err)
+        assert out.count("report: ") == 2 and f"all: {Path('study-report', 'index.html')}" in out
+        assert sorted(os.listdir(folder)) == ["index.html", "phantom-1", "phantom-2"]
+        summary = json.loads((folder / "phantom-1" / "summary.json").read_text())
+        assert summary["recording"]["configuration"] == 0.25
+        assert summary["model"]["name"] == "free"  # nobody is named: nobody held it
+        index = (folder / "index.html").read_text()
+        assert 'href="phantom-1/report.html"' in index and 'href="phantom-2/report.html"' in index
+        assert "bad failed" in index and "oops" in index
+
+    def test_reading_options_are_refused_for_a_study(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "study.toml").write_text("")
+        status, _, err = run("report", "study.toml", "--period-s", "0.001")
+        assert status == 2 and "--period-s is for a single recording" in only_line(err)
+
+    def test_batch_goes_on_after_a_failure(self, run: Run, phantom: Path, tmp_path: Path) -> None:
+        (tmp_path / "bad.csv").write_text("nothing\n")
+        status, out, err = run("batch", "bad.csv", phantom, "--workers", "1", *RIGID)
+        assert status == 1 and "bad.csv" in only_line(err)
+        assert "phantom: " in out and f"reports: {tmp_path / 'reports'}" in out
+        assert os.listdir(tmp_path / "reports") == ["phantom"]
+
+
+# --- batch: executors ---------------------------------------------------------------------------
+
+
+def double_or_fail(number: int) -> int:
+    if number < 0:
+        raise InputError(f"{number} is negative")
+    return 2 * number
+
+
+def die(_: int) -> None:
+    os._exit(3)
+
+
+def outcomes(executor: executors.Executor, job: Any, items: list[int]) -> dict[int, Any]:
+    return {one.item: (one.result, one.error) for one in executor(job, items)}
+
+
+EXPECTED = {1: (2, None), -2: (None, "-2 is negative"), 3: (6, None)}
+
+
+def test_jobs_in_this_process() -> None:
+    assert outcomes(executors.serial, double_or_fail, [1, -2, 3]) == EXPECTED
+
+
+def test_jobs_in_processes() -> None:
+    assert outcomes(executors.processes(2), double_or_fail, [1, -2, 3]) == EXPECTED
+
+
+def test_a_worker_that_dies_is_a_failure_and_not_a_hang() -> None:
+    ended = outcomes(executors.processes(2), die, [1, 2])
+    assert set(ended) == {1, 2}
+    assert all(result is None and "died" in error for result, error in ended.values())
+
+
+def test_jobs_on_a_dask_cluster() -> None:
+    distributed = pytest.importorskip("distributed", reason="the dask extra is not installed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        executor = executors.dask(cluster.scheduler_address)
+        assert outcomes(executor, double_or_fail, [1, -2, 3]) == EXPECTED
+
+
+def test_without_dask_the_extra_is_named(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    status, _, err = run("batch", "a.csv", "--dask", "tcp://nowhere:1")
+    assert status == 2 and "bayeshaptic[dask]" in only_line(err)
+
+
+def test_batch_in_processes_reports_failures_of_each(run: Run, tmp_path: Path) -> None:
+    for name in ("one.csv", "two.csv"):
+        (tmp_path / name).write_text("")
+    status, out, err = run("batch", "one.csv", "two.csv", "--workers", "2")
+    assert status == 1
+    assert sorted(line.split(": ")[2].rsplit("/", 1)[-1] for line in err.splitlines()) == [
+        "one.csv",
+        "two.csv",
+    ]
+    assert not (tmp_path / "reports").exists()
+
+
+# --- simulate -----------------------------------------------------------------------------------
+
+
+def test_simulate_is_repeatable_and_says_the_truth(run: Run, tmp_path: Path) -> None:
+    for name, seed in (("a.csv.gz", "4"), ("b.csv.gz", "4"), ("c.csv.gz", "5")):
+        status, out, err = run(
+            "simulate", "lhifam", "--held", "--seconds", "2", "--seed", seed, "-o", name
+        )
+        assert status == 0 and not err
+        assert out.startswith(f"{name}: 2000 samples every 1 ms; truth: grasped") and "N/m" in out
+    a, b, c = (tmp_path / f"{name}.csv.gz" for name in "abc")
+    assert a.read_bytes() == b.read_bytes() != c.read_bytes()
+
+
+def test_simulate_options(run: Run) -> None:
+    status, _, _ = run(
+        "simulate", "phantom", "--excitation", "multisine", "--seconds", "3", "--force-rms", "0.05",
+        "--period-s", "0.0005", "--delay-s", "0.0013", "--band", "5,100", "-o", "m.npz",
+        "--effect", "coulomb_friction=force:0.002", "--effect", "extra_delay",
+    )  # fmt: skip
+    assert status == 0
+    recording = bayeshaptic.read_recording("m.npz")
+    assert recording.samples == 6000 and recording.period_s == pytest.approx(0.0005)
+    assert np.std(recording.force) == pytest.approx(0.05, rel=0.01)
+    spectrum = np.abs(np.fft.rfft(recording.force))
+    excited = np.flatnonzero(spectrum > 1e-6 * spectrum.max()) / 3.0
+    assert excited.min() == 5 and excited.max() == 100
+
+
+def test_effects_are_parsed() -> None:
+    assert parse_effect("reflex") == ("reflex", {})
+    assert parse_effect("a=x:1.5,y:-2e-3") == ("a", {"x": 1.5, "y": -2e-3})
