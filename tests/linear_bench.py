@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.signal import dlsim, lfilter
+from scipy.signal import lfilter
 
 LHIFAM_FREE = {
     "masses": [0.19, 5.2],
@@ -70,13 +70,15 @@ class Device:
         return value.reshape(np.shape(frequency))
 
     def simulate(self, force, mass=0):
+        """Position of the first mass, at rest before; one first-order filter a mode."""
         late, early = self.drive[mass]
-        previous = np.concatenate([[0.0], force[:-1]])
-        b = np.hstack([late, early])
-        c = np.zeros((1, len(self.a)))
-        c[0, 0] = 1
-        system = (self.ad, b, c, np.zeros((1, 2)), self.period)
-        return dlsim(system, np.column_stack([force, previous]))[1][:, 0]
+        poles, modes = np.linalg.eig(self.ad)
+        b = np.linalg.solve(modes, np.hstack([late, early]))
+        # x[k + 1] = p x[k] + b0 u[k] + b1 u[k - 1]
+        motion = [
+            lfilter([0, b0, b1], [1, -p], force) for p, (b0, b1) in zip(poles, b, strict=True)
+        ]
+        return (modes[0] @ np.array(motion)).real
 
 
 def tremor(rng, samples, period, peak_hz=9.0):

@@ -29,7 +29,8 @@ class Etfe:
     value : complex ndarray, shape (L,)
         Estimated response, position unit over force unit.
     variance : ndarray, shape (L,)
-        E|estimate - truth|^2; the real and the imaginary part have half of it each.
+        E|estimate - truth|^2; the real and the imaginary part have half of it each. Where it is
+        estimated, the error over its root has unit variance.
     coherence : ndarray, shape (L,)
         Share of the position's power that the force explains, 0..1; nan where it makes no sense.
     period_s : float

@@ -1,4 +1,4 @@
-"""What kind of force drives the device: its period, its lines, its band."""
+"""Does the force repeat itself, with what period, and which lines does it excite?"""
 
 from __future__ import annotations
 
@@ -7,11 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# A force that fell by more within an octave was cut off there: 13 dB is more than what a
-# second-order filter does, less than a third-order one.
-CUT_OFF = 20.0
-# Power below which there is nothing but rounding.
-NO_POWER = 1e-10
 # Excited lines lie at most 50 dB below the strongest.
 EXCITED = 1e-5
 
@@ -96,54 +91,3 @@ def excited_lines(period: NDArray[Any]) -> NDArray[np.int64]:
     power = np.abs(np.fft.rfft(period - period.mean())) ** 2
     power = power[: (len(period) + 1) // 2]
     return np.flatnonzero(power > EXCITED * power.max())
-
-
-def driven_range(frequency_hz: NDArray[Any], power: NDArray[Any]) -> tuple[int, int]:
-    """First and last window of the range around the strongest where the force has power.
-
-    The range ends where the power falls by more than 13 dB in an octave, at either side: a steeper
-    slope than that of coloured noise that is meant to be there.
-
-    Parameters
-    ----------
-    frequency_hz, power : ndarray, shape (W,)
-        Centres of windows and mean power of the force in them.
-    """
-    floor = NO_POWER * power.max()
-    log_power, log_frequency = np.log(np.maximum(power, floor)), np.log(frequency_hz)
-    octave = np.log(2)
-    below = np.interp(log_frequency - octave, log_frequency, log_power)
-    above = np.interp(log_frequency + octave, log_frequency, log_power)
-    peak, window = int(np.argmax(power)), np.arange(len(power))
-    cut_high = (below - log_power > np.log(CUT_OFF)) | (power <= floor)
-    cut_low = (above - log_power > np.log(CUT_OFF)) | (power <= floor)
-    low = int(np.max(window[cut_low & (window < peak)], initial=-1)) + 1
-    high = int(np.min(window[cut_high & (window > peak)], initial=len(power))) - 1
-    return low, high
-
-
-def responds_until(excess: NDArray[Any], reach: int = 4) -> int | None:
-    """The last window in which the response stands out of the noise.
-
-    Only the upper end is judged: at the lower end, where a hand wanders, even a faint answer is
-    all that is known about the hand, and the likelihood weighs it rightly.
-
-    Parameters
-    ----------
-    excess : ndarray, shape (W,)
-        How far the response stands out, in standard deviations of what noise alone gives.
-    reach : int
-        Neighbours on each side that are judged together, so that an antiresonance or one noisy
-        window does not end the range.
-
-    Returns
-    -------
-    int or None
-        None where nothing stands out by four standard deviations.
-    """
-    reach = min(reach, (len(excess) - 1) // 2)
-    kernel = np.ones(2 * reach + 1)
-    total = np.convolve(excess, kernel, mode="same")
-    count = np.convolve(np.ones_like(excess), kernel, mode="same")
-    found = np.flatnonzero(total / np.sqrt(count) > 4)
-    return int(found[-1]) if len(found) else None

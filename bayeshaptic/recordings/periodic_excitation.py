@@ -15,15 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.recordings.excitation import (
-    Repetition,
-    excited_lines,
-    find_repetition,
-    responds_until,
-)
+from bayeshaptic.recordings.band import responds_until
+from bayeshaptic.recordings.excitation import Repetition, excited_lines, find_repetition
 from bayeshaptic.recordings.local_polynomial import LEAKAGE_TERMS, leakage_terms
 from bayeshaptic.recordings.points import Points
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.rounding import hidden_rounding
 from bayeshaptic.recordings.spectra import PeriodicSpectra
 
 FEWEST_LINES = 5
@@ -72,14 +69,18 @@ def estimate_periodic(
 
 
 def points(spectra: PeriodicSpectra) -> Points:
-    """Response, variance and coherence in each excited line."""
+    """Response, variance and coherence in each excited line.
+
+    The scatter has n - 1 complex degrees of freedom; over n - 2 the error over the standard
+    deviation, a Student t, has unit variance.
+    """
     noise = spectra.scatter / (spectra.freedom - 1)
     value = spectra.position / spectra.force
     answer = np.maximum(np.abs(spectra.position) ** 2 - noise, 0)
     return Points(
         frequency_hz=spectra.frequency_hz,
         value=value,
-        variance=noise / np.abs(spectra.force) ** 2,
+        variance=spectra.scatter / (spectra.freedom - 2) / np.abs(spectra.force) ** 2,
         coherence=answer / (answer + spectra.periods * noise),
     )
 
@@ -115,10 +116,10 @@ def transient_periods(position: NDArray[Any], harmonics: NDArray[np.int64]) -> i
 def _periods(recording: Recording, repetition: Repetition) -> tuple[NDArray[Any], NDArray[Any]]:
     """One period of the force, shape (p,), and whole periods of the position, shape (M, p).
 
-    The position of a sample answers the forces before it, hence one sample later than the force.
+    The position of a sample answers the forces before it: it may go on for one sample more.
     """
-    start, stop, period = repetition.start + 1, repetition.stop + 1, repetition.period
-    stop = min(stop, recording.samples)
+    start, period = repetition.start, repetition.period
+    stop = min(repetition.stop + 1, recording.samples)
     count = (stop - start) // period
     first = stop - count * period
     force = recording.force[first : first + period]
@@ -162,7 +163,7 @@ def _spectra(
     # Leakage is known from the lines between only: its error adds to the noise of the line.
     shrink = 1 / np.sqrt(1 + leverage)
     freedom = width - LEAKAGE_TERMS + 1
-    floor = _floor(recording, position)
+    floor = hidden_rounding(position, recording.encoder_resolution)
     return PeriodicSpectra(
         frequency_hz=harmonics / (samples * recording.period_s),
         force=np.fft.rfft(force)[harmonics] * np.sqrt(count / samples) * shrink,
@@ -186,20 +187,6 @@ def _leakage(
     weights = np.linalg.solve(np.swapaxes(r, -1, -2), at_line[..., None])[..., 0]
     residual = values - np.einsum("lwt,lt->lw", q, along)
     return np.sum(weights * along, axis=1), residual, np.sum(weights**2, axis=1)
-
-
-def _floor(recording: Recording, position: NDArray[Any]) -> float:
-    """Variance of a line that the scatter cannot show: rounding, and counts that repeat.
-
-    Rounding to an increment q has the variance q^2/12 a sample. Where the periods scatter less than
-    that, rounding repeats itself with them, and gathers in the harmonics.
-    """
-    increments = np.abs(np.diff(position.ravel()))
-    smallest = np.min(increments[increments > 0], initial=np.inf)
-    count = recording.encoder_resolution or (smallest if np.isfinite(smallest) else 0.0)
-    scatter = np.mean(np.var(position, axis=0, ddof=1))
-    repeated = len(position) * max(count**2 / 12 - scatter, 0.0)
-    return float(repeated + (np.finfo(float).eps * np.abs(position).max()) ** 2)
 
 
 def _responding(spectra: PeriodicSpectra, recording: Recording) -> PeriodicSpectra:
@@ -231,6 +218,7 @@ def _notices(
 ) -> tuple[Notice, ...]:
     seconds = repetition.period * recording.period_s
     rest = recording.samples - position.size
+    unused = f" ({rest} samples more are in no whole period)" if rest else ""
     dropped = (
         f"the first {transient} are transient and dropped"
         if transient
@@ -238,8 +226,8 @@ def _notices(
     )
     text = (
         f"The force repeats every {seconds:.6g} s ({repetition.period} samples): "
-        f"{len(position)} whole periods, {dropped}, {spectra.periods} kept; "
-        f"{rest} samples before and after them are not used. {spectra.lines} excited lines, "
+        f"{len(position)} whole periods, {dropped}, {spectra.periods} kept{unused}. "
+        f"{spectra.lines} excited lines, "
         f"{spectra.frequency_hz[0]:.4g} to {spectra.frequency_hz[-1]:.4g} Hz."
     )
     notices = [Notice("note", "periods", text)]

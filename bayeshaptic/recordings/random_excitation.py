@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.recordings.excitation import driven_range, responds_until
+from bayeshaptic.recordings.band import NO_POWER, choose_band
 from bayeshaptic.recordings.local_polynomial import window_edges
 from bayeshaptic.recordings.points import Points
 from bayeshaptic.recordings.recording import Recording
@@ -24,6 +24,8 @@ LOW_END_WINDOWS = 0.875
 LOWEST_HZ = 0.3
 # A rational reference must explain a window better than chance does with its two more terms.
 BETTER = 10.0
+# What to advise: 12 lines are then 12 Hz, and limits below 20 Hz are common.
+SHORTEST_S = 1.0
 
 
 def default_minimum_lines(duration_s: float) -> int:
@@ -49,69 +51,69 @@ def estimate_random(
         When there are too few lines for `FEWEST_WINDOWS` windows, or no response.
     """
     minimum = minimum_lines or default_minimum_lines(recording.duration_s)
-    notices: tuple[Notice, ...] = ()
-    if band_hz is None:
-        everything = _spectra(recording, _widest(recording, minimum), minimum)
-        band_hz = _choose_band(everything, recording)
-        notices = (
-            Notice(
-                "note",
-                "band",
-                f"Band {band_hz[0]:.3g} to {band_hz[1]:.4g} Hz, chosen where the force has power "
-                "and the position answers it.",
-            ),
-        )
-    spectra = _with_reference(_spectra(recording, band_hz, minimum))
-    return spectra, points(spectra.windows()), notices
+    spectra, notice = (
+        _in_chosen_band(recording, minimum)
+        if band_hz is None
+        else _in_given_band(recording, band_hz, minimum)
+    )
+    spectra = _with_reference(spectra)
+    return spectra, points(spectra.windows()), (notice,) if notice else ()
 
 
 def points(windows: Windows) -> Points:
     """Response, variance and coherence at the centre of each window.
 
-    The variance comes from the window's scatter, which has n - 3 complex degrees of freedom; the
+    The variance comes from the window's scatter, which has n - 3 complex degrees of freedom; over
+    n - 4, so that the error over the standard deviation, a Student t, has unit variance. The
     coherence is the multiple coherence of the three columns, corrected for their number.
     """
     inverse = np.linalg.pinv(windows.design, rcond=1e-10)[:, 1]
-    value = np.einsum("wk,wk->w", inverse, windows.target)
-    noise = windows.scatter / (windows.lines - 3)
+    value, n = np.einsum("wk,wk->w", inverse, windows.target), windows.lines
     total = windows.scatter + np.sum(np.abs(windows.target) ** 2, axis=1)
     return Points(
         frequency_hz=windows.frequency_hz[:, 1],
         value=value,
-        variance=noise * np.sum(np.abs(inverse) ** 2, axis=1),
-        coherence=np.clip(1 - noise * windows.lines / total, 0, 1),
+        variance=windows.scatter / (n - 4) * np.sum(np.abs(inverse) ** 2, axis=1),
+        coherence=np.clip(1 - windows.scatter / (n - 3) * n / total, 0, 1),
     )
 
 
-def _widest(recording: Recording, minimum: int) -> tuple[float, float]:
-    low = max(LOWEST_HZ, LOW_END_WINDOWS * minimum / recording.duration_s)
-    return low, 0.5 / recording.period_s
+def _in_chosen_band(recording: Recording, minimum: int) -> tuple[RandomSpectra, Notice]:
+    widest = max(LOWEST_HZ, LOW_END_WINDOWS * minimum / recording.duration_s)
+    everything = _spectra(recording, (widest, 0.5 / recording.period_s), minimum)
+    low, high = choose_band(everything, recording.name)
+    text = (
+        f"Band {low:.3g} to {high:.4g} Hz, chosen where the force has power and the position "
+        "answers it."
+    )
+    return _spectra(recording, (low, high), minimum, "the force drives"), Notice(
+        "note", "band", text
+    )
 
 
-def _choose_band(spectra: RandomSpectra, recording: Recording) -> tuple[float, float]:
-    windows = spectra.windows()
-    power = np.add.reduceat(np.abs(spectra.force) ** 2, spectra.edges[:-1])
-    low, high = driven_range(windows.frequency_hz[:, 1], power / np.diff(spectra.edges))
-    # Share of the power explained, against what three columns explain of noise.
-    n = windows.lines
-    explained = np.sum(np.abs(windows.target) ** 2, axis=1)
-    share = explained / (explained + windows.scatter)
-    excess = (share - 3 / n) / np.sqrt(3 * (n - 3) / (n**2 * (n + 1)))
-    last = responds_until(excess[low : high + 1])
-    if last is None:
-        raise InputError(
-            f"{recording.name}: the position does not follow the force at any frequency; check "
-            "which column is which, or record with more force"
-        )
-    high = low + last
-    lines = slice(spectra.edges[low], spectra.edges[high + 1])
-    level = power[max(high - 1, low)] / np.diff(spectra.edges)[max(high - 1, low)]
-    driven = np.flatnonzero(np.abs(spectra.force[lines]) ** 2 > level / 20)
-    frequency = spectra.frequency_hz[lines]
-    return float(frequency[0]), float(frequency[driven[-1]])
+def _in_given_band(
+    recording: Recording, band_hz: tuple[float, float], minimum: int
+) -> tuple[RandomSpectra, Notice | None]:
+    """Without windows at the ends where there is no force."""
+    spectra = _spectra(recording, band_hz, minimum)
+    driven = np.flatnonzero(spectra.force_power > NO_POWER * np.var(recording.force))
+    if len(driven) == len(spectra.force_power):
+        return spectra, None
+    asked = f"the band was set to {band_hz[0]:g} to {band_hz[1]:g} Hz"
+    if len(driven) == 0:
+        raise InputError(f"{recording.name}: {asked}, where the force has no power")
+    first, last = spectra.edges[driven[0]], spectra.edges[driven[-1] + 1] - 1
+    low, high = (float(spectra.frequency_hz[line]) for line in (first, last))
+    text = f"The force has no power outside {low:.3g} to {high:.4g} Hz ({asked})."
+    return _spectra(recording, (low, high), minimum), Notice("warning", "band", text)
 
 
-def _spectra(recording: Recording, band_hz: tuple[float, float], minimum: int) -> RandomSpectra:
+def _spectra(
+    recording: Recording,
+    band_hz: tuple[float, float],
+    minimum: int,
+    what: str = "the band is",
+) -> RandomSpectra:
     samples = recording.samples
     frequency = np.fft.rfftfreq(samples, recording.period_s)
     # The last line of an even record, at the Nyquist frequency, is real: not one like the others.
@@ -122,7 +124,8 @@ def _spectra(recording: Recording, band_hz: tuple[float, float], minimum: int) -
     decades = min(1 / 80, 0.99 * np.log10(band_hz[1] / band_hz[0]) / FEWEST_WINDOWS)
     edges = window_edges(frequency[lines], minimum, decades)
     if len(edges) <= FEWEST_WINDOWS:
-        raise InputError(_too_short(recording, band_hz, minimum, len(frequency[lines])))
+        count = len(frequency[lines])
+        raise InputError(_too_short(recording, band_hz, minimum, count, what))
     position = _detrended(recording.position)
     scale = 1 / np.sqrt(samples)
     return RandomSpectra(
@@ -135,18 +138,19 @@ def _spectra(recording: Recording, band_hz: tuple[float, float], minimum: int) -
     )
 
 
-def _too_short(recording: Recording, band_hz: tuple[float, float], minimum: int, lines: int) -> str:
+def _too_short(
+    recording: Recording, band_hz: tuple[float, float], minimum: int, lines: int, what: str
+) -> str:
     """What to say when the band holds too few lines."""
-    needed = FEWEST_WINDOWS * minimum
+    needed, (low, high) = FEWEST_WINDOWS * minimum, band_hz
     where = f"{recording.name}: {recording.samples} samples ({recording.duration_s:.3g} s)"
-    if lines and band_hz[1] < 0.5 / recording.period_s:
-        width = needed / recording.duration_s
+    if lines and high < 0.5 / recording.period_s:
         return (
-            f"{where} have {lines} DFT lines in the band {band_hz[0]:g} to {band_hz[1]:g} Hz, "
-            f"{needed} are needed; widen the band to {width:.3g} Hz or record "
-            f"{needed / (band_hz[1] - band_hz[0]):.3g} s"
+            f"{where} are too few: {what} {low:.4g} to {high:.4g} Hz, {lines} lines of the "
+            f"spectrum, and {needed} are needed; record {needed / (high - low):.3g} s, or use "
+            f"{needed / recording.duration_s:.3g} Hz"
         )
-    seconds = (FEWEST_WINDOWS + LOW_END_WINDOWS) * minimum / band_hz[1]
+    seconds = max((FEWEST_WINDOWS + LOW_END_WINDOWS) * minimum / high, SHORTEST_S)
     return f"{where} are too few for a frequency response; record at least {seconds:.2g} s"
 
 

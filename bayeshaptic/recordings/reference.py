@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.recordings.local_polynomial import NODES
 from bayeshaptic.recordings.windows import Windows
 
 
@@ -100,9 +101,8 @@ def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> Loc
         weighted = np.linalg.pinv(columns * weight[..., None], rcond=1e-12)
         coefficients = (weighted @ (ratio * weight)[..., None])[..., 0]
         denominator[:, 1:] = coefficients[:, 3:]
-    ends = windows.frequency_hz[:, 2]
-    starts = windows.frequency_hz[:, 0]
-    edges = (ends[:-1] + starts[1:]) / 2
+    half = (windows.frequency_hz[:, 2] - centre) / NODES[2]
+    edges = ((centre + half)[:-1] + (centre - half)[1:]) / 2
     return LocalRational(edges, centre, scale, coefficients[:, :3], denominator)
 
 

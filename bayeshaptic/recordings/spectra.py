@@ -73,6 +73,11 @@ class RandomSpectra:
         return len(self.frequency_hz)
 
     @cached_property
+    def force_power(self) -> NDArray[Any]:
+        """Mean power of the force in each window, shape (W,)."""
+        return np.add.reduceat(np.abs(self.force) ** 2, self.edges[:-1]) / np.diff(self.edges)
+
+    @cached_property
     def nodes_hz(self) -> NDArray[Any]:
         """Frequencies of the nodes, shape (W, 3)."""
         low = self.frequency_hz[self.edges[:-1], None]
