@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -110,6 +111,9 @@ def dask(address: str) -> Executor:
             "running on a dask cluster needs the dask extra: pip install 'bayeshaptic[dask]'"
         ) from None
 
+    if not re.fullmatch(r"\w+://\S+", address):
+        raise InputError(f"'{address}' is no dask address: write it as in tcp://10.0.0.1:8786")
+
     def run(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
         try:
             client = distributed.Client(address, timeout="10s", set_as_default=False)
@@ -118,7 +122,7 @@ def dask(address: str) -> Executor:
                 f"no dask scheduler answers at {address} ({describe(error)}): start one with "
                 "'dask scheduler', or use --workers"
             ) from error
-        with client:
+        with client, client.as_current():
             futures = {
                 client.submit(_attempt, job, item, pure=False, retries=0): item for item in items
             }

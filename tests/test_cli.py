@@ -527,6 +527,13 @@ def test_jobs_on_a_dask_cluster() -> None:
         assert outcomes(executor, double_or_fail, [1, -2, 3]) == EXPECTED
 
 
+def test_no_dask_scheduler_is_one_line(run: Run, tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="the dask extra is not installed")
+    for address, part in (("nonsense", "no dask address"), ("tcp://127.0.0.1:9", "no dask sched")):
+        status, _, err = run("batch", "a.csv", "--dask", address)
+        assert status == 2 and part in only_line(err)
+
+
 def test_without_dask_the_extra_is_named(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     status, _, err = run("batch", "a.csv", "--dask", "tcp://nowhere:1")

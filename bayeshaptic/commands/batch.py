@@ -46,8 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--dask",
         metavar="ADDRESS",
-        help="address of a dask scheduler, for example tcp://scheduler:8786; its workers need "
-        "bayeshaptic and the same files under the same paths (pip install 'bayeshaptic[dask]')",
+        help="address of a dask scheduler, for example tcp://scheduler:8786; it and its workers "
+        "need bayeshaptic and the same files under the same paths "
+        "(pip install 'bayeshaptic[dask]')",
     )
     add_analysis_options(parser)
     add_quiet(parser)
@@ -74,7 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
         talk.progress(0.0, f"0 of {len(work)}")
         for number, outcome in enumerate(execute(report_source, work), start=1):
             if outcome.error is not None:
-                talk.complain(f"{outcome.item.source}: {outcome.error}")
+                source = str(outcome.item.source)
+                named = outcome.error.startswith(source)
+                talk.complain(outcome.error if named else f"{source}: {outcome.error}")
                 failed += 1
             else:
                 failed += talk.tell(outcome.result)
