@@ -81,13 +81,46 @@ class Device:
         return (modes[0] @ np.array(motion)).real
 
 
-def tremor(rng, samples, period, peak_hz=9.0):
-    """Force of a hand: a tremor near 9 Hz above a slow wander, unit standard deviation."""
-    w0, zeta = 2 * np.pi * peak_hz * period, 0.1
-    r = np.exp(-zeta * w0)
-    a = [1, -2 * r * np.cos(w0), r * r]
-    slow = np.exp(-2 * np.pi * 0.3 * period)
-    white = rng.standard_normal((2, samples + 20000))
-    peak, wander = lfilter([1], a, white[0]), lfilter([1], [1, -slow], white[1])
-    total = peak / peak.std() + wander / wander.std()
-    return total[20000:] / total[20000:].std()
+def _tremor_filters(period):
+    angle, damping = 2 * np.pi * 9.0 * period, 0.1
+    radius = np.exp(-damping * angle)
+    peak = [1, -2 * radius * np.cos(angle), radius**2]
+    return peak, [1, -np.exp(-2 * np.pi * 0.3 * period)]
+
+
+def tremor(rng, samples, period):
+    """Force of a hand: a tremor near 9 Hz and a slow wander, about unit variance."""
+    lead = int(20 / period)
+    both = [
+        lfilter([1], a, rng.standard_normal(samples + lead))[lead:] / _spread(a)
+        for a in _tremor_filters(period)
+    ]
+    return sum(both) / np.sqrt(2)
+
+
+def tremor_density(frequency, period):
+    """Variance of `tremor` a line of the DFT over sqrt(N)."""
+    z = np.exp(2j * np.pi * frequency * period)
+    return sum(
+        np.abs(1 / np.polyval(a[::-1], 1 / z) / _spread(a)) ** 2 / 2
+        for a in _tremor_filters(period)
+    )
+
+
+def _spread(a):
+    return np.linalg.norm(lfilter([1], a, np.eye(1, 2**16)[0]))
+
+
+def limited_noise(rng, samples, period, highest):
+    """White noise of unit variance a line up to a highest frequency, Hz, and nothing above."""
+    spectrum = np.fft.rfft(rng.standard_normal(samples))
+    spectrum[np.fft.rfftfreq(samples, period) > highest] = 0
+    return np.fft.irfft(spectrum, samples)
+
+
+def multisine(rng, samples, harmonics):
+    """One period of random phases on some harmonics, unit standard deviation."""
+    spectrum = np.zeros(samples // 2 + 1, complex)
+    spectrum[harmonics] = np.exp(2j * np.pi * rng.random(len(harmonics)))
+    one = np.fft.irfft(spectrum, samples)
+    return one / one.std()

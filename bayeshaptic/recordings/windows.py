@@ -74,5 +74,8 @@ def compress(
         be a parabola, which matters beside resonances and at low frequencies. By default a
         smooth estimate made from the data. It makes no difference for periodic excitation and
         for tables.
+    inputs : complex ndarray, shape (J, L), optional
+        Motions that add to the position with a coefficient each, at the lines of `etfe.spectra` and
+        in the scale of its positions.
     """
-    return etfe.spectra.windows(reference)
+    return etfe.spectra.windows(reference, inputs)
