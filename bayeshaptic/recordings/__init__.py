@@ -1,6 +1,5 @@
 """What was measured: recordings, studies, their readers and checks."""
 
-from bayeshaptic.recordings.causality import Causality, causality
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.frf_table import read_frf
 from bayeshaptic.recordings.raw_signals import Clipping, Repeats, clipping, increment_unit, repeats
@@ -10,14 +9,12 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.study import Study, StudyEntry, read_study
 
 __all__ = [
-    "Causality",
     "Clipping",
     "Reader",
     "Recording",
     "Repeats",
     "Study",
     "StudyEntry",
-    "causality",
     "check_recording",
     "clipping",
     "increment_unit",

@@ -17,8 +17,8 @@ from bayeshaptic.recordings.recording import Recording
 
 # Shares of the prediction error. On 90 simulated open loops (white, coloured and band-limited
 # noise, steps, sweeps, multisines; four devices, friction, tremor, quantised or not) the feedback
-# share stays below 0.003 and the answer above 0.15 unless the encoder is very coarse; virtual walls from
-# 3 % of the critical stiffness, position controllers and relays give a feedback share above 0.05,
+# share stays below 0.003 and the answer above 0.15 unless the encoder is very coarse; virtual walls
+# from 3 % of the critical stiffness, position controllers and relays give a share above 0.05,
 # and the measured servo of the EMPS benchmark 0.18.
 NOTABLE_SHARE = 0.02
 SIGNIFICANT = 5.0

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.devices import Device
+from bayeshaptic.devices import STRUCTURES, Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.causality import causality
 from bayeshaptic.recordings.raw_signals import increment_unit
@@ -171,7 +173,7 @@ def _slip(ratio: float, tolerance: float) -> float | None:
 
 
 def _response(recording: Recording, device: Device | None) -> list[Notice]:
-    """Compare a rough frequency response with no response at all, and with the device's masses."""
+    """Compare a rough frequency response with none at all, and with the device's own."""
     frequency, response, coherence = _rough_response(recording)
     if np.quantile(coherence, 0.9) < 0.3:
         text = (
@@ -179,39 +181,51 @@ def _response(recording: Recording, device: Device | None) -> list[Notice]:
             f"{np.quantile(coherence, 0.9):.2f} on nine lines in ten. Are these the right columns?"
         )
         return [Notice("warning", "coherence", text)]
-    masses = {} if device is None else _masses(device)
     clear = coherence > 0.7
-    clear &= frequency > np.sqrt(frequency[0] * frequency[-1])
-    if not masses or recording.force_unit == "A" or np.count_nonzero(clear) < 5:
+    if device is None or recording.force_unit == "A" or np.count_nonzero(clear) < 5:
         return []
-    # Above the rigid-body frequencies the response is about 1 / (m w^2), up to its resonances.
-    found = float(np.median(1 / ((2 * np.pi * frequency[clear]) ** 2 * np.abs(response[clear]))))
-    low, high = min(masses.values()), sum(masses.values())
-    if low / 30 < found < 30 * high:
+    s = 2j * np.pi * frequency[clear]
+    ratios = [
+        float(np.median(np.abs(response[clear] / compliance)))
+        for compliance in _compliances(device, s)
+    ]
+    # Nobody knows here whether the device was held: the nearest of its models counts.
+    ratio = min(ratios, key=lambda ratio: abs(np.log(ratio)), default=1.0)
+    if 0.05 < ratio < 20:
         return []
-    assert device is not None
-    mass_unit = "kg" if device.kind == "translational" else "kg m^2"
+    slip = _slip(ratio, 4)
     text = (
-        f"The recording shows a mass of about {found:.2g} {mass_unit}, the device {device.name} "
-        f"has {low:.2g} to {high:.2g} {mass_unit}: the force or the position is off by a factor "
-        f"of about {_round_factor(found / np.sqrt(low * high)):g}. Give the units with "
-        "--columns, as in position=NAME[mm]."
+        f"The position answers {ratio:.2g} times as much to the force as that of {device.name} "
+        f"should: a slip of units? Perhaps the position is {slip or ratio:.3g} times too large, or "
+        f"the force {1 / (slip or ratio):.3g} times. Give the units with --columns, as in "
+        "position=NAME[mm]."
     )
     return [Notice("warning", "units", text)]
 
 
-def _round_factor(ratio: float) -> float:
-    return float(10.0 ** np.round(np.log10(ratio)))
+def _compliances(device: Device, s: NDArray[Any]) -> list[NDArray[Any]]:
+    """Position over force at the motor of each model that the device file gives in full.
 
-
-def _masses(device: Device) -> dict[str, float]:
-    """The masses of the largest model that the device file describes."""
-    for structure in ("grasped", "free", "rigid"):
-        values = device.parameters.get(structure, {})
-        masses = {name: value for name, value in values.items() if name.startswith("m")}
-        if masses:
-            return masses
-    return {}
+    The rigid one counts only where it is alone: it is far off above the first mode.
+    """
+    full = {
+        structure: device.parameters[structure]
+        for structure, names in STRUCTURES.items()
+        if set(names) <= set(device.parameters.get(structure, {}))
+    }
+    if set(full) == {"rigid"}:
+        return [1 / (full["rigid"]["m"] * s**2 + full["rigid"]["b"] * s)]
+    found = []
+    for structure, p in full.items():
+        if structure == "rigid":
+            continue
+        load = p["m2"] * s**2 + p["b2"] * s
+        if structure == "grasped":
+            hand = p["mh"] * s**2 + p["bh"] * s + p["kh"]
+            load = load + 1 / (1 / (p["bs"] * s + p["ks"]) + 1 / hand)
+        load = 1 / (1 / (p["bc"] * s + p["kc"]) + 1 / load)
+        found.append(1 / (p["m1"] * s**2 + p["b1"] * s + load))
+    return found
 
 
 def _rough_response(

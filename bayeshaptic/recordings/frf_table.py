@@ -126,6 +126,8 @@ def _columns(
 
     A single number fills its column.
     """
+    for role in set(mapping) - set(FRF_ROLES):
+        raise InputError(f"{path}: '{role}' belongs to a recording, not to a frequency response")
     columns: dict[str, NDArray[np.float64]] = {}
     for role in FRF_ROLES:
         found = pick(arrays, role, mapping, path, required=role in FRF_ROLES[:3])

@@ -198,11 +198,6 @@ def _recording(
     name: str | None,
     kind: str | None,
 ) -> Recording:
-    for role in mapping:
-        if role not in ("time", "force", "position"):
-            raise InputError(
-                f"{path}: '{role}' belongs to a frequency response, not to a recording"
-            )
     signals: dict[str, NDArray[np.float64]] = {}
     units: dict[str, str | None] = {}
     for role in ("force", "position", "time"):

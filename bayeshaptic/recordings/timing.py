@@ -125,9 +125,12 @@ def _clock(time_s: NDArray[np.float64]) -> tuple[float, float]:
 
 def _rounding(time_s: NDArray[np.float64]) -> float:
     """The power of ten to which the stamps were rounded; zero where there is none."""
+    # What double precision itself leaves of a decimal number.
+    dust = 4 * np.finfo(float).eps * float(np.abs(time_s).max())
     for digits in range(10):
         scaled = (time_s - time_s[0]) * 10.0**digits
-        if np.abs(scaled - np.round(scaled)).max() < 0.05:
+        tolerance = 1e-6 + dust * 10.0**digits
+        if tolerance < 0.05 and np.abs(scaled - np.round(scaled)).max() < tolerance:
             return float(10.0**-digits)
     return 0.0
 

@@ -1,0 +1,161 @@
+"""Which signal drives which, on simulated and on measured recordings."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
+
+from bayeshaptic.recordings.causality import (
+    NOTABLE_SHARE,
+    Causality,
+    causality,
+    repeats_exactly,
+)
+from bayeshaptic.recordings.read import read_recording, recording_from_arrays
+
+MEASURED = Path(
+    os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
+)
+SAMPLES = 12_000
+BANDS = (100.0, 200.0, 300.0, 500.0)
+
+
+def judge(force: np.ndarray, position: np.ndarray) -> Causality:
+    return causality(recording_from_arrays(force, position, period_s=PERIOD))
+
+
+@cache
+def open_loops(case: str) -> tuple[np.ndarray, np.ndarray]:
+    """Eight recordings: four bands, two shapes of band edge; friction in the second four."""
+    rng = np.random.default_rng(CASES.index(case))
+    scale = SCALE[case.split()[0]]
+    noise = np.concatenate([band_noise(rng, (2, SAMPLES), band) for band in BANDS])
+    friction = scale["friction"] * (np.arange(8) >= 4)
+    return record(case, scale["rms"] * noise, rng, friction=friction)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_false_alarm_in_open_loop(case: str) -> None:
+    for force, position in zip(*open_loops(case), strict=True):
+        found = judge(force, position)
+        assert not (found.has_feedback or found.swapped or found.early_position)
+        # Half of the alarm's threshold: it is not by luck.
+        assert found.feedback < 0.01
+        assert found.answer > 0.04
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_swapped_columns_are_seen(case: str) -> None:
+    for force, position in zip(*open_loops(case), strict=True):
+        found = judge(position, force)
+        assert found.swapped
+        assert not found.has_feedback
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_position_recorded_a_sample_early_is_no_feedback(case: str) -> None:
+    for force, position in zip(*open_loops(case), strict=True):
+        found = judge(force[:-1], position[1:])
+        assert not (found.has_feedback or found.swapped)
+    # White force on the first mass: its answer within the sample is plain for the heavy device,
+    # and hidden by the coarse encoder of the light one.
+    if case.startswith("lhifam"):
+        force, position = (signal[-1] for signal in open_loops(case))
+        assert judge(force[:-1], position[1:]).early_position
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_virtual_walls_and_servos_are_feedback(case: str) -> None:
+    rng = np.random.default_rng(7)
+    scale, critical = SCALE[case.split()[0]], CRITICAL[case]
+    excitation = scale["rms"] * band_noise(rng, (4, SAMPLES), 300.0)
+    stiffness = critical * np.array([0.03, 0.1, 0.5, 0.05])
+    damping = np.array([0.0, 0.0, 0.0, critical * 4e-4])
+
+    def control(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        speed = (position[:, k] - position[:, max(k - 1, 0)]) / PERIOD
+        return wanted - stiffness * position[:, k] - damping * speed
+
+    for force, position in zip(*record(case, excitation, rng, control=control), strict=True):
+        found = judge(force, position)
+        assert found.has_feedback
+        assert not found.swapped
+
+
+def test_a_relay_is_feedback_and_a_binary_sequence_is_not() -> None:
+    rng = np.random.default_rng(8)
+    case = "lhifam free"
+    bits = 3.0 * np.repeat(rng.choice([-1.0, 1.0], (1, SAMPLES // 10)), 10, axis=1)
+    force, position = record(case, bits, rng)
+    assert not judge(force[0], position[0]).relay
+
+    def control(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        return np.where(position[:, k] < 0, 3.0, -3.0)
+
+    force, position = record(case, bits, rng, control=control)
+    found = judge(force[0], position[0])
+    assert found.relay
+    assert found.has_feedback
+
+
+def test_a_force_that_repeats_exactly_is_no_feedback() -> None:
+    # More lines than the prediction has lags: the device's memory helps to tell the phase.
+    rng = np.random.default_rng(9)
+    force = np.tile(rng.normal(size=80), SAMPLES // 80)
+    assert repeats_exactly(force)
+    assert not repeats_exactly(force + 1e-3 * rng.normal(size=SAMPLES))
+    assert not repeats_exactly(rng.normal(size=SAMPLES))
+    force, position = record("lhifam free", 3.0 * force[None], rng)
+    found = judge(force[0], position[0])
+    assert found.feedback > NOTABLE_SHARE
+    assert found.repeats
+    assert not found.has_feedback
+
+
+def test_signals_of_other_people_are_neither_feedback_nor_swapped() -> None:
+    force, position = open_loops("lhifam grasped")
+    found = judge(force[6], position[7])
+    assert not (found.has_feedback or found.swapped)
+    assert abs(found.answer) < 0.02
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_units_do_not_matter(factor: float) -> None:
+    force, position = (signal[0] for signal in open_loops("phantom free"))
+    one, other = judge(force, position), judge(factor * force, position / factor + 5 / factor)
+    assert other.answer == pytest.approx(one.answer, rel=1e-3)
+
+
+@pytest.mark.parametrize("samples", [1000, 3000])
+def test_short_recordings(samples: int) -> None:
+    force, position = (signal[7, :samples] for signal in open_loops("lhifam grasped"))
+    assert not judge(force, position).has_feedback
+    assert judge(position, force).swapped
+
+
+def measured(name: str, columns: str) -> Causality:
+    path = MEASURED / name
+    if not path.exists():
+        pytest.skip(f"measured recording not found: {path} (set BAYESHAPTIC_MEASURED)")
+    return causality(read_recording(path, columns))
+
+
+def test_the_measured_servo_is_feedback() -> None:
+    found = measured("emps/DATA_EMPS.mat", "time=t,force=vir*35.15[N],position=qm[m]")
+    assert found.has_feedback
+    assert found.feedback > 0.1
+
+
+def test_the_measured_bench_is_open_loop() -> None:
+    name = "two_mass_bench/MultisineTypeA.mat"
+    columns = "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"
+    found = measured(name, columns)
+    assert not (found.has_feedback or found.swapped or found.early_position)
+    assert found.answer > 0.5
+    swapped = "time=time*1e-6,force=theta_mx[N],position=iq_refx[m]"
+    assert measured(name, swapped).swapped

@@ -1,0 +1,183 @@
+"""What cannot be used is refused in one line; what should be known is said."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tiny_bench import PERIOD, SCALE, band_noise, record
+
+from bayeshaptic.devices import load_device
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings import Recording, check_recording, read_recording
+from bayeshaptic.recordings.checks import FEWEST_SAMPLES
+
+MEASURED = Path(
+    os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
+)
+
+
+@cache
+def held(device: str = "lhifam") -> Recording:
+    """A sound recording of a device in a hand."""
+    rng = np.random.default_rng(4)
+    noise = SCALE[device]["rms"] * band_noise(rng, (1, 8000), 200.0)
+    force, position = record(f"{device} grasped", noise, rng)
+    units = {"lhifam": ("N", "m"), "phantom": ("Nm", "rad")}[device]
+    return Recording(force[0], position[0], PERIOD, *units, name="held")
+
+
+def changed(**parts: Any) -> Recording:
+    return replace(held(), **parts)
+
+
+def topics(notices: tuple[Notice, ...], level: str = "warning") -> list[str]:
+    return [notice.topic for notice in notices if notice.level == level]
+
+
+@pytest.mark.parametrize("device", SCALE)
+def test_nothing_is_said_of_a_sound_recording(device: str) -> None:
+    assert check_recording(held(device)) == ()
+    assert check_recording(held(device), load_device(device)) == ()
+
+
+def test_what_reading_found_is_kept() -> None:
+    note = Notice("note", "units", "assumed")
+    assert check_recording(changed(notices=(note,))) == (note,)
+
+
+def with_value(signal: np.ndarray, index: int, value: float) -> np.ndarray:
+    signal = signal.copy()
+    signal[index] = value
+    return signal
+
+
+REFUSED = {
+    r"50 samples \(0.05 s\) are too few: at least 1000 \(1 s at this period\)": held().part(0, 50),
+    "0 samples": held().part(0, 0),
+    r"the force is nan in row 8 \(1 such": changed(force=with_value(held().force, 7, np.nan)),
+    "the position is inf in row 1": changed(position=with_value(held().position, 0, np.inf)),
+    "the force is constant": changed(force=np.full(8000, 2.0)),
+    "the position never changes": changed(position=np.zeros(8000)),
+    "8000 samples of force and 7999 of position": changed(position=held().position[1:]),
+    "look swapped.*exchange them with --columns": changed(
+        force=held().position, position=held().force
+    ),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_used(message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        check_recording(REFUSED[message])
+    assert str(caught.value).startswith("held: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_other_kind_of_device() -> None:
+    with pytest.raises(InputError, match="translational recording .* phantom is rotational"):
+        check_recording(held(), load_device("phantom"))
+
+
+def test_the_fewest_samples_will_do() -> None:
+    assert check_recording(held().part(0, FEWEST_SAMPLES)) == ()
+
+
+WARNED = {
+    "steps of 0.00314 m, 1e\\+03 times the encoder's resolution": (
+        changed(position=1e3 * held().position, encoder_resolution=3.14e-6),
+        "units",
+    ),
+    "steps of 0.00018 m, 57.3 times .*is it in degrees": (
+        changed(position=held().position * 180 / np.pi, encoder_resolution=3.14e-6),
+        "units",
+    ),
+    "sampling period is 1 s, which no haptic loop has": (
+        changed(period_s=1.0),
+        "units",
+    ),
+    "stiffness is then in N/rad": (changed(position_unit="rad"), "units"),
+    "time steps vary by 3 % of the period": (changed(time_jitter=0.03), "time stamps"),
+    "hardly answers to the force": (changed(force=held().force[::-1]), "coherence"),
+    "recorded one sample early": (
+        changed(force=held().force[:-1], position=held().position[1:]),
+        "alignment",
+    ),
+}
+
+
+@pytest.mark.parametrize("text", WARNED)
+def test_what_is_warned_of(text: str) -> None:
+    recording, topic = WARNED[text]
+    (notice,) = check_recording(recording)
+    assert (notice.level, notice.topic) == ("warning", topic)
+    assert re.search(text, notice.text)
+
+
+def test_a_device_file_betrays_units() -> None:
+    lhifam = replace(load_device("lhifam"), encoder_resolution=None)
+    for factor in (1e3, 1e-3):
+        for part in ("force", "position"):
+            recording = changed(**{part: factor * getattr(held(), part)})
+            (notice,) = check_recording(recording, lhifam)
+            assert notice.topic == "units"
+            slip = factor if part == "position" else 1 / factor
+            assert f"the position is {slip:.3g} times too large" in notice.text
+    # Where no force constant is known the device's masses say nothing.
+    assert check_recording(changed(force_unit="A", force=1e3 * held().force), lhifam) == ()
+    phantom = held("phantom")
+    degrees = replace(phantom, position=phantom.position * 180 / np.pi)
+    assert topics(check_recording(degrees, load_device("phantom"))) == ["units"]
+
+
+def test_a_motion_of_a_few_counts() -> None:
+    count = np.ptp(held().position) / 15
+    coarse = changed(position=np.round(held().position / count) * count)
+    assert "resolution" in topics(check_recording(coarse))
+
+
+def test_a_coarser_encoder_and_another_period_than_the_device_file_says() -> None:
+    lhifam = load_device("lhifam")
+    coarse = changed(position=np.round(held().position, 5))
+    (notice,) = check_recording(coarse, lhifam)
+    assert (notice.level, notice.topic) == ("note", "resolution")
+    assert topics(check_recording(held(), replace(lhifam, period_s=2e-3))) == ["period"]
+
+
+def test_feedback_is_warned_of() -> None:
+    rng = np.random.default_rng(5)
+    noise = SCALE["lhifam"]["rms"] * band_noise(rng, (1, 8000), 200.0)
+
+    def wall(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        return wanted - 3000 * position[:, k]
+
+    def relay(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        return np.where(position[:, k] < 0, 3.0, -3.0)
+
+    for control, text in ((wall, "made in closed loop"), (relay, "a relay recording")):
+        force, position = record("lhifam grasped", noise, rng, control=control)
+        notices = check_recording(Recording(force[0], position[0], PERIOD))
+        assert topics(notices) == ["feedback"]
+        assert text in notices[0].text
+
+
+def test_the_measured_recordings() -> None:
+    for name, columns, expected in (
+        ("emps/DATA_EMPS.mat", "time=t,force=vir*35.15[N],position=qm[m]", ["feedback"]),
+        (
+            "two_mass_bench/MultisineTypeA.mat",
+            "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]",
+            [],
+        ),
+    ):
+        path = MEASURED / name
+        if not path.exists():
+            pytest.skip(f"measured recording not found: {path} (set BAYESHAPTIC_MEASURED)")
+        notices = check_recording(read_recording(path, columns))
+        assert [notice.topic for notice in notices] == expected

@@ -1,0 +1,153 @@
+"""Frequency responses from tables, and the variance that they imply."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings import read_frf, read_measurement
+from bayeshaptic.recordings.etfe import Etfe
+
+FREQUENCY = np.linspace(2.0, 300.0, 40)
+RESPONSE = 1 / (5.0 * (2j * np.pi * FREQUENCY) ** 2 + 7.0 * 2j * np.pi * FREQUENCY)
+GAIN_DB, PHASE_DEG = 20 * np.log10(np.abs(RESPONSE)), np.degrees(np.angle(RESPONSE))
+
+
+def write(path: Path, **columns: np.ndarray | float) -> Path:
+    table = np.column_stack(
+        [np.broadcast_to(values, len(FREQUENCY)) for values in columns.values()]
+    )
+    np.savetxt(path, table, header=",".join(columns), comments="", delimiter=",")
+    return path
+
+
+def base(**columns: np.ndarray | float) -> dict[str, np.ndarray | float]:
+    return {"frequency_hz": FREQUENCY, "gain_db": GAIN_DB, "phase_deg": PHASE_DEG, **columns}
+
+
+def test_a_table_with_standard_deviations(tmp_path: Path) -> None:
+    sd = 0.01 * np.abs(RESPONSE)
+    etfe = read_frf(write(tmp_path / "a.csv", **base(sd=sd)), period_s=1e-3)
+    np.testing.assert_allclose(etfe.value, RESPONSE, rtol=1e-12)
+    np.testing.assert_allclose(etfe.variance, sd**2, rtol=1e-12)
+    np.testing.assert_allclose(etfe.gain_db, GAIN_DB)
+    assert np.all(np.isnan(etfe.coherence))
+    assert etfe.recording is None
+    assert etfe.period_s == 1e-3
+    assert etfe.band_hz == (2.0, 300.0)
+    assert etfe.stiffness_unit == "N/m"
+    (note,) = etfe.notices
+    assert "m/N" in note.text
+    # The likelihood of a known variance is Gaussian: log p = -|z - g|^2 / variance.
+    windows = etfe.spectra.windows()
+    off = windows.target[:, 0] + 2 * sd
+    loss = (windows.lines - 1) * np.log1p(np.abs(windows.target[:, 0] - off) ** 2 / windows.scatter)
+    np.testing.assert_allclose(loss, 4.0, rtol=1e-4)
+
+
+def test_rows_in_any_order(tmp_path: Path) -> None:
+    shuffled = np.random.default_rng(0).permutation(len(FREQUENCY))
+    columns = {name: np.broadcast_to(v, 40)[shuffled] for name, v in base(sd=FREQUENCY).items()}
+    etfe = read_frf(write(tmp_path / "a.csv", **columns), period_s=1e-3)
+    np.testing.assert_allclose(etfe.frequency_hz, FREQUENCY)
+    np.testing.assert_allclose(etfe.value, RESPONSE, rtol=1e-12)
+    np.testing.assert_allclose(etfe.variance, FREQUENCY**2)
+
+
+@pytest.mark.parametrize("averages", [4, 16])
+def test_the_variance_that_coherence_implies(tmp_path: Path, averages: int) -> None:
+    # Many tables of one response at 40 frequencies, each averaged from Gaussian segments: on
+    # average the variance that each table states is the scatter that the tables show.
+    rng = np.random.default_rng(averages)
+    tables, noise = 2000, 0.5
+    shape = (tables, averages, len(FREQUENCY))
+
+    def gaussian() -> np.ndarray:
+        return (rng.normal(size=shape) + 1j * rng.normal(size=shape)) / np.sqrt(2)
+
+    force = gaussian()
+    position = RESPONSE * force + noise * np.abs(RESPONSE) * gaussian()
+    cross = (force.conj() * position).sum(axis=1)
+    force_power = (np.abs(force) ** 2).sum(axis=1)
+    coherence = np.abs(cross) ** 2 / (force_power * (np.abs(position) ** 2).sum(axis=1))
+    estimate = cross / force_power
+    stated = np.empty((20, len(FREQUENCY)))
+    for row in range(20):
+        columns = base(coherence=coherence[row], averages=averages)
+        columns["gain_db"] = 20 * np.log10(np.abs(estimate[row]))
+        columns["phase_deg"] = np.degrees(np.angle(estimate[row]))
+        etfe = read_frf(write(tmp_path / "a.csv", **columns), period_s=1e-3)
+        np.testing.assert_allclose(etfe.value, estimate[row], rtol=1e-12)
+        np.testing.assert_allclose(etfe.coherence, coherence[row])
+        assert np.all(etfe.spectra.windows().lines == averages)
+        stated[row] = etfe.variance
+    formula = np.abs(estimate) ** 2 * (1 - coherence) / (coherence * (averages - 1))
+    np.testing.assert_allclose(stated, formula[:20], rtol=1e-10)
+    error = np.abs(estimate - RESPONSE) ** 2
+    # Both sides are means of 80000 draws whose relative sd is below 3 with four averages.
+    assert formula.mean(axis=0).sum() / error.mean(axis=0).sum() == pytest.approx(1, abs=0.05)
+
+
+def test_units(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", **base(sd=1.0))
+    for columns, kind, unit, factor in (
+        ("gain_db=gain_db[rad/A]", None, "A/rad", 1.0),
+        ("gain_db=gain_db[mm/N]", None, "N/m", 1e-3),
+        (None, "rotational", "N m/rad", 1.0),
+    ):
+        etfe = read_frf(path, 1e-3, columns, kind=kind)
+        assert etfe.stiffness_unit == unit
+        np.testing.assert_allclose(etfe.value, factor * RESPONSE)
+        np.testing.assert_allclose(etfe.variance, factor**2)
+    assert read_frf(path, 1e-3, force_unit="A", position_unit="rad").notices == ()
+
+
+def test_other_names_and_formats(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, f=FREQUENCY, g=GAIN_DB, p=PHASE_DEG, c=np.full(40, 0.9), n=np.array(16))
+    columns = "frequency=f,gain_db=g,phase_deg=p,coherence=c,averages=n"
+    etfe = read_measurement(path, columns, default_period_s=1e-3)
+    assert isinstance(etfe, Etfe)
+    np.testing.assert_allclose(etfe.variance, np.abs(RESPONSE) ** 2 / 9 / 15)
+
+
+def changed(values: np.ndarray | float, index: int, value: float) -> np.ndarray:
+    column = np.broadcast_to(values, len(FREQUENCY)).astype(float)
+    column[index] = value
+    return column
+
+
+WRONG: dict[str, dict[str, np.ndarray | float]] = {
+    "needs its uncertainty, .*there is neither": base(),
+    "there is coherence without averages": base(coherence=0.9),
+    "sd is 0 at 2 Hz; it must be above 0": base(sd=changed(1, 0, 0)),
+    "sd is nan in row 3": base(sd=changed(1, 2, np.nan)),
+    "coherence is 1 at 2 Hz; it must be between 0 and 1": base(coherence=1.0, averages=9),
+    "averages is 1 at 2 Hz; it must be at least 2": base(coherence=0.5, averages=1),
+    "frequency 600 Hz is not above 0 and up to the Nyquist frequency, 500 Hz": base(sd=1)
+    | {"frequency_hz": changed(FREQUENCY, 5, 600.0)},
+    "frequency 0 Hz is not above 0": base(sd=1) | {"frequency_hz": changed(FREQUENCY, 0, 0.0)},
+    "frequency 2 Hz is there twice": base(sd=1) | {"frequency_hz": changed(FREQUENCY, 1, 2.0)},
+    "no column for the phase_deg": {"frequency_hz": FREQUENCY, "gain_db": GAIN_DB, "sd": 1.0},
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_tables_that_cannot_be_used(tmp_path: Path, message: str) -> None:
+    path = write(tmp_path / "a.csv", **WRONG[message])
+    with pytest.raises(InputError, match=message) as caught:
+        read_frf(path, period_s=1e-3)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_table_needs_a_period(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", **base(sd=1.0))
+    with pytest.raises(InputError, match="give --period-s"):
+        read_frf(path)
+    with pytest.raises(InputError, match="above 0"):
+        read_frf(path, -1.0)
+    with pytest.raises(InputError, match="position over force"):
+        read_frf(path, 1e-3, "gain_db=gain_db[m]")

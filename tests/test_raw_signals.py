@@ -1,0 +1,75 @@
+"""Facts that raw samples show: resolution, held samples, clipping."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayeshaptic.recordings.raw_signals import clipping, increment_unit, repeats
+
+RNG = np.random.default_rng(0)
+MOTION = np.cumsum(np.cumsum(RNG.normal(size=5000)) * 1e-5 * np.hanning(5000))
+
+
+@pytest.mark.parametrize("count", [3.14e-6, 2e-4, 2 * np.pi / 2**20, 1e-9])
+@pytest.mark.parametrize("offset", [0.0, -7.3])
+def test_the_count_of_an_encoder(count: float, offset: float) -> None:
+    motion = MOTION * (30 * count / np.abs(np.diff(MOTION)).mean())
+    reading = offset + count * np.round(motion / count)
+    assert increment_unit(reading) == pytest.approx(count, rel=1e-4)
+    # Nine digits, as files have them, hide a count that is finer than them.
+    if count > 1e-7:
+        written = np.array([float(f"{value:.9g}") for value in reading])
+        assert increment_unit(written) == pytest.approx(count, rel=1e-3)
+
+
+def test_an_encoder_that_never_moves_by_one_count() -> None:
+    counts = RNG.choice([2, 3, 7, 9], size=1000) * RNG.choice([-1, 1], size=1000)
+    assert increment_unit(1e-6 * np.cumsum(counts)) == pytest.approx(1e-6)
+
+
+def test_a_continuous_signal_has_no_count() -> None:
+    assert increment_unit(MOTION) is None
+    assert increment_unit(RNG.normal(size=300)) is None
+    assert increment_unit(np.zeros(100)) is None
+    assert increment_unit(np.arange(3.0)) is None
+
+
+def test_a_file_rounded_to_a_sixth_of_a_count() -> None:
+    count = 5.992e-6
+    reading = np.round(count * np.round(MOTION / count), 6)
+    assert increment_unit(reading) == pytest.approx(count, rel=1e-3)
+
+
+def test_held_samples_catch_up_and_rest_does_not() -> None:
+    moving = np.linspace(0, 1, 200) + 1e-5 * RNG.normal(size=200)
+    held = moving.copy()
+    held[50:55] = held[50]
+    found = repeats(held)
+    assert (found.start.tolist(), found.length.tolist()) == ([50], [5])
+    assert found.catch_up[0] == pytest.approx(5, rel=0.01)
+    rest = np.concatenate([moving[:50], np.full(4, moving[50]), moving[50:] + 0.0])
+    found = repeats(rest)
+    assert (found.start.tolist(), found.length.tolist()) == ([50], [5])
+    assert found.catch_up[0] == pytest.approx(1, rel=0.01)
+
+
+def test_runs_at_the_ends_and_short_ones() -> None:
+    found = repeats(np.array([1, 1, 1, 2, 3, 3, 4, 5, 5, 5, 5]), shortest=3)
+    assert found.start.tolist() == [0, 7]
+    assert found.length.tolist() == [3, 4]
+    assert np.all(np.isnan(found.catch_up))
+    assert repeats(np.array([1, 1, 2]), shortest=2).length.tolist() == [2]
+    assert len(repeats(MOTION).start) == 0
+
+
+def test_clipping() -> None:
+    signal = np.round(RNG.normal(size=10_000), 2)
+    found = clipping(np.clip(signal, -np.inf, 1.5))
+    assert (found.high, found.high_clipped, found.low_clipped) == (1.5, True, False)
+    assert found.high_samples == np.count_nonzero(signal >= 1.5)
+    assert not clipping(signal).high_clipped
+    assert not clipping(RNG.normal(size=1000)).low_clipped
+    relay = clipping(np.where(signal > 0, 3.0, -3.0))
+    assert not (relay.low_clipped or relay.high_clipped)
+    assert not clipping(np.zeros(100)).low_clipped

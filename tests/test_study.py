@@ -1,0 +1,179 @@
+"""Studies: one device and all its recordings from a TOML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayeshaptic.devices import load_device
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings import Recording, read_study
+from bayeshaptic.recordings.etfe import Etfe
+
+SIGNALS = np.random.default_rng(0).normal(size=(30, 2))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with two recordings (one with names of its own) and a frequency response."""
+    for name, header in (("a.csv", "force_n,position_m"), ("b.csv", "u,q")):
+        np.savetxt(tmp_path / name, SIGNALS, header=header, comments="", delimiter=",")
+    rows = "\n".join(f"{f},{-f},{-180},1e-6" for f in range(1, 20))
+    (tmp_path / "frf.csv").write_text(
+        f"frequency_hz,gain_db,phase_deg,sd\n{rows}\n", encoding="utf-8"
+    )
+    return tmp_path
+
+
+def write(folder: Path, content: str) -> Path:
+    path = folder / "study.toml"
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+FULL = """
+[device]
+name = "my wheel"
+kind = "translational"
+period_s = 5e-4
+delay_s = 1e-4
+delay_sd_s = 1e-5
+encoder_resolution = 1e-6
+lever_m = 0.1
+columns = "force=force_n[N],position=position_m[m]"
+
+[prior]
+m1 = { median = 0.2, log_sd = 0.3 }
+b1 = { scale = 5 }
+kc = { mean = 6e4, sd = 1e3 }
+m2 = { low = 1, high = 9, log = true }
+
+[[recording]]
+file = "a.csv"
+user = "Ada"
+configuration = 0.3
+trial = 2
+level = 1.5
+
+[[recording]]
+file = "b.csv"
+columns = { force = "u[N]", position = "q[mm]" }
+configuration = "upright"
+trial = "second"
+
+[[recording]]
+file = "frf.csv"
+columns = "gain_db=gain_db[m/N]"
+user = 3
+"""
+
+
+def test_a_full_study(folder: Path) -> None:
+    study = read_study(write(folder, FULL))
+    assert study.name == "study"
+    assert study.device.name == "my wheel"
+    assert (study.device.delay_s, study.device.delay_sd_s) == (1e-4, 1e-5)
+    assert study.device.lever_m == 0.1
+    assert study.users == ("Ada", "3")
+    assert study.prior == {
+        "m1": {"median": 0.2, "log_sd": 0.3},
+        "b1": {"scale": 5.0},
+        "kc": {"mean": 6e4, "sd": 1e3},
+        "m2": {"low": 1.0, "high": 9.0, "log": True},
+    }
+    first, second, third = study.read_all()
+    assert isinstance(first, Recording)
+    assert (first.name, first.device, first.user) == ("a", "my wheel", "Ada")
+    assert (first.configuration, first.trial, first.level) == (0.3, 2, 1.5)
+    assert (first.period_s, first.encoder_resolution) == (5e-4, 1e-6)
+    np.testing.assert_allclose(first.force, SIGNALS[:, 0])
+    assert isinstance(second, Recording)
+    assert (second.user, second.configuration, second.trial) == (None, "upright", "second")
+    np.testing.assert_allclose(second.position, 1e-3 * SIGNALS[:, 1])
+    assert isinstance(third, Etfe)
+    assert third.period_s == 5e-4
+
+
+RECORDING = "\n[[recording]]\nfile = 'a.csv'\n"
+
+
+def test_a_known_device_with_parts_overridden(folder: Path) -> None:
+    study = read_study(write(folder, f"[device]\nname = 'LHIfAM'\ndelay_s = 3e-4{RECORDING}"))
+    lhifam = load_device("lhifam")
+    assert study.device.delay_s == 3e-4
+    assert study.device.parameters == lhifam.parameters
+    assert study.device.encoder_resolution == lhifam.encoder_resolution
+    content = f"[device]\nname = 'lhifam'\n[device.free]\nm1 = 1\n{RECORDING}"
+    device = read_study(write(folder, content)).device
+    assert device.parameters["free"] == {"m1": 1.0}
+    assert device.parameters["grasped"] == lhifam.parameters["grasped"]
+
+
+def test_a_device_file_beside_the_study(folder: Path) -> None:
+    (folder / "mine.toml").write_text("kind = 'rotational'\nlever_m = 0.2\n", encoding="utf-8")
+    study = read_study(write(folder, f"[device]\nfile = 'mine.toml'\n{RECORDING}"))
+    assert (study.device.name, study.device.lever_m) == ("mine", 0.2)
+    study = read_study(write(folder, f"[device]\nfile = 'mine.toml'\nname = 'x'\n{RECORDING}"))
+    assert study.device.name == "x"
+
+
+def test_units_follow_the_kind_of_device(folder: Path) -> None:
+    columns = "columns = 'force=u,position=q'"
+    content = f"[device]\nname='phantom'\n{columns}\n[[recording]]\nfile='b.csv'\n"
+    (recording,) = read_study(write(folder, content)).read_all()
+    assert recording.stiffness_unit == "N m/rad"
+
+
+def test_a_name_that_is_almost_known(folder: Path) -> None:
+    content = f"[device]\nname = 'lhifan'\nkind = 'translational'\n{RECORDING}"
+    (note,) = read_study(write(folder, content)).notices
+    assert "did you mean 'lhifam'" in note.text
+
+
+DEVICE = "[device]\nname = 'lhifam'\n"
+WRONG = {
+    "": r"no \[device\] table",
+    DEVICE: "no recordings",
+    f"{DEVICE}[[recordings]]\nfile='a.csv'\n": r"unknown key 'recordings' \(did you mean 'reco",
+    f"{DEVICE}[recording]\nfile='a.csv'\n": "no recordings",
+    f"{DEVICE}[[recording]]\nfiel='a.csv'\n": r"recording 1 has an unknown key 'fiel' \(did you m",
+    f"{DEVICE}{RECORDING}[[recording]]\nuser='x'\n": "recording 2 needs a file",
+    f"{DEVICE}[[recording]]\nfile='none.csv'\n": "recording 1: no such file: .*none.csv",
+    f"{DEVICE}[[recording]]\nfile=3\n": "recording 1: file must be text, not 3",
+    f"{DEVICE}{RECORDING}level='high'\n": "recording 1: level must be a number, not 'high'",
+    f"{DEVICE}{RECORDING}configuration=[1]\n": r"configuration must be a number, not \[1\]",
+    f"{DEVICE}{RECORDING}user=true\n": "user must be text, not True",
+    f"{DEVICE}{RECORDING}trial=1.5\n": "trial must be text, not 1.5",
+    f"{DEVICE}{RECORDING}columns='forse=u'\n": "recording 1: columns: 'forse' is none of",
+    f"{DEVICE}columns=3\n{RECORDING}": r"\[device\]: columns must be text like",
+    f"{DEVICE}delay=1\n{RECORDING}": r"\[device\] has an unknown key 'delay' \(did you mean 'dela",
+    f"{DEVICE}kind='rotational'\n{RECORDING}": "but the device lhifam is translational",
+    f"[device]\nname='wheel'\n{RECORDING}": "no device 'wheel' is known: there are lhifam, phantom",
+    f"[device]\nkind='rotational'\n{RECORDING}": r"\[device\] needs a name",
+    f"[device]\nfile='none.toml'\n{RECORDING}": "none.toml: no such file",
+    f"device=3\n{RECORDING}": r"\[device\] must be a table",
+    f"{DEVICE}[prior]\nm1=3\n{RECORDING}": r"\[prior\], m1 must be a table",
+    f"{DEVICE}[prior]\nm1={{men=3}}\n{RECORDING}": r"unknown key 'men' \(did you mean 'mean'\?\)",
+    f"{DEVICE}[prior]\nm1={{scale='x'}}\n{RECORDING}": "m1: scale must be a number, not 'x'",
+    f"{DEVICE}[prior]\nm1={{low=1,high=2,log=1}}\n{RECORDING}": "log must be true or false, not 1",
+    "[device\n": "not valid TOML",
+}
+
+
+@pytest.mark.parametrize("content", WRONG)
+def test_wrong_studies_say_where(folder: Path, content: str) -> None:
+    path = write(folder, content)
+    with pytest.raises(InputError, match=WRONG[content]) as caught:
+        read_study(path)
+    assert str(folder) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_study(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_study(tmp_path / "none.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="cannot be read as text"):
+        read_study(tmp_path / "binary.toml")

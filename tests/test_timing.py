@@ -1,0 +1,90 @@
+"""The sampling period from time stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.timing import sampling_period
+
+RNG = np.random.default_rng(3)
+N = 5000
+EVEN = 1e-3 * np.arange(N)
+
+
+def test_even_stamps() -> None:
+    for start, period in ((0.0, 1e-3), (1.7e9, 1e-3), (-3.0, 1 / 1024), (0.0, 4e-4)):
+        timing = sampling_period(start + period * np.arange(N))
+        # A second of 2026 has its last digit at 2.4e-7 s: that is the error over the whole length.
+        assert timing.period_s == pytest.approx(period, rel=1e-6)
+        assert timing.jitter is not None
+        assert timing.jitter < 1e-3
+    assert sampling_period(EVEN).period_s == 1e-3
+
+
+@pytest.mark.parametrize("digits", [3, 4, 5, 6])
+def test_stamps_that_were_rounded_are_even(digits: int) -> None:
+    # 700 us in milliseconds: two stamps in ten are equal, and still no sample is late.
+    timing = sampling_period(np.round(0.7e-3 * np.arange(N), digits))
+    assert timing.period_s == pytest.approx(0.7e-3, rel=1e-4)
+    assert timing.jitter == 0
+
+
+@pytest.mark.parametrize("jitter", [0.002, 0.02])
+def test_jitter_is_measured(jitter: float) -> None:
+    stamps = EVEN + 1e-3 * jitter / np.sqrt(2) * RNG.normal(size=N)
+    timing = sampling_period(stamps)
+    # The difference of two stamps; sd of an sd from N samples with neighbours correlated by -1/2.
+    assert timing.jitter == pytest.approx(jitter, rel=5 * np.sqrt(1.5 / 2 / N))
+    assert timing.period_s == pytest.approx(1e-3, rel=1e-5)
+
+
+def test_one_late_stamp_is_no_gap() -> None:
+    stamps = EVEN.copy()
+    stamps[100] += 0.7e-3
+    assert sampling_period(stamps).period_s == pytest.approx(1e-3, rel=1e-5)
+
+
+def drop(stamps: np.ndarray, *rows: int) -> np.ndarray:
+    return np.delete(stamps, rows)
+
+
+def replaced(index: int, value: float) -> np.ndarray:
+    stamps = EVEN.copy()
+    stamps[index] = value
+    return stamps
+
+
+WRONG = {
+    "about 1 samples are missing after row 7 .*1 such places": drop(EVEN, 7),
+    "about 3 samples are missing after row 100": drop(EVEN, 100, 101, 102),
+    "time does not advance from row 10 to row 11 .*1 such places": replaced(10, EVEN[9]),
+    "time does not advance from row 5 to row 6": replaced(5, 0.001),
+    "the time in row 4 is nan": replaced(3, np.nan),
+    "not even: they vary by 58 %": np.cumsum(1e-3 * RNG.uniform(1e-3, 2, size=N)),
+    "not even": np.concatenate([EVEN, EVEN[-1] + 2 * EVEN[1:]]),
+    "2 time stamps; a period needs at least 3": EVEN[:2],
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_stamps_that_cannot_be_used(message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        sampling_period(WRONG[message])
+    # Whoever gives the period is believed, and warned.
+    timing = sampling_period(WRONG[message], 1e-3)
+    assert timing.period_s == 1e-3
+    (notice,) = timing.notices
+    assert notice.level == "warning"
+
+
+def test_a_period_beside_stamps() -> None:
+    assert sampling_period(EVEN, 1e-3).notices == ()
+    assert sampling_period(EVEN, 1.005e-3).notices == ()
+    (notice,) = sampling_period(EVEN, 1e-4).notices
+    assert "show a period of 0.001 s" in notice.text
+    assert sampling_period(None, 1e-4).jitter is None
+    for period in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="above 0"):
+            sampling_period(EVEN, period)
