@@ -1,0 +1,87 @@
+"""What the documents say: their snippets run, their links lead somewhere, their numbers hold."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bayeshaptic.cli import build_parser
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("data/*.md")})
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    text = page.read_text(encoding="utf-8")
+    return [code for name, code in BLOCK.findall(text) if name == language]
+
+
+def with_snippets() -> list[Path]:
+    return [page for page in PAGES if blocks(page, "python")]
+
+
+@pytest.mark.parametrize("page", with_snippets(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_snippets_run(page: Path, tmp_path: Path) -> None:
+    """All snippets of a page, one after the other in a process of their own, warnings as errors."""
+    (tmp_path / "data").symlink_to(ROOT / "data")
+    code = "\n".join(blocks(page, "python"))
+    # A script with a guard, as where a snippet starts processes.
+    script = tmp_path / "snippets.py"
+    script.write_text(code, encoding="utf-8")
+    command = [sys.executable, "-W", "error", "-W", "ignore::FutureWarning", str(script)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_readme_has_two_commands_of_one_line() -> None:
+    commands = [line for block in blocks(ROOT / "README.md", "sh") for line in block.splitlines()]
+    assert len(commands) == 2
+    report, tests = commands
+    assert report.startswith("python3 -m venv .venv && ") and "bayeshaptic report" in report
+    assert tests.startswith("python3 -m venv .venv && ") and "-m pytest" in tests
+    arguments = report.split("bayeshaptic report ")[1].split()
+    understood = build_parser().parse_args(["report", *arguments])
+    assert (ROOT / understood.source).is_file()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_files(page: Path) -> None:
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        if not re.match(r"https?:|#", target):
+            assert (page.parent / target.split("#")[0]).exists(), f"{page.name}: {target}"
+
+
+def test_every_page_is_linked_from_the_readme_or_the_index() -> None:
+    linked = {ROOT / "README.md", ROOT / "docs" / "README.md"}
+    for index in tuple(linked):
+        for target in LINK.findall(index.read_text(encoding="utf-8")):
+            linked.add((index.parent / target.split("#")[0]).resolve())
+    assert not [page for page in PAGES if page.resolve() not in linked]
+
+
+def test_every_folder_of_the_package_is_in_the_architecture() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    folders = {path.parent.name for path in (ROOT / "bayeshaptic").glob("*/*.py")}
+    assert not [name for name in sorted(folders - {"bayeshaptic"}) if f"`{name}/`" not in text]
+    for name in re.findall(r"`(\w+/[\w/]*(?:\.py)?)`", text):
+        assert (ROOT / "bayeshaptic" / name).exists() or (ROOT / name).exists(), name
+
+
+def test_every_key_of_the_summary_is_described() -> None:
+    from fake_analysis import fake_analysis
+
+    from bayeshaptic.report.summary import summary
+
+    text = (ROOT / "docs" / "file-formats.md").read_text(encoding="utf-8")
+    for key, content in summary(fake_analysis()).items():
+        assert f"| `{key}` |" in text
+        (line,) = (line for line in text.splitlines() if line.startswith(f"| `{key}` |"))
+        names = content if isinstance(content, dict) and key != "error" else {}
+        missing = [name for name in names if f"`{name}`" not in line and not name.startswith("q")]
+        assert not missing, f"{key}: {missing}"
