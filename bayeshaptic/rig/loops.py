@@ -136,8 +136,9 @@ def run_relay(
 
     The loop settles into an oscillation near the frequency where the phase is -180 degrees, and its
     amplitude tells the gain there (Astrom and Hagglund, Automatica 20, 1984). A relay that switches
-    at samples only does so half a period late on average, so that it oscillates below that
-    frequency.
+    at samples does so up to a period late, where a held stiffness is late by half a period: it may
+    settle to either side of that frequency, on half periods of whole samples, unless a hand that
+    wanders keeps it moving.
 
     Parameters
     ----------
@@ -243,8 +244,11 @@ def _growth(position: Array, period_s: float) -> float:
         return np.inf
     pieces = half[-10 * length :].reshape(10, length)
     window = np.hanning(length + 2)[1:-1] ** 2
-    power = (window * pieces**2).sum(axis=1) / window.sum()
-    if not np.all(power > 0):
+    window /= window.sum()
+    swing = pieces - (window * pieces).sum(axis=1)[:, None]
+    power = (window * swing**2).sum(axis=1)
+    # Where friction holds it, nothing swings any more but the last digit.
+    if not np.all(power > 1e-24 * np.max(pieces**2)):
         return -np.inf
     middles = (np.arange(10) - 4.5) * length * period_s
     return float(0.5 * np.log(power) @ middles / (middles @ middles))

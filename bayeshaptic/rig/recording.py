@@ -90,8 +90,8 @@ def write_recording(path: str | os.PathLike[str], recording: SimulatedRecording)
 
 
 def _decimals(grid: float, values: Array) -> int:
-    """Decimals that keep the grid of counts to a hundredth, or nine digits where there is none."""
-    size = grid / 100 if grid > 0 else float(np.max(np.abs(values), initial=0.0)) * 1e-9
+    """Decimals that keep counts to a ten-thousandth, or nine digits where there is none."""
+    size = grid / 1e4 if grid > 0 else float(np.max(np.abs(values), initial=0.0)) * 1e-9
     return int(np.clip(np.ceil(-np.log10(size)), 0, 18)) if size > 0 else 1
 
 
@@ -100,7 +100,7 @@ def _write_csv(path: Path, recording: SimulatedRecording) -> None:
 
     names = ",".join(recording.columns)
     columns = np.column_stack(list(recording.columns.values()))
-    grids = (recording.period_s * 1e-2, 0.0, recording.bench.resolution)
+    grids = (recording.period_s, 0.0, recording.bench.resolution)
     formats = [
         f"%.{_decimals(grid, values)}f" for grid, values in zip(grids, columns.T, strict=True)
     ]

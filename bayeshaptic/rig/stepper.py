@@ -14,7 +14,9 @@ from bayeshaptic.rig.plant import Array, Plant
 from bayeshaptic.rig.propagate import Stretch, generator, layout, stretches
 
 SUBSTEPS = 8
-HALVINGS = 10
+HALVINGS = 6
+# How often the force at the end of a step is looked up again where the step then ends.
+CORRECTIONS = 2
 
 
 @dataclass(frozen=True)
@@ -86,10 +88,11 @@ class Stepper:
 
     A step of the linear part is a matrix exponential. Smooth laws are predicted with their force at
     the beginning of the step and corrected by the ramp to their force at its end (second order,
-    Cox and Matthews 2002). Dry friction slides with a constant force while the velocity keeps its
-    sign; a step in which it does not is halved, `halvings` times at most, and at the bottom the
-    force is the one that brings the velocity to exactly zero, or, where the bound does not
-    allow that, the bound in the new direction. A stuck mass does not move at all.
+    Cox and Matthews, J. Comput. Phys. 176, 2002). Dry friction slides with a constant force while
+    the velocity keeps its sign; a step in which it does not is halved, `halvings` times at most. At
+    the bottom the force is the one that brings the velocity to exactly zero, or, where friction
+    cannot hold against the other forces, the mean of the old direction's and the new one's. A stuck
+    mass does not move at all.
 
     Parameters
     ----------
@@ -182,26 +185,29 @@ class Stepper:
         """The state after a step, or after its two halves where friction reverses in it."""
         step = table[level]
         end = step.matrix @ z
-        for j, slot, law, place in self.smooth:
-            before = z.item(slot)
-            q = place.position(end)
-            force = law.force(q, place.velocity(end), before, q - place.position(z))
-            end += step.ramp[j] * (force - before)
+        applied = [z.item(slot) for _, slot, _, _ in self.smooth]
+        for _ in range(CORRECTIONS if applied else 0):
+            for i, (j, slot, law, place) in enumerate(self.smooth):
+                q = place.position(end)
+                moved = q - place.position(z)
+                force = law.force(q, place.velocity(end), z.item(slot), moved)
+                end += step.ramp[j] * (force - applied[i])
+                applied[i] = force
         if self.dry:
             modes = self._rub(z, end, step, level == self.halvings)
             if modes is None:
                 return self._take(self._take(z, table, level + 1), table, level + 1)
-            for (j, slot, law, place), mode in zip(self.dry, modes, strict=True):
+            for (j, slot, friction, place), mode in zip(self.dry, modes, strict=True):
                 self.mode[j] = mode
                 if mode:
-                    end[slot] = -mode * law.bound(place.velocity(end))
+                    end[slot] = -mode * friction.bound(place.velocity(end))
         for _, slot, law, place in self.smooth:
             q = place.position(end)
             end[slot] = law.force(q, place.velocity(end), z.item(slot), q - place.position(z))
         return end
 
     def _rub(self, z: Array, end: Array, step: Step, finest: bool) -> list[int] | None:
-        """Add dry friction to the end of a step; None where a velocity reverses in it."""
+        """Add dry friction to the end of a step; None where one begins, ends or turns in it."""
         modes = []
         for j, slot, law, place in self.dry:
             mode, before, grip = self.mode[j], z.item(slot), step.grip[j]
@@ -213,15 +219,23 @@ class Stepper:
                 continue
             if mode and not finest:
                 return None
-            holding = before - v / grip
-            force = min(max(holding, -law.static), law.static)
+            # What the velocity would gain in the step without this friction decides if it can hold.
+            start = place.velocity(z) if mode else 0.0
+            gain = v - before * grip - start
+            sticks = abs(gain) <= law.static * grip
+            if not sticks and not finest:
+                return None
+            if sticks:
+                force = -(gain + start) / grip
+            elif mode:
+                force = before * (2 * start / (start - v) - 1)
+            else:
+                force = -math.copysign(law.static, gain)
             end += step.constant[j] * (force - before)
             end[slot] = force
-            if force == holding:
-                modes.append(0)
+            modes.append(0 if sticks else int(math.copysign(1, gain)))
+            if sticks:
                 self._pin(z, end, place, was_stuck=mode == 0)
-            else:
-                modes.append(-1 if force > 0 else 1)
         return modes
 
     @staticmethod

@@ -126,6 +126,9 @@ def make_effect(name: str, scales: Scales, **changes: Any) -> Effect:
     if name not in REGISTRY:
         raise InputError(f"unknown effect '{name}'; the bench knows {', '.join(sorted(REGISTRY))}")
     effect = REGISTRY[name].typical(scales)
+    for key, value in changes.items():
+        if type(getattr(effect, key, None)) is int and float(value).is_integer():
+            changes[key] = int(value)
     try:
         return replace(effect, **changes)
     except TypeError:

@@ -67,7 +67,7 @@ class PositionClipping(Effect):
 
     @classmethod
     def typical(cls, scales: Scales) -> PositionClipping:
-        return cls(2.0 * scales.position)
+        return cls(1.5 * scales.position)
 
     def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
         return replace(samples, position=np.clip(samples.position, -self.limit, self.limit))
@@ -112,9 +112,8 @@ class HeldSamples(Effect):
         count = len(log.position)
         source = np.arange(count)
         starts = np.flatnonzero(rng.random(count) < self.probability)
-        for start, length in zip(
-            starts, rng.integers(1, self.longest + 1, len(starts)), strict=True
-        ):
+        lengths = rng.integers(1, self.longest + 1, len(starts))
+        for start, length in zip(starts.tolist(), lengths.tolist(), strict=True):
             source[start : start + length] = source[max(start - 1, 0)]
         return replace(log, position=log.position[source])
 
