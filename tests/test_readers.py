@@ -184,7 +184,7 @@ WRONG_CSV = {
     "time_s,force_n,torque_nm,position_m\n0,1,2,3\n": "both force_n and torque_nm",
     "time_s,force_n,position_m\n0,1,2\n0.001,nan,3\n0.002,1,1\n": r"force is nan in row 2 \(1 such",
     "time_s,force_n,position_m\n0,1,2\n0.001,1,inf\n0.002,1,1\n": "position is inf in row 2",
-    "force_n,position_m\n1,2\n1,3\n0,2\n": "no column for the time.*",
+    "force_n,position_m\n1,2\n1,3\n0,2\n": "no column for the time.*or give the sampling period",
 }
 
 

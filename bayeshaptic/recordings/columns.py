@@ -153,6 +153,7 @@ def pick(
         raise InputError(
             f"{path}: no column for the {role} ({' or '.join(DEFAULT_HEADERS[role])}); "
             f"the file has {listing(arrays)}; name what to use, as in --columns {_EXAMPLE}"
+            + (", or give the sampling period with --period-s" if role == "time" else "")
         )
     column = mapping[role]
     for name, factor in zip(column.names, column.factors, strict=True):

@@ -143,8 +143,11 @@ def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None
     # Many long steps are uneven sampling, not gaps.
     if 0 < len(gaps) <= max(3, len(steps) // 100):
         first = gaps[0]
+        edges = np.concatenate([[0], gaps + 1, [len(time_s)]])
+        longest = int(np.argmax(np.diff(edges)))
         raise InputError(
             f"{where}: about {round(steps[first] / period) - 1} samples are missing after row "
             f"{first + 1} (a step of {steps[first]:.6g} s where the period is {period:.6g} s; "
-            f"{len(gaps)} such places); use the longest part without a gap"
+            f"{len(gaps)} such places); the longest part without a gap is rows "
+            f"{edges[longest] + 1} to {edges[longest + 1]}"
         )
