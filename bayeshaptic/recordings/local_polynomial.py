@@ -50,10 +50,17 @@ def interpolation(position: NDArray[Any]) -> NDArray[Any]:
     return np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2], axis=-1)
 
 
+# Wide enough to lose little to leakage, and still narrow enough for a parabola if it is a
+# tenth of the frequency.
+ENOUGH_LINES, STILL_NARROW = 24, 1 / 25
+
+
 def window_edges(
     frequency: NDArray[Any], minimum_lines: int, decades: float = 1 / 80
 ) -> NDArray[np.int64]:
     """Where windows begin and end: at least `minimum_lines` and `decades` wide.
+
+    Windows below 24 lines grow to 24 as soon as that is less than a tenth of the frequency.
 
     Parameters
     ----------
@@ -71,8 +78,10 @@ def window_edges(
     """
     edges = [0]
     while (start := edges[-1]) + minimum_lines <= len(frequency):
-        stop = int(np.searchsorted(frequency, frequency[start] * 10**decades))
-        edges.append(max(start + minimum_lines, stop))
+        low = frequency[start]
+        wide, narrow = np.searchsorted(frequency, low * 10 ** np.array([decades, STILL_NARROW]))
+        least = max(minimum_lines, min(ENOUGH_LINES, int(narrow) - start))
+        edges.append(max(start + least, int(wide)))
     if len(edges) > 2 and edges[-1] > len(frequency):
         edges.pop()
     if len(edges) > 1:
