@@ -7,9 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.models.polynomial import Polynomial, add, determinant
+from bayeshaptic.models.polynomial import Polynomial, add
+from bayeshaptic.models.spanning import GROUND, Edges, merged, spanning_trees, with_edge
 
 Floats = NDArray[np.float64]
+Pair = tuple[int, int | None]
+"""Two masses, or a mass and the ground (None)."""
 
 
 @dataclass(frozen=True)
@@ -27,25 +30,36 @@ class Link:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Masses on a line, force on one of them, position of one of them measured.
+    """Masses on a line; the motor pushes one of them and the encoder reads its position.
 
     Attributes
     ----------
     masses : tuple of ndarray, each of shape (B,)
     links : tuple of Link
-    driven, measured : int
-        The mass that the motor pushes and the one that the encoder reads; 0 for both in every
-        model of the paper.
+    driven : int
+        The motor's mass, 0 in every model of the paper.
+    hand : int or None
+        The mass of the hand that holds the device; it leans on the ground whatever the device
+        stands on.
+    frame : int or None
+        The mass that the device is built on: the motor pushes against it, the encoder reads from
+        it.  None: the ground itself.
     """
 
     masses: tuple[Floats, ...]
     links: tuple[Link, ...]
     driven: int = 0
-    measured: int = 0
+    hand: int | None = None
+    frame: int | None = None
 
     @property
     def batch(self) -> int:
         return len(self.masses[0])
+
+    @property
+    def drive(self) -> Pair:
+        """What the motor pushes apart, and the encoder reads between."""
+        return (self.driven, self.frame)
 
     def with_mass(self, mass: Floats, on: int, damping: Floats, stiffness: Floats) -> Mechanism:
         """With one more mass, joined to the mass number `on`."""
@@ -55,47 +69,53 @@ class Mechanism:
     def with_link(self, link: Link) -> Mechanism:
         return replace(self, links=(*self.links, link))
 
-    def dynamic_stiffness(self) -> list[list[Polynomial | None]]:
-        """The matrix M s^2 + C s + K as polynomials in s; None where it is zero by structure."""
-        n = len(self.masses)
-        zero = np.zeros(self.batch)
-        matrix: list[list[Polynomial | None]] = [[None] * n for _ in range(n)]
+    def with_frame(self, mass: Floats, damping: Floats, stiffness: Floats) -> Mechanism:
+        """On a frame that moves on a spring and a damper, instead of on what carried it before."""
+        frame = len(self.masses)
+        links = tuple(
+            replace(link, second=frame) if self._on_frame(link) else link for link in self.links
+        )
+        feet = Link(frame, self.frame, damping, stiffness)
+        return replace(self, masses=(*self.masses, mass), links=(*links, feet), frame=frame)
 
-        def put(i: int, j: int, term: Polynomial) -> None:
-            entry = matrix[i][j]
-            matrix[i][j] = term if entry is None else add(entry, term)
+    def _on_frame(self, link: Link) -> bool:
+        return link.second == self.frame and link.first != self.hand
 
-        for i, mass in enumerate(self.masses):
-            put(i, i, np.stack([zero, zero, mass]))
-        for link in self.links:
-            term = np.stack([link.stiffness, link.damping])
-            put(link.first, link.first, term)
-            if link.second is not None:
-                put(link.second, link.second, term)
-                put(link.first, link.second, -term)
-                put(link.second, link.first, -term)
-        return matrix
+    def mutual(self, first: Pair, second: Pair) -> Polynomial:
+        """Numerator, over `transfer`'s denominator, of the stretch of one pair by another's force.
+
+        Reciprocal: either may be the one that a force pushes apart.  By the effective compliances
+        R of the network, (R_il + R_jk - R_ik - R_jl) / 2 for the pairs ij and kl.
+        """
+        (i, j), (k, m) = ((GROUND if node is None else node for node in p) for p in (first, second))
+        edges = self._edges()
+        if (i, j) == (k, m):
+            return spanning_trees(merged(edges, (i, j)))
+        signs = {(i, m): 0.5, (j, k): 0.5, (i, k): -0.5, (j, m): -0.5}
+        total = np.zeros((1, self.batch))
+        for pair, sign in signs.items():
+            if pair[0] != pair[1]:
+                total = add(total, sign * spanning_trees(merged(edges, pair)))
+        return total
 
     def transfer(self) -> tuple[Polynomial, Polynomial]:
         """Numerator and denominator of position over force (G, G1 and H1 of the paper)."""
-        return self.transfer_to(self.measured)
+        return self.transfer_to(self.driven)
 
     def transfer_to(self, mass: int) -> tuple[Polynomial, Polynomial]:
-        """Numerator and denominator of the position of the mass number `mass` over the force."""
-        matrix = self.dynamic_stiffness()
-        denominator = determinant(matrix)
-        minor = determinant(
-            [
-                [entry for j, entry in enumerate(row) if j != mass]
-                for i, row in enumerate(matrix)
-                if i != self.driven
-            ]
-        )
-        assert denominator is not None
-        if minor is None:  # no path from the force to this mass
-            minor = np.zeros((1, self.batch))
-        sign = -1.0 if (mass + self.driven) % 2 else 1.0
-        return np.broadcast_to(sign * minor, (len(minor), self.batch)), denominator
+        """Numerator and denominator of a mass's position, seen from the frame, over the force."""
+        return self.mutual(self.drive, (mass, self.frame)), spanning_trees(self._edges())
+
+    def _edges(self) -> Edges:
+        """The network: springs and dampers between masses, and every mass against the ground."""
+        zero = np.zeros(self.batch)
+        edges: Edges = {}
+        for number, mass in enumerate(self.masses):
+            edges = with_edge(edges, number, GROUND, np.stack([zero, zero, mass]))
+        for link in self.links:
+            second = GROUND if link.second is None else link.second
+            edges = with_edge(edges, link.first, second, np.stack([link.stiffness, link.damping]))
+        return edges
 
     def state_matrix(self) -> Floats:
         """A of d/dt (positions, velocities) = A (positions, velocities), shape (B, 2n, 2n)."""
@@ -115,3 +135,11 @@ class Mechanism:
         state[:, n:, :n] = -stiffness / masses
         state[:, n:, n:] = -damping / masses
         return state
+
+    def drive_vector(self) -> Floats:
+        """+1 at the motor's mass, -1 at the frame: how force enters and position is read, (n,)."""
+        vector = np.zeros(len(self.masses))
+        vector[self.driven] = 1.0
+        if self.frame is not None:
+            vector[self.frame] = -1.0
+        return vector

@@ -27,28 +27,6 @@ def add(a: Polynomial, b: Polynomial) -> Polynomial:
     return out
 
 
-def determinant(matrix: list[list[Polynomial | None]]) -> Polynomial | None:
-    """Determinant of a square matrix of polynomials by expansion along its first row.
-
-    None stands for a structural zero; a chain of masses has so many of them that the expansion
-    is cheap, and a zero stays an exact zero (the rigid-body pole of a device held by nobody).
-    """
-    if not matrix:
-        return np.ones((1, 1))
-    total: Polynomial | None = None
-    for column, entry in enumerate(matrix[0]):
-        if entry is None:
-            continue
-        minor = determinant([row[:column] + row[column + 1 :] for row in matrix[1:]])
-        if minor is None:
-            continue
-        term = multiply(entry, minor)
-        if column % 2:
-            term = -term
-        total = term if total is None else add(total, term)
-    return total
-
-
 def evaluate(polynomial: Polynomial, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Values of shape (..., B) at points `s` of shape (..., 1) or (..., B), by Horner's rule."""
     value = np.zeros(np.broadcast_shapes(s.shape, polynomial.shape[1:]), complex)

@@ -18,11 +18,13 @@ Two routes give the same numbers:
               A_p = \sum_q (-1)^q h_q T^q \binom{p+q}{p} \frac{B_{p+q+1}(x)}{(p+q+1)!}.
 
     It converges like ((|p_max| + |s|) T / 2 pi)^n, needs no poles, and does not mind double ones.
+    Towards the Nyquist frequency the terms k = 1 and -1 are taken as they stand, too, and what
+    is left converges like ((|p_max| + |s|) T / 4 pi)^n.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,7 @@ Complexes = NDArray[np.complex128]
 
 _ORDER = 28  # terms in 1/s and in s that the alias series keeps
 _REACH = 0.62  # (|p_max| + |s|) T / 2 pi up to which the series is used: relative error < 1e-9
+_HIGH = 2.2  # |s| T above which the nearest aliases are taken out of the series
 
 
 def phi(x: Complexes) -> Complexes:
@@ -83,7 +86,8 @@ class _Nodes:
         omega = 2 * np.pi * frequency_hz
         self.period_s = period_s
         self.s = 1j * omega
-        self.reach = float(np.max(np.abs(omega))) * period_s
+        self.reach = min(float(np.max(np.abs(omega))) * period_s, _HIGH)
+        self.high = np.flatnonzero(np.abs(omega) * period_s > _HIGH)
         powers = np.vander(omega, 2 * 12, increasing=True)
         sign = np.array([1.0, 1.0, -1.0, -1.0] * 6)  # of Re and Im of j^p
         signed = powers * sign
@@ -93,6 +97,16 @@ class _Nodes:
         self.tail_even, self.tail_odd = scaled[:, 0::2].copy(), scaled[:, 1::2].copy()
         self.hold = -np.expm1(-self.s * period_s)
 
+    @cached_property
+    def beyond(self) -> tuple[_Nodes, list[tuple[int, _Nodes]]]:
+        """The high frequencies by themselves, and their nearest aliases with their numbers."""
+        omega = self.s.imag[self.high]
+        step = 2 * np.pi / self.period_s
+        here, *aliases = (
+            _Nodes((omega + k * step) / (2 * np.pi), self.period_s) for k in (0, -1, 1)
+        )
+        return here, list(zip((-1, 1), aliases, strict=True))
+
     def polynomial(self, coefficients: Polynomial) -> Complexes:
         """Values of a polynomial in s at the nodes, shape (L, B), as two real products."""
         even, odd = coefficients[0::2], coefficients[1::2]
@@ -101,11 +115,22 @@ class _Nodes:
         value.imag = self.odd[:, : len(odd)] @ odd
         return value
 
+    def term(self, numerator: Polynomial, denominator: Polynomial) -> Complexes:
+        """P(s) / (s T) at the nodes, shape (L, B)."""
+        value = self.polynomial(numerator) / self.polynomial(denominator)
+        value /= (self.s * self.period_s)[:, None]
+        return value
+
     def tail(self, coefficients: Floats) -> Complexes:
         value = np.empty((len(self.s), coefficients.shape[1]), complex)
         value.real = self.tail_even @ coefficients[0::2]
         value.imag = self.tail_odd @ coefficients[1::2]
         return value
+
+
+def nodes_at(frequency_hz: Floats, period_s: float) -> _Nodes:
+    """The tables of these frequencies, kept from one call to the next."""
+    return _nodes(np.ascontiguousarray(frequency_hz, float).tobytes(), period_s)
 
 
 @lru_cache(maxsize=64)
@@ -144,15 +169,23 @@ def _bernoulli_table() -> tuple[Floats, Floats]:
     return coefficients, (-1.0) ** q * comb(p + q, p)
 
 
-def _alias_coefficients(h: Floats, delay_s: Floats, period_s: float) -> Floats:
+def _alias_sums(x: Floats, far: bool) -> Floats:
+    """B_n(x)/n! for delays of x periods, shape (N, len(x)); `far`: without the terms k = 1, -1."""
+    coefficients, _ = _bernoulli_table()
+    sums = coefficients @ x ** np.arange(coefficients.shape[1])[:, None]
+    if far:  # B_n(x)/n! = -sum over k != 0 of e^{2 pi j k x} / (2 pi j k)^n
+        turns = (2j * np.pi) ** -np.arange(len(sums), dtype=float)[:, None]
+        sums[1:] += 2 * np.real(np.exp(2j * np.pi * x) * turns[1:])
+    return sums
+
+
+def _alias_coefficients(h: Floats, late: Floats, far: bool = False) -> Floats:
     """A_p of the module's docstring, shape (_ORDER, B)."""
-    coefficients, binomials = _bernoulli_table()
-    x = delay_s / period_s - np.floor(delay_s / period_s)
+    _, binomials = _bernoulli_table()
     index = np.arange(_ORDER)[:, None] + np.arange(_ORDER + 1)[None, :] + 1
-    if np.all(x == x[0]):
-        beta = coefficients @ x[0] ** np.arange(coefficients.shape[1])
-        return (binomials * beta[index]) @ h
-    beta = coefficients @ x ** np.arange(coefficients.shape[1])[:, None]
+    if np.all(late == late[0]):
+        return (binomials * _alias_sums(late[:1], far)[index, 0]) @ h
+    beta = _alias_sums(late, far)
     out = np.empty((_ORDER, h.shape[1]))
     for p in range(_ORDER):
         out[p] = np.einsum("qb,qb->b", binomials[p][:, None] * h, beta[p + 1 : p + _ORDER + 2])
@@ -182,20 +215,36 @@ def from_polynomials(
     good : ndarray of bool, shape (B,)
         False where a pole is too fast for the series; use `from_poles` there.
     """
-    nodes = _nodes(np.ascontiguousarray(frequency_hz, float).tobytes(), period_s)
+    nodes = nodes_at(frequency_hz, period_s)
     h = laurent(numerator, denominator, period_s)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        # h_q T^q grows like (|p_max| T)^q: its last terms tell the fastest pole.
-        first = np.max(np.abs(h[:4]), axis=0)
-        last = np.max(np.abs(h[-4:]), axis=0)
-        fastest = (last / first) ** (1.0 / (_ORDER - 4))
-    good = (fastest + nodes.reach) / (2 * np.pi) < _REACH
-    response = nodes.polynomial(numerator)
-    response /= nodes.polynomial(denominator)
-    response /= (nodes.s * period_s)[:, None]
-    response += nodes.tail(_alias_coefficients(h, delay_s, period_s))
+    good = (fastest_pole(h) + nodes.reach) / (2 * np.pi) < _REACH
+    late = delay_s / period_s - np.floor(delay_s / period_s)
+    response = nodes.term(numerator, denominator)
+    response += nodes.tail(_alias_coefficients(h, late))
+    if len(nodes.high):
+        response[nodes.high] = _towards_nyquist(nodes, numerator, denominator, h, late)
     if np.all(delay_s == delay_s[0]):
         response *= (nodes.hold * np.exp(-nodes.s * delay_s[0]))[:, None]
     else:
         response *= nodes.hold[:, None] * np.exp(-nodes.s[:, None] * delay_s)
     return response.T, good
+
+
+def fastest_pole(h: Floats) -> Floats:
+    """|p_max| T: h_q T^q grows like its q-th power, so that its last terms tell it; shape (B,)."""
+    start = int(np.argmax(np.any(h != 0, axis=1)))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        first = np.max(np.abs(h[start : start + 2]), axis=0)
+        last = np.max(np.abs(h[-4:]), axis=0)
+        return (last / first) ** (1.0 / (_ORDER - start - 2))
+
+
+def _towards_nyquist(
+    nodes: _Nodes, numerator: Polynomial, denominator: Polynomial, h: Floats, late: Floats
+) -> Complexes:
+    """The sum over aliases at the high nodes, without its common factor; shape (H, B)."""
+    here, aliases = nodes.beyond
+    total = here.term(numerator, denominator) + here.tail(_alias_coefficients(h, late, far=True))
+    for k, alias in aliases:
+        total += alias.term(numerator, denominator) * np.exp(-2j * np.pi * k * late)
+    return total

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ def _free(v: Values) -> Mechanism:
 def _grasped(v: Values) -> Mechanism:
     device = _free(v)
     held = device.with_mass(v["mh"], 1, v["bs"], v["ks"])
-    return held.with_link(Link(2, None, v["bh"], v["kh"]))
+    return replace(held.with_link(Link(2, None, v["bh"], v["kh"])), hand=2)
 
 
 RIGID = Structure("rigid", ("m", "b"), _rigid, "one mass and one damper, equation (1)")

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.models.dynamic_link import DynamicLink, Index
 from bayeshaptic.models.mechanism import Mechanism
 from bayeshaptic.models.polynomial import Polynomial, evaluate, multiply
+from bayeshaptic.models.remainder import remainder_of, sampled_remainder
 from bayeshaptic.models.sampled import from_poles, from_polynomials
 
 Floats = NDArray[np.float64]
@@ -23,6 +25,10 @@ class Filter:
     numerator: Polynomial
     denominator: Polynomial
 
+    def rows(self, index: Index) -> Filter:
+        """A part of the batch."""
+        return Filter(self.numerator[:, index], self.denominator[:, index])
+
 
 @dataclass(frozen=True)
 class LinearSystem:
@@ -34,20 +40,36 @@ class LinearSystem:
     delay_s : ndarray, shape (B,)
     filters : tuple of Filter
         Rational factors before or after the mechanism (they commute).
+    dynamic_links : tuple of DynamicLink
+        Further forces inside the mechanism, not rational in s.
     """
 
     mechanism: Mechanism
     delay_s: Floats
     filters: tuple[Filter, ...] = ()
+    dynamic_links: tuple[DynamicLink, ...] = ()
 
     @property
     def batch(self) -> int:
         return self.mechanism.batch
 
+    @property
+    def rational(self) -> bool:
+        """Whether mechanism and filters are all there is: finitely many poles."""
+        return not self.dynamic_links
+
+    @property
+    def rational_part(self) -> LinearSystem:
+        """The same without its dynamic links."""
+        return replace(self, dynamic_links=()) if self.dynamic_links else self
+
     def with_filter(self, numerator: Polynomial, denominator: Polynomial) -> LinearSystem:
         return replace(self, filters=(*self.filters, Filter(numerator, denominator)))
 
-    def rows(self, index: slice | NDArray[np.bool_] | NDArray[np.int_]) -> LinearSystem:
+    def with_dynamic_link(self, link: DynamicLink) -> LinearSystem:
+        return replace(self, dynamic_links=(*self.dynamic_links, link))
+
+    def rows(self, index: Index) -> LinearSystem:
         """A part of the batch."""
         mechanism = self.mechanism
         links = tuple(
@@ -55,18 +77,16 @@ class LinearSystem:
             for link in mechanism.links
         )
         masses = tuple(mass[index] for mass in mechanism.masses)
-        filters = tuple(
-            Filter(f.numerator[:, index], f.denominator[:, index]) for f in self.filters
-        )
         return replace(
             self,
             mechanism=replace(mechanism, masses=masses, links=links),
             delay_s=self.delay_s[index],
-            filters=filters,
+            filters=tuple(factor.rows(index) for factor in self.filters),
+            dynamic_links=tuple(link.rows(index) for link in self.dynamic_links),
         )
 
     def transfer(self) -> tuple[Polynomial, Polynomial]:
-        """Numerator and denominator of the continuous response without the delay."""
+        """Numerator and denominator of the rational part, continuous, without the delay."""
         numerator, denominator = self.mechanism.transfer()
         for factor in self.filters:
             numerator = multiply(numerator, factor.numerator)
@@ -74,7 +94,7 @@ class LinearSystem:
         return numerator, denominator
 
     def poles(self) -> tuple[Complexes, Complexes]:
-        """Poles and residues of the continuous response without the delay, each of shape (B, n).
+        """Poles and residues of the rational part without the delay, each of shape (B, n).
 
         The residues assume simple poles; beside a double pole they blow up (`sampled_response`
         does not use them there).
@@ -94,7 +114,10 @@ class LinearSystem:
         """P(s) without hold and delay at points `s` of shape (L,); shape (B, L)."""
         numerator, denominator = self.transfer()
         points = np.asarray(s, complex)[:, None]
-        return (evaluate(numerator, points) / evaluate(denominator, points)).T
+        response = evaluate(numerator, points) / evaluate(denominator, points)
+        if self.dynamic_links:
+            response = response + remainder_of(self).at(points)
+        return np.asarray(response.T)
 
     def continuous_approximation(self, frequency_hz: Floats, period_s: float) -> Complexes:
         """P(s) e^{-s (td + T/2)}, the paper's stand-in for the sampled response; shape (B, L)."""
@@ -116,12 +139,16 @@ class LinearSystem:
         if not good.all():
             bad = part.rows(~good)
             response[~good] = from_poles(*bad.poles(), bad.delay_s, frequency_hz, period_s)
+        if part.dynamic_links:
+            response += sampled_remainder(part, frequency_hz, period_s)
         return response
 
 
 def _roots(polynomial: Polynomial) -> Complexes:
     """Roots of a batch of polynomials by the companion matrix, shape (B, degree)."""
     degree = len(polynomial) - 1
+    if degree == 0:
+        return np.zeros((polynomial.shape[1], 0), complex)
     companion = np.zeros((polynomial.shape[1], degree, degree))
     companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
     companion[:, :, -1] = -(polynomial[:-1] / polynomial[-1]).T

@@ -45,9 +45,7 @@ class BindingCrossing:
     probability: float
 
 
-def binding_kinds(
-    system: LinearSystem, frequency_hz: Floats, period_s: float, hand: int | None = None
-) -> Ints:
+def binding_kinds(system: LinearSystem, frequency_hz: Floats, period_s: float) -> Ints:
     """What moves at each binding crossing, shape (B,).
 
     The masses' motions are compared with the motion of the measured one at the crossing: where all
@@ -60,8 +58,6 @@ def binding_kinds(
     frequency_hz : ndarray, shape (B,)
         Binding crossing; 0 where the loop is never stable, nan without a crossing.
     period_s : float
-    hand : int or None
-        Number of the mass that is the user's hand.
     """
     mechanism = system.mechanism
     s = (2j * np.pi * np.nan_to_num(frequency_hz)).astype(complex)
@@ -69,8 +65,10 @@ def binding_kinds(
     device_opposes = np.zeros(len(s), bool)
     hand_opposes = np.zeros(len(s), bool)
     for mass in range(len(mechanism.masses)):
+        if mass == mechanism.frame:
+            continue
         opposes = (evaluate(mechanism.transfer_to(mass)[0], s) * np.conj(own)).real < 0
-        if mass == hand:
+        if mass == mechanism.hand:
             hand_opposes |= opposes
         else:
             device_opposes |= opposes

@@ -181,12 +181,11 @@ def _vectors(source: Any, theta: ArrayLike | None, max_draws: int) -> tuple[Floa
 def _limits(
     model: Model, vectors: Floats, period_s: float, approximation: str
 ) -> CriticalStiffness:
-    hand = 2 if model.name == "grasped" else None
     parts = []
     for start in range(0, len(vectors), _CHUNK):
         system = model.system(vectors[start : start + _CHUNK])
         found = find_crossings(system, period_s, approximation)
-        kinds = binding_kinds(system, found.binding_hz, period_s, hand)
+        kinds = binding_kinds(system, found.binding_hz, period_s)
         parts.append((found.critical, found.binding_hz, kinds))
     samples, frequency, kinds = (np.concatenate(part) for part in zip(*parts, strict=True))
     crossings, group = group_crossings(kinds, frequency)

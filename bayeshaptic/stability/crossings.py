@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bayeshaptic.models.system import LinearSystem
 from bayeshaptic.stability.evaluated import EvaluableSystem, EvaluatedResponse
 from bayeshaptic.stability.grid import search_grid
+from bayeshaptic.stability.linked import linked_response
 from bayeshaptic.stability.response import Response, pole_response
 from bayeshaptic.stability.roots import bracketed_roots
 
@@ -59,8 +60,8 @@ def find_crossings(
     Parameters
     ----------
     system : LinearSystem
-        Mechanism, delay and filters of B parameter vectors.  A system with ``rational = False``
-        is searched on a fine grid, by its sampled response alone.
+        Mechanism, delay, filters and dynamic links of B parameter vectors.  Any other system with
+        ``rational = False`` is searched on a fine grid, by its sampled response alone.
     period_s : float
     approximation : {"exact", "continuous"}
         "continuous" looks at P(s) e^{-s (td + T/2)} instead, as the paper does.
@@ -73,6 +74,8 @@ def find_crossings(
     response: Response
     if isinstance(system, LinearSystem) and rational(system):
         response = pole_response(system, period_s, exact)
+    elif isinstance(system, LinearSystem) and system.dynamic_links:
+        response = linked_response(system, period_s, exact)
     else:
         response = EvaluatedResponse(system, period_s, exact)
     return search(response, period_s)

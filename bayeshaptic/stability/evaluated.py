@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.stability.grid import LOWEST
+from bayeshaptic.stability.response import Response
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -46,7 +47,7 @@ class EvaluatedResponse:
     system: EvaluableSystem
     period_s: float
     exact: bool = True
-    smooth: bool = False
+    log_points: int = 1500
 
     @property
     def delay(self) -> Floats:
@@ -74,21 +75,30 @@ class EvaluatedResponse:
         return system.continuous_approximation(frequency, self.period_s)
 
     def at_ends(self) -> tuple[Floats, Floats]:
-        every = np.arange(self.system.batch)
-        response = self._evaluate(every, np.array([LOWEST, np.pi]))
-        static, nyquist = response[:, 0], response[:, 1].real
-        flat = np.abs(static.imag) < 1e-3 * np.abs(static.real)
-        if not self.exact:
-            nyquist = np.full_like(nyquist, np.nan)
-        return np.where(flat, static.real, np.inf), nyquist
+        return ends(self, self.exact)
 
     def stable_at_rest(self) -> NDArray[np.bool_]:
-        """Whether static stiffness is positive, or an integrator's phase above -180 degrees.
+        """A loop without poles to look at is taken to be stable by itself; see `held_at_rest`."""
+        return held_at_rest(self)
 
-        A loop without poles to look at is taken to be stable by itself; what a mechanism can
-        still do wrong is a double integrator with a delay, or a negative static stiffness.
-        """
-        every = np.arange(self.system.batch)
-        response = self._evaluate(every, np.array([1e-6]))[:, 0]
-        above = (response.real >= 0) | (response.imag < 0)
-        return above & (self.at_ends()[0] > 0)
+
+def ends(response: Response, exact: bool) -> tuple[Floats, Floats]:
+    """What `Response.at_ends` gives, by looking very close to the ends."""
+    every = np.arange(len(response.delay))
+    angles = np.broadcast_to([LOWEST, np.pi], (len(every), 2))
+    static, nyquist = response.at(every, angles).T
+    flat = np.abs(static.imag) < 1e-3 * np.abs(static.real)
+    no_frequency = np.full(len(every), np.nan)
+    return np.where(flat, static.real, np.inf), nyquist.real if exact else no_frequency
+
+
+def held_at_rest(response: Response) -> NDArray[np.bool_]:
+    """Whether static stiffness is positive, or an integrator's phase above -180 degrees.
+
+    It is what a mechanism that is stable by itself can still do wrong for K -> 0+: a double
+    integrator with a delay, or a negative static stiffness.
+    """
+    every = np.arange(len(response.delay))
+    slow = response.at(every, np.full((len(every), 1), 1e-6))[:, 0]
+    above = (slow.real >= 0) | (slow.imag < 0)
+    return above & (response.at_ends()[0] > 0)

@@ -15,8 +15,6 @@ _TOP = np.pi * (1 - 1e-7)  # a crossing nearer to the Nyquist frequency has its 
 _TANGENTS = np.tan(np.deg2rad(np.array([-88.0, -80, -60, -30, -8, 8, 30, 60, 80, 88])))
 _SHARPEST = 1e-8  # relative half width around an undamped pole
 _PER_TURN = 16  # points for each turn of the delay's phase
-_LOG_POINTS = 60
-_FINE_POINTS = 1500
 
 
 def search_grid(response: Response, rows: slice) -> Floats:
@@ -44,6 +42,6 @@ def search_grid(response: Response, rows: slice) -> Floats:
         angle = np.abs(upper.imag - 2 * np.pi * np.round(upper.imag / (2 * np.pi)))
         around = angle[:, :, None] + width[:, :, None] * _TANGENTS
         parts.append(np.clip(around.reshape(batch, -1), low, _TOP))
-    steps = np.linspace(0.0, 1.0, _LOG_POINTS if response.smooth else _FINE_POINTS)
+    steps = np.linspace(0.0, 1.0, response.log_points)
     parts.append(low * np.exp(steps * np.log(_TOP / low)))
     return np.sort(np.concatenate(parts, axis=1), axis=1)

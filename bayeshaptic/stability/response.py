@@ -39,8 +39,8 @@ class Response(Protocol):
         Whole loop delay in periods: how fast the phase turns at high frequency.
     features : ndarray of complex, shape (B, n)
         Poles times T, where the response may turn quickly; n may be 0.
-    smooth : bool
-        Whether it is smooth between its features.
+    log_points : int
+        Points of the logarithmic grid that leave no turn out, beside those around its features.
     """
 
     @property
@@ -50,7 +50,7 @@ class Response(Protocol):
     def features(self) -> Complexes: ...
 
     @property
-    def smooth(self) -> bool: ...
+    def log_points(self) -> int: ...
 
     def at(self, rows: Rows, theta: Floats) -> Complexes:
         """Values of rows (M,) at angles (M, k), shape (M, k)."""
@@ -90,7 +90,7 @@ class PoleResponse:
     delay: Floats
     integrators: NDArray[np.int_]
     exact: bool
-    smooth: bool = True
+    log_points: int = 60
 
     @property
     def features(self) -> Complexes:

@@ -65,7 +65,8 @@ def confirms(
     safe = np.where(finite, critical, 0.0)
     radius = spectral_radius(system, period_s, safe[:, None] * np.array([1 - step, 1 + step]))
     rounding = 1e-10
-    held = (radius[:, 0] < 1 + rounding) & (radius[:, 1] > 1 - rounding)
+    stable_below = (radius[:, 0] < 1 + rounding) | (critical == 0)
+    held = stable_below & (radius[:, 1] > 1 - rounding)
     return held | ~finite
 
 
@@ -113,10 +114,11 @@ def _state_space(system: LinearSystem) -> tuple[Floats, Floats, Floats]:
     mechanism = system.mechanism
     masses = len(mechanism.masses)
     a = mechanism.state_matrix()
+    drive = mechanism.drive_vector()
     b = np.zeros(a.shape[:2])
-    b[:, masses + mechanism.driven] = 1.0 / mechanism.masses[mechanism.driven]
+    b[:, masses:] = drive / np.stack(mechanism.masses, axis=-1)
     c = np.zeros(a.shape[:2])
-    c[:, mechanism.measured] = 1.0
+    c[:, :masses] = drive
     for factor in system.filters:
         a, b, c = _filtered(factor, a, b, c)
     return a, b, c
