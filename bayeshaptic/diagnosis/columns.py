@@ -15,6 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 from bayeshaptic.diagnosis.residual import Test
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.models.motion import linear_motion
+from bayeshaptic.models.polynomial import evaluate
 from bayeshaptic.recordings.etfe import Etfe
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.windows import Windows
@@ -117,9 +118,8 @@ def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped
 
 def _pair_response(fit: Fit, s: Complexes) -> Complexes:
     """Position of the motor over a pair of forces in the connection, +1 on m1 and -1 on m2."""
-    from dataclasses import replace
-
-    system = fit.model.system(fit.theta)
-    own = system.continuous_response(s)[0]
-    crossed = replace(system, mechanism=replace(system.mechanism, measured=1))
-    return own - crossed.continuous_response(s)[0]  # reciprocity: x1 over F2 is x2 over F1
+    mechanism = fit.model.system(fit.theta).mechanism
+    numerator = mechanism.mutual(mechanism.drive, (0, 1))
+    denominator = mechanism.transfer()[1]
+    points = s[:, None]
+    return np.asarray((evaluate(numerator, points) / evaluate(denominator, points))[:, 0])

@@ -1,5 +1,5 @@
 """Imports every effect of this package, so that it is registered."""
 
-from bayeshaptic.effects import extra_delay
+from bayeshaptic.effects import extra_delay, friction, springs
 
-__all__ = ["extra_delay"]
+__all__ = ["extra_delay", "friction", "springs"]

@@ -191,6 +191,18 @@ class Model:
         parameters = tuple(replace(p, prior=priors.get(p.name, p.prior)) for p in self.parameters)
         return replace(self, parameters=parameters)
 
+    def with_known(self, values: Mapping[str, float]) -> Model:
+        """With some parameters known, no longer inferred.
+
+        Parameters
+        ----------
+        values : mapping
+            Name to value; names that are no parameter of the model are left aside.
+        """
+        left = tuple(p for p in self.parameters if p.name not in values)
+        known = {p.name: float(values[p.name]) for p in self.parameters if p.name in values}
+        return replace(self, parameters=left, fixed={**self.fixed, **known})
+
     def with_effect(self, effect: LinearEffect) -> Model:
         """With one more linear effect, whose parameters come before the delay's."""
         own = tuple(p for p in self.parameters if p.name != "delay_s")

@@ -23,8 +23,9 @@ def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
     Parameters
     ----------
     dimension : str
-        "mass", "damping", "stiffness", "force", "position", "time", "frequency", "number", or
-        "cubic_stiffness" (force over position cubed).
+        "mass", "damping", "stiffness", "force", "position", "time", "frequency", "number",
+        "velocity", "cubic_stiffness" (force over position cubed), or "drag" (force over velocity
+        squared).
     force_unit : {"N", "Nm", "A"}
         Without a torque constant a force is in amperes, and so a mass is in A s^2/rad.
     position_unit : {"m", "rad"}
@@ -41,6 +42,8 @@ def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
         "damping": f"{force} s/{position_unit}",
         "stiffness": f"{force}/{position_unit}",
         "cubic_stiffness": f"{force}/{position_unit}^3",
+        "velocity": f"{position_unit}/s",
+        "drag": f"{force} s^2/{position_unit}^2",
         "force": force,
     }[dimension]
 
