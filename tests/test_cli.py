@@ -483,6 +483,27 @@ class TestReport:
         assert "phantom: " in out and f"reports: {tmp_path / 'reports'}" in out
         assert os.listdir(tmp_path / "reports") == ["phantom"]
 
+    def test_measured_multisine(self, run: Run, measured: Callable[[str], Path]) -> None:
+        """20 periods of a multisine on 11 to 250 Hz, motor current in, motor angle out."""
+        path = measured("two_mass_bench/MultisineTypeA.mat")
+        mapping = "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"
+        status, out, _ = run("report", path, "--columns", mapping, "--model", "free", "-o", "out")
+        assert status == 0 and "Do not ship a stiffness" in out and "times the noise" in out
+        summary = json.loads(Path("out/summary.json").read_text())
+        assert summary["recording"]["period_s"] == pytest.approx(1 / 2500)
+        assert summary["recording"]["kind"] == "rotational"
+        assert summary["etfe"]["period_lines"] == 240
+        assert summary["etfe"]["frequency_hz"] == pytest.approx([11, 250])
+        assert summary["critical_stiffness"]["unit"] == "A/rad"
+        assert summary["least_squares"]["reduced_chi_square"] > 100
+
+    def test_measured_closed_loop(self, run: Run, measured: Callable[[str], Path]) -> None:
+        path = measured("emps/DATA_EMPS.mat")
+        mapping = "time=t,force=vir*35.15[N],position=qm"
+        status, out, _ = run("report", path, "--columns", mapping, "--model", "rigid", "-o", "out")
+        assert status == 0 and "feedback" in out and "warning: The force was computed" in out
+        assert json.loads(Path("out/summary.json").read_text())["recording"]["feedback"] is True
+
 
 # --- batch: executors ---------------------------------------------------------------------------
 
