@@ -219,6 +219,14 @@ def test_what_cannot_be_is_refused_in_one_line(tmp_path: Path) -> None:
         "period": lambda: Bench("rigid", {"m": 1.0, "b": 2.0}, period_s=0.0),
         "unknown effect 'rust'": lambda: bench.with_effect("rust"),
         "has no amount": lambda: bench.with_effect("extra_delay", amount=1.0),
+        "force is -1; give a number of at least zero": lambda: bench.with_effect(
+            "coulomb_friction", force=-1.0
+        ),
+        "frequency_hz is 0; give a number above zero": lambda: bench.with_effect(
+            "second_mode", frequency_hz=0.0
+        ),
+        "order is 1.5; give a whole number": lambda: bench.with_effect("actuator_lag", order=1.5),
+        "that is finite": lambda: bench.with_effect("centring_stiffness", stiffness=np.nan),
         "no mass 'm3'": lambda: bench.with_effect("coulomb_friction", on="m3"),
         "needs a hand": lambda: bench.with_effect("reflex"),
         "whole number": lambda: simulate(bench, Multisine(1.0, 1.0, 10.0, spacing_hz=0.3)),

@@ -35,22 +35,21 @@ def motion_scales(bench: Bench) -> Scales:
     stretch = np.zeros(plant.states)
     if "m2" in plant.places:
         stretch[[plant.places["m1"][0], plant.places["m2"][0]]] = 1.0, -1.0
-    rows = np.array([x1, x1 @ plant.dynamics, stretch, stretch @ plant.dynamics])
+    rows = np.array([x1, x1 @ plant.dynamics, stretch])
     s = 2j * np.pi * frequency[:, None, None] * np.eye(plant.states)
-    power = np.zeros(4)
+    power = np.zeros(3)
     for column, rms, density in sources:
         if rms > 0 and column.any():
             state = np.linalg.solve(s - plant.dynamics, column[:, None])[..., 0]
             shape = density(frequency)
             shape *= rms**2 / scipy.integrate.trapezoid(shape, frequency)
             power += scipy.integrate.trapezoid(shape * np.abs(rows @ state.T) ** 2, frequency)
-    position, velocity, apart, rate = np.sqrt(power).tolist()
+    position, velocity, apart = np.sqrt(power).tolist()
     return Scales(
         force=bench.force_rms,
         position=position,
         velocity=velocity,
         stretch=apart,
-        stretch_rate=rate,
         resolution=bench.encoder_resolution,
         period_s=bench.period_s,
         parameters=bench.values,

@@ -17,6 +17,7 @@ class ActuatorSaturation(Effect):
     """The actuator gives no more than +-`limit`."""
 
     name: ClassVar[str] = "actuator_saturation"
+    above_zero: ClassVar[tuple[str, ...]] = ("limit",)
     limit: float = 6.0
 
     @classmethod

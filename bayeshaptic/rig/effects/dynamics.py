@@ -34,6 +34,8 @@ class SecondMode(Effect):
     """
 
     name: ClassVar[str] = "second_mode"
+    above_zero: ClassVar[tuple[str, ...]] = ("mass_ratio", "frequency_hz")
+    at_least_zero: ClassVar[tuple[str, ...]] = ("damping_ratio",)
     mass_ratio: float = 0.1
     frequency_hz: float = 110.0
     damping_ratio: float = 0.02
@@ -61,6 +63,8 @@ class BaseCompliance(Effect):
     """
 
     name: ClassVar[str] = "base_compliance"
+    above_zero: ClassVar[tuple[str, ...]] = ("mass_ratio", "frequency_hz")
+    at_least_zero: ClassVar[tuple[str, ...]] = ("damping_ratio",)
     mass_ratio: float = 4.0
     frequency_hz: float = 25.0
     damping_ratio: float = 0.03
@@ -102,6 +106,7 @@ class StructuralDamping(Effect):
     """
 
     name: ClassVar[str] = "structural_damping"
+    above_zero: ClassVar[tuple[str, ...]] = ("loss_factor", "decades", "elements")
     loss_factor: float = 0.15
     decades: float = 3.0
     elements: int = 7
@@ -131,6 +136,7 @@ class ExtraDelay(Effect):
     """More delay in the loop than the bench declares."""
 
     name: ClassVar[str] = "extra_delay"
+    at_least_zero: ClassVar[tuple[str, ...]] = ("delay_s",)
     delay_s: float = 0.6e-3
 
     @classmethod
@@ -147,6 +153,7 @@ class ActuatorLag(Effect):
     """The force follows the delayed command by 1/(1 + s time_constant_s)^order."""
 
     name: ClassVar[str] = "actuator_lag"
+    above_zero: ClassVar[tuple[str, ...]] = ("time_constant_s", "order")
     time_constant_s: float = 0.5e-3
     order: int = 1
 
@@ -160,6 +167,7 @@ class PositionFilter(Effect):
     """An analogue low-pass in front of the encoder: order 1, or order 2 with a damping ratio."""
 
     name: ClassVar[str] = "position_filter"
+    above_zero: ClassVar[tuple[str, ...]] = ("cutoff_hz", "damping_ratio")
     cutoff_hz: float = 200.0
     order: int = 1
     damping_ratio: float = float(np.sqrt(0.5))

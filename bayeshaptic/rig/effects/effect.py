@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, TypeVar
@@ -23,24 +24,22 @@ class Scales:
         Root mean square of the usual excitation.
     position, velocity : float
         Root mean square of the motor's motion under it, without effects.
-    stretch, stretch_rate : float
-        The same of the connection between m1 and m2; 0 without m2.
+    stretch : float
+        The same of the stretch of the connection between m1 and m2; 0 without m2.
     resolution : float
         One count of the encoder.
+    period_s : float
+    parameters : mapping of str to float
+        Of the mechanism.
     """
 
     force: float
     position: float
     velocity: float
     stretch: float
-    stretch_rate: float
     resolution: float
     period_s: float
     parameters: Mapping[str, float]
-
-    @property
-    def held(self) -> bool:
-        return "mh" in self.parameters
 
 
 @dataclass(frozen=True)
@@ -71,10 +70,36 @@ class Effect:
     An effect is a frozen dataclass with a `name`. Of the hooks below, `build`, `parameters`,
     `command`, `sense` and `resolution` act inside a closed loop too; `log` acts on what is written
     down.
+
+    Attributes
+    ----------
+    varies : bool
+        Whether `parameters` depends on the progress.
+    above_zero, at_least_zero : tuple of str
+        Fields that must be so; all numbers must be finite.
     """
 
     name: ClassVar[str]
     varies: ClassVar[bool] = False
+    above_zero: ClassVar[tuple[str, ...]] = ()
+    at_least_zero: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, str | bool | tuple):
+                continue
+            wanted = ""
+            if field.name in self.above_zero and value <= 0:
+                wanted = "above zero"
+            elif field.name in self.at_least_zero and value < 0:
+                wanted = "of at least zero"
+            elif not math.isfinite(value):
+                wanted = "that is finite"
+            if wanted:
+                raise InputError(
+                    f"effect '{self.name}': {field.name} is {value:g}; give a number {wanted}"
+                )
 
     @classmethod
     def typical(cls, scales: Scales) -> Effect:
@@ -127,7 +152,9 @@ def make_effect(name: str, scales: Scales, **changes: Any) -> Effect:
         raise InputError(f"unknown effect '{name}'; the bench knows {', '.join(sorted(REGISTRY))}")
     effect = REGISTRY[name].typical(scales)
     for key, value in changes.items():
-        if type(getattr(effect, key, None)) is int and float(value).is_integer():
+        if type(getattr(effect, key, None)) is int:
+            if not float(value).is_integer():
+                raise InputError(f"effect '{name}': {key} is {value:g}; give a whole number")
             changes[key] = int(value)
     try:
         return replace(effect, **changes)

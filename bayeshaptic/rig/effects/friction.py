@@ -18,6 +18,7 @@ class CoulombFriction(Effect):
     """A constant force against the motion; at rest whatever holds, up to `force`."""
 
     name: ClassVar[str] = "coulomb_friction"
+    at_least_zero: ClassVar[tuple[str, ...]] = ("force",)
     force: float = 0.6
     on: str = "m1"
 
@@ -40,6 +41,8 @@ class StribeckFriction(Effect):
     """
 
     name: ClassVar[str] = "stribeck_friction"
+    above_zero: ClassVar[tuple[str, ...]] = ("velocity",)
+    at_least_zero: ClassVar[tuple[str, ...]] = ("force", "static")
     force: float = 0.6
     static: float = 1.0
     velocity: float = 0.005
@@ -62,6 +65,7 @@ class DahlFriction(Effect):
     """Friction that begins as a spring: F' = -stiffness (v + |v| F/force)."""
 
     name: ClassVar[str] = "dahl_friction"
+    above_zero: ClassVar[tuple[str, ...]] = ("force", "stiffness")
     force: float = 0.6
     stiffness: float = 3e3
     on: str = "m1"

@@ -20,6 +20,8 @@ class Reflex(Effect):
     """
 
     name: ClassVar[str] = "reflex"
+    above_zero: ClassVar[tuple[str, ...]] = ("delay_s",)
+    at_least_zero: ClassVar[tuple[str, ...]] = ("time_constant_s",)
     stiffness: float = 60.0
     damping: float = 8.0
     delay_s: float = 0.03
@@ -62,6 +64,7 @@ class GripDrift(Effect):
     """
 
     name: ClassVar[str] = "grip_drift"
+    above_zero: ClassVar[tuple[str, ...]] = ("ratio",)
     varies: ClassVar[bool] = True
     ratio: float = 1.8
     which: tuple[str, ...] = ("kh", "bh", "ks", "bs")

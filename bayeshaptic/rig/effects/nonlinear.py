@@ -63,6 +63,7 @@ class Backlash(Effect):
     """
 
     name: ClassVar[str] = "backlash"
+    at_least_zero: ClassVar[tuple[str, ...]] = ("gap", "free_damping")
     gap: float = 3e-5
     free_damping: float = 0.0
 
@@ -82,6 +83,7 @@ class ForceRipple(Effect):
     """A force on the motor that repeats with the position: amplitude sin(2 pi x/pitch + phase)."""
 
     name: ClassVar[str] = "force_ripple"
+    above_zero: ClassVar[tuple[str, ...]] = ("pitch",)
     amplitude: float = 0.4
     pitch: float = 0.01
     phase: float = 0.0
@@ -101,6 +103,7 @@ class Drag(Effect):
     """A resistance -coefficient v |v| on a mass."""
 
     name: ClassVar[str] = "drag"
+    at_least_zero: ClassVar[tuple[str, ...]] = ("coefficient",)
     coefficient: float = 500.0
     on: str = "m1"
 

@@ -18,6 +18,7 @@ class Quantisation(Effect):
     """A coarser encoder than declared: counts of `count`."""
 
     name: ClassVar[str] = "quantisation"
+    above_zero: ClassVar[tuple[str, ...]] = ("count",)
     count: float = 3.14e-5
 
     @classmethod
@@ -34,6 +35,7 @@ class MainsTone(Effect):
     """Mains hum on the position that is read, or on the force that acts."""
 
     name: ClassVar[str] = "mains_tone"
+    above_zero: ClassVar[tuple[str, ...]] = ("frequency_hz",)
     amplitude: float = 3e-5
     frequency_hz: float = 50.0
     phase: float = 1.0
@@ -63,6 +65,7 @@ class PositionClipping(Effect):
     """The position cannot be read beyond +-`limit`."""
 
     name: ClassVar[str] = "position_clipping"
+    above_zero: ClassVar[tuple[str, ...]] = ("limit",)
     limit: float = 0.05
 
     @classmethod
@@ -86,6 +89,7 @@ class SampleJitter(Effect):
     """
 
     name: ClassVar[str] = "sample_jitter"
+    at_least_zero: ClassVar[tuple[str, ...]] = ("sd_s",)
     sd_s: float = 5e-5
     stamped: bool = False
 
@@ -105,6 +109,8 @@ class HeldSamples(Effect):
     """Now and then the logger repeats the position before, up to `longest` times in a row."""
 
     name: ClassVar[str] = "held_samples"
+    above_zero: ClassVar[tuple[str, ...]] = ("longest",)
+    at_least_zero: ClassVar[tuple[str, ...]] = ("probability",)
     probability: float = 0.01
     longest: int = 3
 
@@ -124,6 +130,7 @@ class DroppedSamples(Effect):
     """Now and then a row is missing: the time stamps jump."""
 
     name: ClassVar[str] = "dropped_samples"
+    at_least_zero: ClassVar[tuple[str, ...]] = ("probability",)
     probability: float = 1e-3
 
     def log(self, log: Log, rng: np.random.Generator) -> Log:
