@@ -73,7 +73,12 @@ def fake_analysis(
     limit = critical_stiffness(posterior)
     middle = limit.quantile(0.5)
     witness = SimpleNamespace(q05=0.985 * middle, q50=1.004 * middle, q95=1.02 * middle)
-    nothing = SimpleNamespace(q05=None, q50=None, q95=None)
+    nothing = SimpleNamespace(
+        q05=None,
+        q50=None,
+        q95=None,
+        reason="the measured phase does not reach -180 degrees between 0.7 and 300 Hz",
+    )
     return SimpleNamespace(
         recording=etfe.recording,
         etfe=etfe,
@@ -82,8 +87,8 @@ def fake_analysis(
         choice=SimpleNamespace(
             model=model,
             fit=fit,
-            reason=f"{name} predicts the response best: 212 better in log-likelihood than the next.",
-            alternatives=(),
+            reason=f"Chosen: {name}, reduced chi-square 1.02.",
+            candidates={},
         ),
         fit=fit,
         posterior=posterior,
@@ -91,6 +96,7 @@ def fake_analysis(
         etfe_limit=witness if etfe_limit else nothing,
         notices=notices,
         seconds={"read": 0.1, "etfe": 0.3, "fit": 0.4, "sample": 1.2},
+        noise_scale=fit.reduced_chi_square if misfit > 1.2 else 1.0,
         lever_m=lever_m,
     )
 
@@ -168,7 +174,7 @@ def _posterior(
 def _fit(model: Model, etfe: Etfe, posterior: Any, misfit: float) -> Fit:
     theta = _truth(model)
     sd = posterior.draws.std(axis=0)
-    outcome = {n: "converged" for n in model.names}
+    outcome = dict.fromkeys(model.names, "converged")
     for name in ("b2", "b"):
         if name in outcome:
             outcome[name] = "at a bound"

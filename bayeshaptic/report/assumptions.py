@@ -7,8 +7,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 from bayeshaptic import __version__
+from bayeshaptic.models.structures import QUANTITIES
 from bayeshaptic.report import words
-from bayeshaptic.report.quantities import interval, pretty_unit, quantity
+from bayeshaptic.report.quantities import interval, pretty_unit, pure, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -21,12 +22,18 @@ def assumptions(analysis: Analysis) -> tuple[str, ...]:
     etfe, posterior = analysis.etfe, analysis.posterior
     ensembles, steps, walkers, _ = posterior.chains.shape
     unit = pretty_unit(etfe.force_unit)
+    noise = (
+        f" Because the model misfits, the posterior takes {pure(analysis.noise_scale)} times that "
+        "variance."
+        if analysis.noise_scale != 1.0
+        else ""
+    )
     effects = ", ".join(effect.name for effect in analysis.model.effects)
     return (
         "The device, its configuration and the way it is held are those of the recording: another "
         "person, posture or configuration has another limit.",
-        f"The wall is a pure stiffness: the commanded force is −K times the sampled position, every "
-        f"{quantity(etfe.period_s, 's')}, without virtual damping.",
+        "The wall is a pure stiffness: the commanded force is −K times the sampled position, "
+        f"every {quantity(etfe.period_s, 's')}, without virtual damping.",
         "The commanded force is held between samples (zero-order hold). Hold and delay, also a "
         "fraction of a period, are computed exactly, not by a continuous approximation.",
         words.delay(analysis),
@@ -38,11 +45,13 @@ def assumptions(analysis: Analysis) -> tuple[str, ...]:
         + (f"with {effects}." if effects else "no effect has been added to it."),
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
         "extrapolates.",
-        "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is estimated "
-        "in each window of lines and integrated out. The leakage of a random excitation is removed "
-        "in each window; what is left over is independent from window to window.",
-        f"Priors as in the table below. Intervals are 90 % and equal-tailed: from the 5 % to the 95 % "
-        f"quantile. {ensembles} ensembles of {walkers} walkers, {steps} steps, seed {posterior.seed}.",
+        "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is "
+        "estimated in each window of lines and integrated out. The leakage of a random excitation "
+        "is removed in each window; what is left over is independent from window to "
+        f"window.{noise}",
+        "Priors as in the table below. Intervals are 90 % and equal-tailed: from the 5 % to the "
+        f"95 % quantile. {ensembles} ensembles of {walkers} walkers, {steps} steps, seed "
+        f"{posterior.seed}.",
     )
 
 
@@ -54,7 +63,7 @@ def priors(analysis: Analysis) -> tuple[tuple[str, str, str], ...]:
         for p in model.parameters
     ]
     for name, value in model.fixed.items():
-        rows.append((name, "loop delay" if name == "delay_s" else name, f"known: {value:.6g} s"))
+        rows.append((name, QUANTITIES[name][1], f"known: {quantity(value, 's')}"))
     return tuple(rows)
 
 

@@ -6,19 +6,20 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.report.limits import decibel
-from bayeshaptic.report.quantities import estimate, percent, quantity
+from bayeshaptic.inference.least_squares import MISFIT
+from bayeshaptic.report.limits import decibel, own_limit
+from bayeshaptic.report.quantities import estimate, percent, pure, quantity
 from bayeshaptic.report.summary import analysis_of, has_feedback, tip_limit
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 HEADLINE_RISKS = (0.01, 0.05)
-# Clean recordings reach a reduced chi-square of 1.1; beyond this the model lacks something.
-CLEAN_EXCESS = 0.2
+# The reduced chi-square of pure noise scatters by one over the root of the number of points.
 _CHANCE_SDS = 4.0
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
+_WORTH_NAMING = 0.001
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,8 @@ def headline(result: Any) -> Headline:
         return _untrusted(analysis, objections)
     limit = analysis.limit
     if limit.quantile(0.05) == math.inf:
-        return Headline("caution", "Nothing limits the stiffness: the model is stable with any.", ())
+        unlimited = "Nothing limits the stiffness: the model is stable with any."
+        return Headline("caution", unlimited, ())
     risk = next((r for r in HEADLINE_RISKS if limit.safe(r) is not None), None)
     if risk is None:
         few = (
@@ -60,16 +62,23 @@ def headline(result: Any) -> Headline:
 
 
 def misfit_is_clear(analysis: Analysis) -> bool:
-    """Whether the residual is beyond what noise does, by chance with so few lines included."""
-    points = max(len(analysis.fit.residual), 1)
-    excess = max(CLEAN_EXCESS, _CHANCE_SDS / math.sqrt(points))
-    return not analysis.fit.reduced_chi_square <= 1.0 + excess
+    """Whether the model lacks something: a residual far beyond the noise, and not by chance."""
+    return not analysis.fit.reduced_chi_square <= max(MISFIT, _by_chance(analysis))
+
+
+def misfit_is_faint(analysis: Analysis) -> bool:
+    """Whether the residual is a little above the noise, but more than chance makes it."""
+    above = analysis.fit.reduced_chi_square > _by_chance(analysis)
+    return above and not misfit_is_clear(analysis)
+
+
+def _by_chance(analysis: Analysis) -> float:
+    return 1.0 + _CHANCE_SDS / math.sqrt(max(len(analysis.fit.residual), 1))
 
 
 def misfit_factor(analysis: Analysis) -> str:
     """How many times the noise the residual is, for a sentence."""
-    factor = math.sqrt(analysis.fit.reduced_chi_square)
-    return f"{factor:.0f}" if factor >= 10 else f"{factor:.2g}"
+    return pure(math.sqrt(analysis.fit.reduced_chi_square), 2)
 
 
 def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
@@ -78,9 +87,9 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     verdict = (diagnosis or {}).get("verdict")
     if verdict is None and misfit_is_clear(analysis):
         found.append(
-            "the model does not explain the data: what it leaves over is "
-            f"{misfit_factor(analysis)} times the noise (reduced chi-square "
-            f"{analysis.fit.reduced_chi_square:.3g})"
+            "the model does not explain the data (what it leaves over is "
+            f"{misfit_factor(analysis)} times the noise, reduced chi-square "
+            f"{pure(analysis.fit.reduced_chi_square)})"
         )
     if has_feedback(analysis):
         found.append(
@@ -104,14 +113,15 @@ def _untrusted(analysis: Analysis, objections: tuple[str, ...]) -> Headline:
     sentence = f"Do not ship a stiffness from this report: {_joined(objections)}."
     middle, low, high = (limit.quantile(p) for p in (0.5, 0.05, 0.95))
     details = [
-        f"The model's limit and its interval, {estimate(middle, low, high, limit.unit)}, are not to "
-        "be trusted; they stand below for comparison only."
+        f"The model's limit and its interval, {estimate(middle, low, high, limit.unit)}, are not "
+        "to be trusted; they stand below for comparison only."
     ]
-    own = analysis.etfe_limit
-    if own is not None and own.q50 is not None and not has_feedback(analysis):
+    own = own_limit(analysis)
+    if own is not None and not has_feedback(analysis):
+        low, middle, high = own
         details.append(
             "The measured response itself, without a model, puts the limit at "
-            f"{estimate(own.q50, own.q05, own.q95, limit.unit)}."
+            f"{estimate(middle, low, high, limit.unit)}."
         )
     return Headline("untrusted", sentence, tuple(details))
 
@@ -143,21 +153,28 @@ def _recommended(analysis: Analysis, risk: float, diagnosis: Any) -> Headline:
     details.append(_what_binds(analysis))
     warnings = [n.text for n in analysis.notices if n.level == "warning"]
     unexplained = diagnosis.get("verdict") == "unexplained"
-    status = "caution" if warnings or unexplained or cap is not None else "safe"
+    faint = not diagnosis and misfit_is_faint(analysis)
+    doubts = (warnings, unexplained, faint, cap is not None)
+    if faint:
+        details.append(
+            "The residual is slightly above the noise (reduced chi-square "
+            f"{pure(analysis.fit.reduced_chi_square)}): something small may be missing from the "
+            "model."
+        )
     if unexplained:
         details.append(
             "Something in this recording remains unexplained, and the interval is widened for it."
         )
     if warnings:
         details.append("Beware: " + " ".join(_sentence(text) for text in warnings))
-    return Headline(status, sentence, tuple(details))
+    return Headline("caution" if any(doubts) else "safe", sentence, tuple(details))
 
 
 def _cut(stiffness: float, unit: str, sd: float) -> tuple[float, str]:
     """`stiffness` rounded down to three digits, or one digit of its sd, and how it is written."""
     exponent = math.floor(math.log10(stiffness))
     last = min(exponent - 2, math.floor(math.log10(sd)) if sd > 0 else exponent - 2)
-    step = 10.0 ** max(last, exponent - 4)
+    step = 10.0 ** max(last, exponent - 3)
     cut = math.floor(stiffness / step * (1 + 1e-12)) * step
     digits = exponent - round(math.log10(step)) + 1
     return cut, f"{quantity(cut, unit, digits=digits)} ({decibel(cut):.1f} dB)"
@@ -165,19 +182,21 @@ def _cut(stiffness: float, unit: str, sd: float) -> tuple[float, str]:
 
 def _lower_witness(analysis: Analysis, safe: float) -> float | None:
     """The measurement's own lower end, where it contradicts the model on the unsafe side."""
-    own = analysis.etfe_limit
-    if own is None or own.q05 is None or own.q95 is None or own.q05 <= 0:
+    own = own_limit(analysis)
+    if own is None or own[0] <= 0:
         return None
-    apart = own.q95 < analysis.limit.quantile(0.05)
-    if not apart or decibel(safe) - decibel(own.q50) < _AGREEMENT_DB:
+    low, middle, high = own
+    apart = high < analysis.limit.quantile(0.05)
+    if not apart or decibel(safe) - decibel(middle) < _AGREEMENT_DB:
         return None
-    return min(float(own.q05), safe)
+    return min(low, safe)
 
 
 def _what_binds(analysis: Analysis) -> str:
-    named = [f"{c.label} ({percent(c.probability)})" for c in analysis.limit.crossings]
-    if len(named) == 1:
-        return f"What limits it: {analysis.limit.crossings[0].label}."
+    likely = [c for c in analysis.limit.crossings if c.probability >= _WORTH_NAMING]
+    if len(likely) == 1:
+        return f"What limits it: {likely[0].label}."
+    named = [f"{c.label} ({percent(c.probability)})" for c in likely]
     return f"What limits it: {', or '.join(named)}."
 
 

@@ -1,4 +1,4 @@
-"""Every estimate of the stability limit side by side: posterior, least squares, measurement, rules."""
+"""Every estimate of the limit side by side: posterior, least squares, measurement, rules."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -54,24 +55,27 @@ def least_squares_limit(analysis: Analysis) -> float | None:
     return finite(critical_stiffness(analysis.model, analysis.fit.theta).value)
 
 
+def own_limit(analysis: Analysis) -> tuple[float, float, float] | None:
+    """5, 50 and 95 per cent of the limit read from the measurement alone; None without one."""
+    own = analysis.etfe_limit
+    if own is None or own.q05 is None or own.q50 is None or own.q95 is None:
+        return None
+    return own.q05, own.q50, own.q95
+
+
 def witnesses(analysis: Analysis) -> tuple[Witness, ...]:
     """The posterior, least squares, the measurement's own crossing, and the closed-form rules."""
-    limit, own = analysis.limit, analysis.etfe_limit
+    limit, own = analysis.limit, own_limit(analysis)
     low, middle, high = (finite(limit.quantile(p)) for p in (0.05, 0.5, 0.95))
+    fitted = least_squares_limit(analysis)
     found = [
         Witness("posterior", "posterior", "the model with its uncertainty", middle, low, high),
-        Witness(
-            "least_squares", "least squares", "the same model, one number",
-            least_squares_limit(analysis),
-        ),
-    ]  # fmt: skip
-    if own is not None and own.q50 is not None:
-        found.append(
-            Witness(
-                "etfe", "measurement alone", "the crossing read from the response, no model",
-                finite(own.q50), finite(own.q05), finite(own.q95),
-            )
-        )  # fmt: skip
+        Witness("least_squares", "least squares", "the same model, one number", fitted),
+    ]
+    if own is not None:
+        low, middle, high = own
+        remark = "the crossing read from the response, no model"
+        found.append(Witness("etfe", "measurement alone", remark, middle, low, high))
     return (*found, *_rules(analysis))
 
 
@@ -82,14 +86,14 @@ def _rules(analysis: Analysis) -> tuple[Witness, ...]:
     draws = analysis.posterior.draws
     system = analysis.model.system(draws[:: max(len(draws) // RULE_DRAWS, 1)])
     damping, period = ground_damping(system), analysis.etfe.period_s
-    rules = (
-        ("rigid_rule", "rule b/(T/2 + td)", "a rigid device, Diaz and Gil (2010), equation (19)",
-         rigid_limit(damping, system.delay_s, period)),
-        ("passivity", "passivity 2b/T", "a rigid device without delay, Colgate and Schenkel (1997)",
-         passivity_limit(damping, period)),
-    )  # fmt: skip
-    found = []
-    for key, label, remark, values in rules:
+
+    def rule(key: str, label: str, remark: str, values: NDArray[Any]) -> Witness:
         low, middle, high = (finite(v) for v in np.quantile(values, (0.05, 0.5, 0.95)))
-        found.append(Witness(key, label, remark, middle, low, high))
-    return tuple(found)
+        return Witness(key, label, remark, middle, low, high)
+
+    diaz = "a rigid device, Diaz and Gil (2010), equation (19)"
+    colgate = "a rigid device without delay, Colgate and Schenkel (1997)"
+    return (
+        rule("rigid_rule", "rule b/(T/2 + td)", diaz, rigid_limit(damping, system.delay_s, period)),
+        rule("passivity", "passivity 2b/T", colgate, passivity_limit(damping, period)),
+    )

@@ -1,4 +1,4 @@
-"""Numbers with units as a person writes them: digits by uncertainty, SI prefixes, one scale a row."""
+"""Numbers with units as a person writes them: digits by uncertainty, SI prefixes."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def pretty_unit(unit: str) -> str:
 def scale(values: float | Iterable[float | None], unit: str) -> Scale:
     """The SI prefix under which the largest of `values` reads as a number from 0.1 to 1000.
 
-    Masses go from kilograms to grams; units that take no prefix (dB, rad, degrees, none) keep theirs.
+    Masses go from kilograms to grams; units that take no prefix (dB, rad, none) stay as they are.
     """
     unit = pretty_unit(unit)
     given = [values] if isinstance(values, int | float) else list(values)
@@ -83,21 +83,33 @@ def interval(low: float | None, high: float | None, unit: str, sd: float | None 
     if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
         return _NOTHING
     row = scale((low, high), unit)
-    spread = sd if sd is not None else (high - low) / 3.3 or None
+    spread = spread_of(low, high) if sd is None else sd
     return f"{row.number(low, spread)} to {row.number(high, spread)} {row.unit}".rstrip()
+
+
+def spread_of(low: float, high: float) -> float:
+    """The sd that decides the digits of a 90 % interval: no more than five digits in all."""
+    return max((high - low) / 3.29, 1e-3 * max(abs(low), abs(high)))
 
 
 def estimate(middle: float, low: float, high: float, unit: str) -> str:
     """A value and its interval with the same digits: ``"22.3 (21.9 to 22.7) kN/m"``."""
     row = scale((low, middle, high), unit)
-    spread = (high - low) / 3.3 or None
+    spread = spread_of(low, high)
     numbers = [row.number(value, spread) for value in (middle, low, high)]
     return f"{numbers[0]} ({numbers[1]} to {numbers[2]}) {row.unit}".rstrip()
 
 
+def pure(value: float, digits: int = 3) -> str:
+    """A number without a unit and without powers of ten: ``"10,400"``, ``"0.957"``."""
+    if not math.isfinite(value):
+        return _NOTHING
+    return _minus(f"{float(f'{value:.{digits}g}'):,.10g}")
+
+
 def percent(probability: float) -> str:
     """A probability in per cent, for example ``"1 %"``, ``"0.1 %"``; never 0 or 100 by rounding."""
-    if 0.0 < probability < 0.0005:
+    if 0.0 < probability < 0.00095:
         return "under 0.1 %"
     if 0.995 < probability < 1.0:
         return "over 99 %"

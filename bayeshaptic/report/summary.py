@@ -184,6 +184,4 @@ def _quantiles(limit: CriticalStiffness) -> dict[str, Any]:
 
 def _frequency(limit: CriticalStiffness) -> dict[str, Any]:
     known = limit.frequency_hz[np.isfinite(limit.frequency_hz)]
-    return {
-        name: np.quantile(known, p) if len(known) else None for name, p in QUANTILES.items()
-    }
+    return {name: np.quantile(known, p) if len(known) else None for name, p in QUANTILES.items()}

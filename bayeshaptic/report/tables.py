@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayeshaptic.report.limits import RISKS, decibel, finite, witnesses
-from bayeshaptic.report.quantities import interval, percent, pretty_unit, quantity, scale
+from bayeshaptic.report.quantities import interval, percent, pretty_unit, quantity, scale, spread_of
 from bayeshaptic.report.summary import QUANTILES, tip_limit
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 Rows = tuple[tuple[str, ...], ...]
 _DASH = "\N{EN DASH}"
+_SHOWN = ("q05", "q95", "mean", "sd")
 _OUTCOMES = {
     "at a bound": "least squares stopped at its bound: no error bar",
     "prior-dominated": "the data alone do not decide it",
@@ -49,7 +51,8 @@ def parameters(analysis: Analysis) -> tuple[ParameterRow, ...]:
     for i, (name, found) in enumerate(posterior.summary().items()):
         row = scale((found["q50"], found["q95"]), found["unit"])
         value, sd = float(fit.theta[i]), finite(fit.sd[i])
-        numbers = [row.number(found[q], found["sd"]) for q in ("q05", "q95")]
+        low, high, mean, wide = (row.number(found[q], found["sd"]) for q in _SHOWN)
+        error = f" ± {row.number(sd, sd)}" if sd else ""
         remarks = [_OUTCOMES.get(fit.outcome.get(name, ""), "")]
         if found["prior_dominated"]:
             remarks.append("the prior decides this one")
@@ -58,9 +61,9 @@ def parameters(analysis: Analysis) -> tuple[ParameterRow, ...]:
                 name,
                 model.parameter(name).title,
                 row.unit,
-                row.number(value, sd or found["sd"]) + (f" ± {row.number(sd, sd)}" if sd else ""),
-                f"{row.number(found['mean'], found['sd'])} ± {row.number(found['sd'], found['sd'])}",
-                " to ".join(numbers),
+                row.number(value, sd or found["sd"]) + error,
+                f"{mean} ± {wide}",
+                f"{low} to {high}",
                 row.number(model.reference.get(name)),
                 f"{min(found['ess_bulk'], found['ess_tail']):.0f}",
                 f"{found['rhat']:.3f}",
@@ -74,15 +77,15 @@ def limit(analysis: Analysis) -> Rows:
     """Quantiles of the limit: (what, 5 %, median, 95 %)."""
     stiffness, tip = analysis.limit, tip_limit(analysis)
     levels = tuple(QUANTILES.values())
-    rows = [("critical stiffness", *_scaled([stiffness.quantile(p) for p in levels], stiffness.unit))]
+    rows = [("critical stiffness", *_scaled(stiffness.quantile(levels), stiffness.unit))]
     rows.append((f"in dB re 1 {stiffness.unit}", *(_db(stiffness.quantile(p)) for p in levels)))
     if tip is not None:
-        rows.append(("at the tip", *_scaled([tip.quantile(p) for p in levels], tip.unit)))
+        rows.append(("at the tip", *_scaled(tip.quantile(levels), tip.unit)))
         rows.append((f"at the tip in dB re 1 {tip.unit}", *(_db(tip.quantile(p)) for p in levels)))
     known = stiffness.frequency_hz[np.isfinite(stiffness.frequency_hz)]
     if len(known):
-        hertz = [float(v) for v in np.quantile(known, levels)]
-        rows.append(("frequency of the binding crossing", *_scaled(hertz, "Hz")))
+        hertz = _scaled(np.quantile(known, levels), "Hz")
+        rows.append(("frequency of the binding crossing", *hertz))
     return tuple(rows)
 
 
@@ -114,14 +117,18 @@ def comparison(analysis: Analysis) -> Rows:
     """Every estimate of the limit: (name, 5 %, middle, 95 %, dB, difference in dB, remark)."""
     found = witnesses(analysis)
     ours = decibel(found[0].middle or 0.0)
+    ours_spread = spread_of(found[0].low or 0.0, found[0].high or 0.0)
     rows = []
     for witness in found:
         middle = witness.middle
-        numbers = _scaled([witness.low, middle, witness.high], analysis.limit.unit)
+        ends = (witness.low, witness.high)
+        spread = ours_spread if None in ends else spread_of(*ends)  # type: ignore[arg-type]
+        numbers = _scaled([witness.low, middle, witness.high], analysis.limit.unit, spread)
         level = _DASH if not middle else f"{decibel(middle):.2f}"
         apart = _DASH
         if middle and np.isfinite(ours) and witness.key != "posterior":
-            apart = f"{decibel(middle) - ours:+.2f}".replace("-", "\N{MINUS SIGN}")
+            difference = round(decibel(middle) - ours, 2) + 0.0  # no minus before a zero
+            apart = f"{difference:+.2f}".replace("-", "\N{MINUS SIGN}")
         rows.append((witness.label, *numbers, level, apart, witness.remark))
     return tuple(rows)
 
@@ -143,9 +150,7 @@ def measured(analysis: Analysis) -> Rows:
         ):
             if value is not None:
                 rows.append((title, str(value)))
-        rows.append(
-            ("Samples", f"{recording.samples:,} in {quantity(recording.duration_s, 's')}")
-        )
+        rows.append(("Samples", f"{recording.samples:,} in {quantity(recording.duration_s, 's')}"))
         rms = float(np.sqrt(np.mean(np.square(recording.force))))
         rows.append(("Excitation", f"{quantity(rms, unit)} rms ({_excitation(analysis)})"))
         if recording.encoder_resolution is not None:
@@ -183,12 +188,16 @@ def _excitation(analysis: Analysis) -> str:
     return "random" if lines is None else f"periodic, {lines} excited lines"
 
 
-def _scaled(values: list[float | None], unit: str) -> tuple[str, ...]:
+def _scaled(
+    values: Iterable[float | None], unit: str, spread: float | None = None
+) -> tuple[str, ...]:
     """Numbers of one row with the same prefix, digits by their spread."""
+    values = list(values)
     known = [float(v) for v in values if v is not None and np.isfinite(v)]
     row = scale(known, unit)
-    spread = (max(known) - min(known)) / 3.29 if len(known) > 1 else None
-    return tuple(row.quantity(v, spread or None) if v is not None else _DASH for v in values)
+    if spread is None and known:
+        spread = spread_of(min(known), max(known))
+    return tuple(_DASH if v is None else row.quantity(v, spread) for v in values)
 
 
 def _db(stiffness: float) -> str:

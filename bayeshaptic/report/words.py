@@ -9,7 +9,8 @@ import numpy as np
 
 from bayeshaptic.report.figures.residuals import third_octaves
 from bayeshaptic.report.headline import misfit_factor, misfit_is_clear
-from bayeshaptic.report.quantities import estimate, interval, percent, quantity
+from bayeshaptic.report.limits import own_limit
+from bayeshaptic.report.quantities import estimate, interval, percent, pure, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -23,15 +24,16 @@ def misfit(analysis: Analysis) -> str:
     order = np.argsort(fit.frequency_hz)
     bands = third_octaves(fit.frequency_hz[order], fit.residual[order])
     outside = bands.rms > bands.high
-    worst = int(np.argmax(bands.rms / bands.high))
-    place = f"{bands.rms[worst]:.2g} times the noise around {quantity(bands.frequency_hz[worst], 'Hz')}"
-    chi = f"reduced chi-square {fit.reduced_chi_square:.3g}, where 1 is pure noise"
+    worst = int(np.argmax(bands.rms))
+    hertz = quantity(float(bands.frequency_hz[worst]), "Hz")
+    place = f"{pure(bands.rms[worst], 2)} times the noise around {hertz}"
+    chi = f"reduced chi-square {pure(fit.reduced_chi_square)}, where 1 is pure noise"
     if misfit_is_clear(analysis):
         return (
             f"The model does not explain this recording: the residual is {misfit_factor(analysis)} "
             f"times the noise ({chi}). It stands out in {outside.sum()} of {len(outside)} third "
-            f"octaves and is worst at {place}. Until the cause is found and added to the model, the "
-            "intervals below are narrower than the truth."
+            f"octaves and is worst at {place}. Until the cause is found and added to the model, "
+            "nothing here says how wrong the limit may be."
         )
     if outside.any():
         return (
@@ -51,9 +53,9 @@ def convergence(analysis: Analysis) -> str:
     ensembles, steps, walkers, _ = posterior.chains.shape
     message = posterior.message[:1].upper() + posterior.message[1:].rstrip(".")
     return (
-        f"{message}. {ensembles} independent ensembles of {walkers} walkers took {steps} steps each, "
-        f"{posterior.chains[..., 0].size:,} draws in {quantity(posterior.seconds, 's')}, seed "
-        f"{posterior.seed}."
+        f"{message}. {ensembles} independent ensembles of {walkers} walkers took {steps} steps "
+        f"each, {posterior.chains[..., 0].size:,} draws in {quantity(posterior.seconds, 's')}, "
+        f"seed {posterior.seed}."
     )
 
 
@@ -74,8 +76,8 @@ def delay(analysis: Analysis) -> str:
     if _DELAY in model.fixed:
         return (
             f"The loop delay beyond the hold is taken as known exactly: "
-            f"{quantity(model.fixed[_DELAY], 's')}. If it is not, the limit's interval is too narrow; "
-            "give --delay-sd-s."
+            f"{quantity(model.fixed[_DELAY], 's')}. If it is not, the limit's interval is too "
+            "narrow; give --delay-sd-s."
         )
     column = analysis.posterior.draws[:, model.names.index(_DELAY)]
     low, high = (float(v) for v in np.quantile(column, (0.05, 0.95)))
@@ -87,22 +89,24 @@ def delay(analysis: Analysis) -> str:
 
 def agreement(analysis: Analysis) -> str:
     """The model's limit beside the measurement's own."""
-    limit, own = analysis.limit, analysis.etfe_limit
-    if own is None or own.q50 is None:
+    limit, own = analysis.limit, own_limit(analysis)
+    if own is None:
+        why = getattr(analysis.etfe_limit, "reason", None)
         return (
-            "The measured response does not cross the negative real axis inside the band with enough "
-            "certainty to read a limit from it without a model."
+            "No limit can be read from the measured response alone, without a model"
+            f"{': ' + why if why else ''}. Crossings outside the band rest on the model."
         )
+    low, measured, high = own
     middle = limit.quantile(0.5)
-    if not (math.isfinite(middle) and middle > 0 and own.q50 > 0):
+    if not (math.isfinite(middle) and middle > 0 and measured > 0):
         return "The model and the measurement cannot be compared: one of them has no limit."
-    difference = 20 * math.log10(middle / own.q50)
-    overlap = own.q05 <= limit.quantile(0.95) and limit.quantile(0.05) <= own.q95
+    difference = 20 * math.log10(middle / measured)
+    overlap = low <= limit.quantile(0.95) and limit.quantile(0.05) <= high
     side = "above" if difference > 0 else "below"
     verdict = "their 90 % intervals overlap" if overlap else "their 90 % intervals do not overlap"
     return (
         f"Read from the measured response alone, without a model, the limit is "
-        f"{estimate(own.q50, own.q05, own.q95, limit.unit)}. The model's "
+        f"{estimate(measured, low, high, limit.unit)}. The model's "
         f"median lies {abs(difference):.2f} dB {side} that, and {verdict}."
     )
 
@@ -114,6 +118,6 @@ def hump(analysis: Analysis) -> str:
         return ""
     parts = [f"{c.label} with probability {percent(c.probability)}" for c in crossings]
     return (
-        f"More than one crossing may set the limit: {', '.join(parts)}. A mean or a single best fit "
-        "hides this; the quantiles do not."
+        f"More than one crossing may set the limit: {', '.join(parts)}. A mean or a single best "
+        "fit hides this; the quantiles do not."
     )

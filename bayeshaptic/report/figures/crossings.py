@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.recordings.etfe import Etfe
 
 CURVES = 60
 POINTS = 700
@@ -39,10 +40,17 @@ def draw(analysis: Analysis) -> Figure:
     style.panel(bottom, y="phase + 180°, degrees")
     _curves(top, frequency, row.factor / np.abs(response))
     _curves(bottom, frequency, _unbroken(np.degrees(np.angle(-response))))
-    top.plot(etfe.frequency_hz, row.factor / np.abs(etfe.value), ".", color=style.DATA,
-             markersize=3, label="measured")  # fmt: skip
-    bottom.plot(etfe.frequency_hz, np.degrees(np.angle(-etfe.value)), ".", color=style.DATA,
-                markersize=3)  # fmt: skip
+    top.plot(
+        etfe.frequency_hz,
+        row.factor / np.abs(etfe.value),
+        ".",
+        color=style.DATA,
+        markersize=3,
+        label="measured",
+    )
+    bottom.plot(
+        etfe.frequency_hz, np.degrees(np.angle(-etfe.value)), ".", color=style.DATA, markersize=3
+    )
     _marks(top, bottom, analysis, row, found)
     for axes in (top, bottom):
         style.frequency_axis(axes, start, half * 1.02)
@@ -50,6 +58,7 @@ def draw(analysis: Analysis) -> Figure:
         if start < low_hz:
             axes.axvspan(start, low_hz, color="#f0f0f0", zorder=0, linewidth=0)
     top.set_yscale("log")
+    top.set_ylim(*_stiffness_range(etfe, [k for _, k in found], row))
     bottom.set_yscale("symlog", linthresh=LINEAR_DEG, linscale=1.2)
     _phase_ticks(bottom)
     bottom.set_xlabel("frequency, Hz (grey: not measured)", fontsize=style.FONT)
@@ -68,10 +77,22 @@ def _at_median(analysis: Analysis) -> list[tuple[float, float]]:
     return [(float(hz), float(k)) for hz, k in pairs if np.isfinite(k)][:SHOWN]
 
 
+def _stiffness_range(etfe: Etfe, critical: list[float], row: Scale) -> tuple[float, float]:
+    """All that was measured and all crossings; towards Nyquist 1/|G| may grow without bound."""
+    shown = np.r_[1 / np.abs(etfe.value), critical] * row.factor
+    return float(shown.min()) / 2, float(shown.max()) * 3
+
+
 def _curves(axes: Axes, frequency: NDArray[Any], values: NDArray[Any]) -> None:
     for number, curve in enumerate(values):
-        axes.plot(frequency, curve, color=style.MODEL, linewidth=0.6, alpha=0.3,
-                  label="draws of the posterior" if number == 0 else None)  # fmt: skip
+        axes.plot(
+            frequency,
+            curve,
+            color=style.MODEL,
+            linewidth=0.6,
+            alpha=0.3,
+            label="draws of the posterior" if number == 0 else None,
+        )
 
 
 def _unbroken(phase_deg: NDArray[Any]) -> NDArray[Any]:
@@ -87,8 +108,13 @@ def _marks(
     unit = analysis.limit.unit
     middle = analysis.limit.quantile(0.5)
     if np.isfinite(middle) and middle > 0:
-        top.axhline(middle * row.factor, color=style.OTHER, linewidth=1.0, linestyle="--",
-                    label=f"median limit {quantity(middle, unit)}")  # fmt: skip
+        top.axhline(
+            middle * row.factor,
+            color=style.OTHER,
+            linewidth=1.0,
+            linestyle="--",
+            label=f"median limit {quantity(middle, unit)}",
+        )
     bottom.axhline(0, color=style.DATA, linewidth=0.7)
     for number, (hz, stiffness) in enumerate(found):
         look: dict[str, Any] = {

@@ -33,8 +33,14 @@ def draw(analysis: Analysis) -> Figure:
         else:
             axes.axis("off")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False,
-                  fontsize=style.SMALL + 0.5)  # fmt: skip
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper center",
+        ncols=3,
+        frameon=False,
+        fontsize=style.SMALL + 0.5,
+    )
     return figure
 
 
@@ -51,8 +57,13 @@ def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
     x = np.linspace(low, high, 200)
     prior = np.exp(model.prior(name).log_density(x)) / row.factor
     axes.plot(x * row.factor, prior, "--", color=style.PRIOR, linewidth=1.1, label="prior")
-    axes.axvline(fit.theta[index] * row.factor, color=style.OTHER, linewidth=1.2,
-                 linestyle="-.", label="least squares")  # fmt: skip
+    axes.axvline(
+        fit.theta[index] * row.factor,
+        color=style.OTHER,
+        linewidth=1.2,
+        linestyle="-.",
+        label="least squares",
+    )
     style.panel(axes, grid=False, title=_title(name, row), size=style.FONT - 0.5)
     axes.set_xlim(low * row.factor, high * row.factor)
     axes.set_ylim(0, 1.12 * max(float(density.max()), float(prior[np.isfinite(prior)].max())))

@@ -51,9 +51,11 @@ def draw(analysis: Analysis) -> Figure:
         return _nothing()
     figure = style.new_figure(1.2 + 1.12 * size, style.WIDTH_IN if size > 2 else 4.6)
     panels = figure.subplots(size, size, squeeze=False, sharex="col", sharey="row")
-    rows = [scale(float(np.median(draws[:, i])), analysis.model.unit(analysis.model.names[i]))
-            for i in chosen]  # fmt: skip
-    label = [f"{style.short(analysis.model.names[i])}\n[{row.unit}]" for i, row in zip(chosen, rows, strict=True)]
+    names = [analysis.model.names[i] for i in chosen]
+    middles = np.median(draws[:, chosen], axis=0)
+    units = [analysis.model.unit(name) for name in names]
+    rows = [scale(float(m), unit) for m, unit in zip(middles, units, strict=True)]
+    label = [f"{style.short(n)}\n[{row.unit}]" for n, row in zip(names, rows, strict=True)]
     scaled = draws[:, chosen] * [row.factor for row in rows]
     for i in range(size):
         for j in range(size):
@@ -79,13 +81,26 @@ def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float)
     count, x_edges, y_edges = np.histogram2d(x, y, 22, ranges)
     levels = _credible(count)
     if np.all(np.diff(levels) > 0):
-        axes.contour(_middle(x_edges), _middle(y_edges), _smooth(count).T, levels,
-                     colors=style.DATA, linewidths=0.7)  # fmt: skip
+        axes.contour(
+            _middle(x_edges),
+            _middle(y_edges),
+            _smooth(count).T,
+            levels,
+            colors=style.DATA,
+            linewidths=0.7,
+        )
     axes.set_xlim(*ranges[0])
     axes.set_ylim(*ranges[1])
-    axes.text(0.97, 0.95, f"{rank_correlation:+.2f}".replace("-", "\N{MINUS SIGN}"),
-              transform=axes.transAxes, ha="right", va="top", fontsize=style.SMALL,
-              bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1})  # fmt: skip
+    axes.text(
+        0.97,
+        0.95,
+        f"{rank_correlation:+.2f}".replace("-", "\N{MINUS SIGN}"),
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        fontsize=style.SMALL,
+        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1},
+    )
     from matplotlib.ticker import MaxNLocator
 
     axes.xaxis.set_major_locator(MaxNLocator(2))

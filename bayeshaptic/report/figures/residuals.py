@@ -58,26 +58,52 @@ def draw(analysis: Analysis) -> Figure:
     for part, marker, name, colour in zip(
         parts, ("o", "^"), ("real part", "imaginary part"), (style.MODEL, style.OTHER), strict=True
     ):
-        top.plot(frequency, part, marker, color=colour, markersize=2.8, markeredgewidth=0.5,
-                 markerfacecolor=colour if marker == "o" else "none", label=name)  # fmt: skip
+        top.plot(
+            frequency,
+            part,
+            marker,
+            color=colour,
+            markersize=2.8,
+            markeredgewidth=0.5,
+            markerfacecolor=colour if marker == "o" else "none",
+            label=name,
+        )
     worst = max(float(np.nanmax(np.abs(parts))), 4.0)
     if worst > 10:
         _symlog(top, worst)
-    # Room for the legend above the highest point.
-    top.set_ylim(-1.25 * worst, (2.5 if worst > 10 else 1.35) * worst)
-    style.legend(top, loc="upper left", ncols=3)
+    top.set_ylim(-1.25 * worst, 1.25 * worst)
+    _legend_above(top)
     style.panel(bottom, y="rms per third\noctave / noise")
     bands = third_octaves(frequency, residual)
-    bottom.fill_between(bands.frequency_hz, bands.low, bands.high, color="#bdbdbd", alpha=0.45,
-                        linewidth=0, label="99 % of pure noise")  # fmt: skip
-    bottom.plot(bands.frequency_hz, bands.rms, "s-", color=style.DATA, markersize=3, linewidth=0.9,
-                label="measured")  # fmt: skip
+    bottom.fill_between(
+        bands.frequency_hz,
+        bands.low,
+        bands.high,
+        color="#bdbdbd",
+        alpha=0.45,
+        linewidth=0,
+        label="99 % of pure noise",
+    )
+    bottom.plot(
+        bands.frequency_hz,
+        bands.rms,
+        "s-",
+        color=style.DATA,
+        markersize=3,
+        linewidth=0.9,
+        label="measured",
+    )
     _rms_axis(bottom, bands)
-    style.legend(bottom, loc="upper left", ncols=2)
+    _legend_above(bottom)
     style.frequency_axis(top, frequency[0] / 1.05, frequency[-1] * 1.05)
     style.frequency_axis(bottom, frequency[0] / 1.05, frequency[-1] * 1.05, "frequency, Hz")
     figure.align_ylabels([top, bottom])
     return figure
+
+
+def _legend_above(axes: Axes) -> None:
+    """Outside of the panel: inside it would cover points wherever it stood."""
+    style.legend(axes, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.1)
 
 
 def _symlog(axes: Axes, worst: float) -> None:
@@ -97,7 +123,7 @@ def _rms_axis(axes: Axes, bands: BandResidual) -> None:
         from matplotlib.ticker import FuncFormatter
 
         axes.set_yscale("log")
-        axes.set_ylim(0.9 * min(bands.rms.min(), bands.low.min()), highest * 3)
+        axes.set_ylim(0.9 * min(bands.rms.min(), bands.low.min()), highest * 1.3)
         axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
     else:
-        axes.set_ylim(0, highest * 1.35)
+        axes.set_ylim(0, highest * 1.1)

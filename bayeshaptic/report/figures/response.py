@@ -31,7 +31,8 @@ def draw(analysis: Analysis) -> Figure:
     gain = style.panel(panels[0], y=f"gain, dB re 1 {unit}")
     phase = style.panel(panels[1], y="phase, degrees")
     relative = etfe.relative_sd
-    measured = _near(etfe.phase_deg, np.interp(etfe.frequency_hz, band.frequency_hz, band.phase_deg[1]))
+    modelled = np.interp(etfe.frequency_hz, band.frequency_hz, band.phase_deg[1])
+    measured = _near(etfe.phase_deg, modelled)
     # Beyond 100 % the noise has taken over, and a symmetric bar in dB says nothing.
     error = 2 * np.clip(relative / np.sqrt(2), 0.0, 1.0)
     _points(gain, etfe, etfe.gain_db, 20 / np.log(10) * error, "measured, ± 2 sd")
@@ -39,11 +40,23 @@ def draw(analysis: Analysis) -> Figure:
     for axes, quantiles in ((gain, band.gain_db), (phase, band.phase_deg)):
         low, middle, high = quantiles
         axes.fill_between(
-            band.frequency_hz, low, high, color=style.MODEL, alpha=0.3, linewidth=0, zorder=3,
+            band.frequency_hz,
+            low,
+            high,
+            color=style.MODEL,
+            alpha=0.3,
+            linewidth=0,
+            zorder=3,
             label="model, 90 % band of the posterior",
-        )  # fmt: skip
-        axes.plot(band.frequency_hz, middle, color=style.MODEL, linewidth=1.2, zorder=3,
-                  label="model, posterior median")  # fmt: skip
+        )
+        axes.plot(
+            band.frequency_hz,
+            middle,
+            color=style.MODEL,
+            linewidth=1.2,
+            zorder=3,
+            label="model, posterior median",
+        )
     style.legend(gain, loc="lower left")
     _difference(panels[2], etfe, band, 20 / np.log(10) * error)
     if known:
@@ -64,19 +77,37 @@ def _difference(axes: Axes, etfe: Etfe, band: ResponseBand, error: NDArray[Any])
     low, middle, high = band.gain_db
     difference = etfe.gain_db - np.interp(etfe.frequency_hz, band.frequency_hz, middle)
     _points(axes, etfe, difference, error)
-    axes.fill_between(band.frequency_hz, low - middle, high - middle, color=style.MODEL, alpha=0.35,
-                      linewidth=0, zorder=3)  # fmt: skip
+    axes.fill_between(
+        band.frequency_hz,
+        low - middle,
+        high - middle,
+        color=style.MODEL,
+        alpha=0.35,
+        linewidth=0,
+        zorder=3,
+    )
     axes.axhline(0, color=style.MODEL, linewidth=1.0, zorder=3)
     # The few worst lines, of almost no signal, may run out of the panel.
     reach = 1.15 * float(np.quantile(np.abs(difference) + error, 0.97))
     axes.set_ylim(-reach, reach)
 
 
-def _points(axes: Axes, etfe: Etfe, value: NDArray[Any], error: NDArray[Any], label: str = "") -> None:
+def _points(
+    axes: Axes, etfe: Etfe, value: NDArray[Any], error: NDArray[Any], label: str = ""
+) -> None:
     axes.errorbar(
-        etfe.frequency_hz, value, yerr=error, fmt="o", color=style.DATA, ecolor="#8c8c8c",
-        markersize=2.2, markeredgewidth=0, elinewidth=0.7, zorder=2, label=label,
-    )  # fmt: skip
+        etfe.frequency_hz,
+        value,
+        yerr=error,
+        fmt="o",
+        color=style.DATA,
+        ecolor="#8c8c8c",
+        markersize=2.2,
+        markeredgewidth=0,
+        elinewidth=0.7,
+        zorder=2,
+        label=label,
+    )
 
 
 def _near(phase: NDArray[Any], model: NDArray[Any]) -> NDArray[Any]:

@@ -81,8 +81,16 @@ def _draws(axes: Axes, posterior: Any) -> None:
     style.panel(axes, y="effective draws", title="effective draws of each parameter")
     place = np.arange(len(posterior.ess_bulk))
     axes.bar(place - 0.2, posterior.ess_bulk, 0.4, color=style.MODEL, label="bulk")
-    axes.bar(place + 0.2, posterior.ess_tail, 0.4, facecolor="white", edgecolor=style.MODEL,
-             hatch="/////", linewidth=0.6, label="tail")  # fmt: skip
+    axes.bar(
+        place + 0.2,
+        posterior.ess_tail,
+        0.4,
+        facecolor="white",
+        edgecolor=style.MODEL,
+        hatch="/////",
+        linewidth=0.6,
+        label="tail",
+    )
     _names(axes, posterior)
     axes.set_ylim(0, 1.3 * float(max(posterior.ess_bulk.max(), posterior.ess_tail.max())))
     style.legend(axes, loc="upper left", ncols=2)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.limits import RISKS, Witness, decibel, witnesses
+from bayeshaptic.report.limits import RISKS, Witness, decibel, own_limit, witnesses
 from bayeshaptic.report.quantities import Scale, percent, scale
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 BINS = 60
+WIDEST = 4.0  # times the histogram's own width, to show the measurement's interval beside it
 LOG_BEYOND = 8.0  # a distribution wider than this factor is drawn on a logarithmic axis
 
 
@@ -37,15 +38,20 @@ def _histogram(axes: Axes, analysis: Analysis) -> None:
     style.panel(axes, y="probability density", grid=False)
     axes.set_yticks([])
     if not len(samples) or not np.any(samples > 0):
-        axes.text(0.5, 0.5, "no stiffness above zero is stable" if len(samples) else
-                  "stable at every stiffness", transform=axes.transAxes, ha="center")  # fmt: skip
+        axes.text(
+            0.5,
+            0.5,
+            "no stiffness above zero is stable" if len(samples) else "stable at every stiffness",
+            transform=axes.transAxes,
+            ha="center",
+        )
         return
     row = scale(float(np.median(samples)), limit.unit)
     low, high = (float(v) for v in np.quantile(samples[samples > 0], (0.0005, 0.9995)))
     logarithmic = high > LOG_BEYOND * low
     edges = _edges(low, high, logarithmic) * row.factor
     _stack(axes, analysis, row, edges, logarithmic)
-    axes.set_xlim(edges[0], edges[-1])
+    axes.set_xlim(*_reach(analysis, row, edges))
     axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
     _lines(axes, analysis, row)
     if logarithmic:
@@ -67,6 +73,18 @@ def _edges(low: float, high: float, logarithmic: bool) -> NDArray[Any]:
     return np.linspace(max(low - margin, 0.0), high + margin, BINS + 1)
 
 
+def _reach(analysis: Analysis, row: Scale, edges: NDArray[Any]) -> tuple[float, float]:
+    """The histogram, and the measurement's own interval where that leaves it wide enough."""
+    low, high = float(edges[0]), float(edges[-1])
+    own = own_limit(analysis)
+    if own is None:
+        return low, high
+    wide_low = min(low, own[0] * row.factor - 0.04 * (high - low))
+    wide_high = max(high, own[2] * row.factor + 0.04 * (high - low))
+    fits = wide_low > 0 and wide_high - wide_low < WIDEST * (high - low)
+    return (wide_low, wide_high) if fits else (low, high)
+
+
 def _stack(
     axes: Axes, analysis: Analysis, row: Scale, edges: NDArray[Any], logarithmic: bool
 ) -> None:
@@ -78,10 +96,18 @@ def _stack(
         part = samples[(analysis.limit.group == number) & np.isfinite(samples)] * row.factor
         height = np.histogram(part, edges)[0] / (len(samples) * width)
         colour = style.CYCLE[number % len(style.CYCLE)]
-        axes.stairs(base + height, edges, baseline=base, fill=True, facecolor=colour, alpha=0.55,
-                    edgecolor=style.DATA, linewidth=0.0,
-                    hatch=style.HATCHES[number % len(style.HATCHES)],
-                    label=f"{crossing.label}: {percent(crossing.probability)}")  # fmt: skip
+        axes.stairs(
+            base + height,
+            edges,
+            baseline=base,
+            fill=True,
+            facecolor=colour,
+            alpha=0.55,
+            edgecolor=style.DATA,
+            linewidth=0.0,
+            hatch=style.HATCHES[number % len(style.HATCHES)],
+            label=f"{crossing.label}: {percent(crossing.probability)}",
+        )
         axes.stairs(base + height, edges, baseline=base, color=colour, linewidth=0.8)
         base = base + height
 
@@ -92,21 +118,34 @@ def _lines(axes: Axes, analysis: Analysis, row: Scale) -> None:
     for number, risk in enumerate(RISKS):
         safe = analysis.limit.safe(risk)
         if safe is not None and low <= safe * row.factor <= high:
-            axes.axvline(safe * row.factor, color=style.DATA, linewidth=1.0,
-                         linestyle=style.DASHES[1:][number],
-                         label=f"{percent(risk)} risk of instability")  # fmt: skip
+            axes.axvline(
+                safe * row.factor,
+                color=style.DATA,
+                linewidth=1.0,
+                linestyle=style.DASHES[1:][number],
+                label=f"{percent(risk)} risk of instability",
+            )
     for witness in witnesses(analysis):
         if witness.middle is None or not low <= witness.middle * row.factor <= high:
             continue
         if witness.key == "least_squares":
-            axes.axvline(witness.middle * row.factor, color=style.OTHER, linewidth=1.4,
-                         label="least squares")  # fmt: skip
+            axes.axvline(
+                witness.middle * row.factor, color=style.OTHER, linewidth=1.4, label="least squares"
+            )
         if witness.key == "etfe" and witness.low is not None and witness.high is not None:
             middle = witness.middle * row.factor
             reach = [[middle - witness.low * row.factor], [witness.high * row.factor - middle]]
-            axes.errorbar([middle], [0.965 * axes.get_ylim()[1]], xerr=reach, fmt="s",
-                          color=style.DATA, capsize=3, markersize=4, linewidth=1.1,
-                          label="measurement alone, 90 %")  # fmt: skip
+            axes.errorbar(
+                [middle],
+                [0.965 * axes.get_ylim()[1]],
+                xerr=reach,
+                fmt="s",
+                color=style.DATA,
+                capsize=3,
+                markersize=4,
+                linewidth=1.1,
+                label="measurement alone, 90 %",
+            )
     axes.set_xlim(low, high)
 
 
@@ -115,13 +154,14 @@ def _decibel_axis(axes: Axes, row: Scale, unit: str) -> None:
 
     low, high = (decibel(v / row.factor) for v in axes.get_xlim())
     low = low if np.isfinite(low) else high - 40.0
-    step = next((s for s in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5) if (high - low) / s <= 8), 10)
+    steps = (digit * 10.0**power for power in range(-5, 3) for digit in (1, 2, 5))
+    step = next(step for step in steps if (high - low) / step <= 7)
     ticks = np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
     top = axes.secondary_xaxis("top")
     top.xaxis.set_major_locator(FixedLocator(list(10 ** (ticks / 20) * row.factor)))
     top.xaxis.set_minor_locator(NullLocator())
     top.xaxis.set_minor_formatter(NullFormatter())
-    places = max(-int(np.floor(np.log10(step))), 0)
+    places = max(-int(np.floor(np.log10(step) + 1e-9)), 0)
     top.xaxis.set_major_formatter(
         FuncFormatter(lambda value, _: f"{decibel(value / row.factor):.{places}f}")
     )
@@ -140,12 +180,20 @@ def _forest(axes: Axes, rows: tuple[Witness, ...], unit: str) -> None:
         middle = decibel(witness.middle)
         reach = [[0.0], [0.0]]
         if witness.low is not None and witness.high is not None and witness.low > 0:
-            reach = [[max(middle - decibel(witness.low), 0)], [max(decibel(witness.high) - middle, 0)]]
+            ends = middle - decibel(witness.low), decibel(witness.high) - middle
+            reach = [[max(end, 0.0)] for end in ends]
         ours = witness.key == "posterior"
-        axes.errorbar([middle], [place], xerr=reach, fmt="o" if ours else "s",
-                      color=style.MODEL if ours else style.DATA, markersize=4.5 if ours else 3.5,
-                      linewidth=2.0 if ours else 1.1, capsize=3,
-                      markerfacecolor=None if ours else "white")  # fmt: skip
+        axes.errorbar(
+            [middle],
+            [place],
+            xerr=reach,
+            fmt="o" if ours else "s",
+            color=style.MODEL if ours else style.DATA,
+            markersize=4.5 if ours else 3.5,
+            linewidth=2.0 if ours else 1.1,
+            capsize=3,
+            markerfacecolor=None if ours else "white",
+        )
     axes.set_yticks(range(len(rows)), [row.label for row in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     low, high = axes.get_xlim()

@@ -1,0 +1,465 @@
+"""The report: numbers as people write them, the sentence, the figures, the page, the files."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import json
+import re
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import needs_browser, probe, run
+from fake_analysis import CASES, FEEDBACK, fake_analysis
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.report import write, write_report
+from bayeshaptic.report.figures import PICTURES, draw_pictures, png
+from bayeshaptic.report.figures.pairs import correlation, strongest
+from bayeshaptic.report.figures.residuals import third_octaves
+from bayeshaptic.report.figures.sampler import rank_histogram
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.limits import least_squares_limit, witnesses
+from bayeshaptic.report.quantities import estimate, interval, percent, quantity, scale
+from bayeshaptic.report.tables import parameters, safe
+from bayeshaptic.report.words import agreement, hump, misfit
+
+FILES = {"report.html", "summary.json", "posterior.nc", *(f"{p.name}.png" for p in PICTURES)}
+
+
+# ---- quantities
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "sd", "text"),
+    [
+        (22_145.0, "N/m", 130.0, "22.14 kN/m"),
+        (22_145.0, "N/m", None, "22.1 kN/m"),
+        (8.5e-4, "kg m^2", 3e-6, "0.8500 g m²"),
+        (0.19, "kg", 4e-4, "0.19000 kg"),
+        (200e-6, "s", 1e-6, "200.0 µs"),
+        (0.0084, "N m s/rad", 0.001, "8.4 mN m s/rad"),
+        (999.7, "N/m", None, "1.000 kN/m"),
+        (13.2, "A/rad", 0.3, "13.20 A/rad"),
+        (-3.0, "dB", 0.1, "−3.00 dB"),
+        (102.84, "Hz", 0.2, "102.84 Hz"),
+        (0.0, "N s/m", 0.3, "0.00 N s/m"),
+        (1.0, "", None, "1.00"),
+        (float("inf"), "N/m", None, "–"),
+        (None, "N/m", None, "–"),
+    ],
+)
+def test_a_quantity_reads_well(value: float | None, unit: str, sd: float | None, text: str) -> None:
+    assert quantity(value, unit, sd) == text
+
+
+def test_an_interval_has_one_unit_and_no_more_digits_than_it_can_bear() -> None:
+    assert interval(21_912.3, 22_391.9, "N/m") == "21.91 to 22.39 kN/m"
+    assert interval(22_246.11, 22_246.13, "N/m") == "22.246 to 22.246 kN/m"
+    assert estimate(22_330.0, 21_910.0, 22_690.0, "N/m") == "22.33 (21.91 to 22.69) kN/m"
+    assert interval(None, 1.0, "N/m") == "–"
+
+
+def test_percentages_are_never_rounded_to_certainty() -> None:
+    assert [percent(p) for p in (0.05, 0.01, 0.001, 0.34, 0.9996, 1e-5)] == [
+        "5 %",
+        "1 %",
+        "0.1 %",
+        "34 %",
+        "over 99 %",
+        "under 0.1 %",
+    ]
+
+
+def test_a_row_has_one_scale() -> None:
+    row = scale([950.0, 12_000.0], "N/m")
+    assert [row.number(v, 30.0) for v in (950.0, 12_000.0)] == ["0.950", "12.000"]
+
+
+# ---- the sentence
+
+
+def test_the_recommendation_is_never_above_the_safe_stiffness() -> None:
+    for seed in range(8):
+        analysis = fake_analysis("rigid", spread=0.002, seed=seed)
+        found = headline(analysis)
+        assert found.status == "safe"
+        number = re.search(r"at most ([\d.]+) kN/m", found.sentence)
+        assert number, found.sentence
+        exact = analysis.limit.safe(0.01)
+        assert 0.98 * exact < 1e3 * float(number[1]) <= exact
+        assert "1 %" in found.sentence
+
+
+def test_both_humps_are_named() -> None:
+    analysis = fake_analysis(**CASES["two-humps"])
+    details = " ".join(headline(analysis).details)
+    for crossing in analysis.limit.crossings:
+        assert crossing.label in details
+    assert len(analysis.limit.crossings) == 2
+    assert "More than one crossing" in hump(analysis)
+    assert hump(fake_analysis("rigid")) == ""
+
+
+def test_no_confident_number_when_the_model_does_not_explain_the_data() -> None:
+    found = headline(fake_analysis("rigid", misfit=13.0))
+    assert found.status == "untrusted"
+    assert "does not explain the data" in found.sentence
+    assert "13 times the noise" in found.sentence
+    assert "N/m" not in found.sentence
+    assert "not to be trusted" in " ".join(found.details)
+
+
+def test_a_faint_misfit_is_said_beside_the_number() -> None:
+    analysis = fake_analysis("rigid")
+    analysis.fit = dataclasses.replace(
+        analysis.fit, reduced_chi_square=1.25, residual=np.ones(400, complex)
+    )
+    found = headline(analysis)
+    assert found.status == "caution"
+    assert "slightly above the noise" in " ".join(found.details)
+
+
+def test_few_points_may_be_above_the_noise_by_chance() -> None:
+    analysis = fake_analysis("rigid")
+    analysis.fit = dataclasses.replace(
+        analysis.fit, reduced_chi_square=1.4, residual=np.ones(12, complex)
+    )
+    assert headline(analysis).status == "safe"
+
+
+@pytest.mark.parametrize(
+    ("case", "words"), [("feedback", "feedback"), ("not-converged", "not converged")]
+)
+def test_the_sentence_carries_what_spoils_it(case: str, words: str) -> None:
+    found = headline(fake_analysis(**CASES[case]))
+    assert found.status == "untrusted"
+    assert words in found.sentence
+
+
+def test_a_warning_stands_beside_the_number() -> None:
+    notice = Notice("warning", "resolution", "The encoder is ten times coarser than declared")
+    found = headline(fake_analysis("rigid", notices=(notice,)))
+    assert found.status == "caution"
+    assert notice.text in found.details[-1]
+    note = Notice("note", "band", "Band 0.7 to 300 Hz.")
+    assert headline(fake_analysis("rigid", notices=(note,))).status == "safe"
+
+
+def test_a_measurement_that_contradicts_the_model_lowers_the_number() -> None:
+    analysis = fake_analysis()
+    low = 0.8 * analysis.limit.quantile(0.5)
+    analysis.etfe_limit = SimpleNamespace(q05=0.98 * low, q50=low, q95=1.02 * low, reason=None)
+    found = headline(analysis)
+    assert found.status == "caution"
+    number = re.search(r"Stay below ([\d.]+) kN/m", found.sentence)
+    assert number
+    assert 0.97 * low < 1e3 * float(number[1]) <= 0.98 * low
+    assert "do not overlap" in agreement(analysis)
+
+
+def test_an_unstable_or_unlimited_loop_gets_no_number() -> None:
+    analysis = fake_analysis("rigid")
+    samples = analysis.limit.samples.copy()
+    samples[: len(samples) // 10] = 0.0
+    analysis.limit = dataclasses.replace(analysis.limit, samples=samples)
+    found = headline(analysis)
+    assert found.status == "untrusted"
+    assert "10 %" in found.sentence
+    analysis.limit = dataclasses.replace(analysis.limit, samples=np.full_like(samples, np.inf))
+    assert "Nothing limits" in headline(analysis).sentence
+
+
+def test_too_few_draws_are_no_recommendation() -> None:
+    analysis = fake_analysis("rigid")
+    few = slice(0, 100)
+    limit = analysis.limit
+    analysis.limit = dataclasses.replace(
+        limit,
+        samples=limit.samples[few],
+        frequency_hz=limit.frequency_hz[few],
+        group=limit.group[few],
+        chains=1,
+    )
+    assert "too few" in headline(analysis).sentence
+
+
+def test_an_unexplained_remainder_is_said() -> None:
+    closed = SimpleNamespace(analysis=fake_analysis("rigid"), diagnosis={"verdict": "unexplained"})
+    found = headline(closed)
+    assert found.status == "caution"
+    assert "unexplained" in " ".join(found.details)
+
+
+# ---- words and tables
+
+
+def test_the_misfit_is_placed() -> None:
+    analysis = fake_analysis("rigid", misfit=8.0)  # the stand-in's residual sits around 80 Hz
+    text = misfit(analysis)
+    assert "8 times the noise" in text
+    hertz = re.search(r"around ([\d.]+) Hz", text)
+    assert hertz and 55 < float(hertz[1]) < 115
+
+
+def test_remarks_of_the_parameter_table() -> None:
+    analysis = fake_analysis("free", damping=1.0)
+    rows = {row.name: row for row in parameters(analysis)}
+    assert "bound" in rows["b2"].remarks and "±" not in rows["b2"].least_squares
+    dominated = [name for name, yes in analysis.posterior.prior_dominated.items() if yes]
+    assert dominated
+    assert all("the prior decides" in rows[name].remarks for name in dominated)
+    assert "±" in rows["kc"].least_squares and rows["kc"].unit == "kN/m"
+    assert rows["delay_s"].unit == "µs"
+
+
+def test_the_safe_table_has_a_tip_only_where_there_is_one() -> None:
+    assert {len(row) for row in safe(fake_analysis("rigid"))} == {3}
+    tipped = safe(fake_analysis("rigid", device="phantom", lever_m=0.12))
+    assert tipped[0][3].endswith("N/m")
+
+
+def test_witnesses_stand_side_by_side() -> None:
+    analysis = fake_analysis("rigid")
+    found = {witness.key: witness for witness in witnesses(analysis)}
+    assert list(found) == ["posterior", "least_squares", "etfe", "rigid_rule", "passivity"]
+    # Diaz and Gil's rule is the limit of a rigid device to a few per cent.
+    assert found["rigid_rule"].middle == pytest.approx(found["posterior"].middle, rel=0.05)
+    assert found["least_squares"].middle == least_squares_limit(analysis)
+    silent = fake_analysis("rigid", etfe_limit=False)
+    assert "etfe" not in {witness.key for witness in witnesses(silent)}
+    assert "does not reach" in agreement(silent)
+
+
+# ---- what the figures compute
+
+
+def test_third_octaves_hold_pure_noise() -> None:
+    rng = np.random.default_rng(1)
+    frequency = np.geomspace(1.0, 300.0, 20_000)
+    residual = (rng.normal(size=20_000) + 1j * rng.normal(size=20_000)) / np.sqrt(2)
+    bands = third_octaves(frequency, residual)
+    outside = np.mean((bands.rms < bands.low) | (bands.rms > bands.high))
+    assert len(bands.rms) == 25
+    assert outside <= 2 / 25  # 1 % expected
+    assert np.all(np.diff(bands.frequency_hz) > 0)
+    doubled = third_octaves(frequency, 2 * residual)
+    np.testing.assert_allclose(doubled.rms, 2 * bands.rms)
+
+
+def test_ranks_are_flat_for_ensembles_of_one_density_only() -> None:
+    rng = np.random.default_rng(2)
+    chains = rng.normal(size=(4, 500, 32))
+    flat = rank_histogram(chains)
+    np.testing.assert_allclose(flat.mean(axis=1), 1.0)
+    assert np.abs(flat - 1).max() < 5 * np.sqrt(20 / 16_000)  # 5 sd of a share of 1/20
+    chains[0] += 1.0
+    assert rank_histogram(chains)[0, -1] > 1.5
+
+
+def test_the_strongest_pairs_are_shown() -> None:
+    rng = np.random.default_rng(3)
+    draws = rng.normal(size=(4000, 9))
+    draws[:, 7] = draws[:, 2] + 0.1 * rng.normal(size=4000)
+    draws[:, 4] = np.exp(-draws[:, 8]) * (1 + 0.01 * rng.normal(size=4000))
+    matrix = correlation(draws)
+    assert matrix[2, 7] > 0.98 and matrix[4, 8] < -0.98
+    assert strongest(matrix, 4) == [2, 4, 7, 8]
+    assert strongest(correlation(draws[:, :2])) == [0, 1]
+
+
+# ---- the figures as pictures
+
+
+@pytest.fixture
+def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
+    """Every text that matplotlib draws, as it is drawn."""
+    from matplotlib.text import Text
+
+    drawn: list[Any] = []
+    original = Text.draw
+
+    def draw(self: Any, renderer: Any, *rest: Any, **named: Any) -> Any:
+        if self.get_visible() and self.get_text().strip():
+            drawn.append(self)
+        return original(self, renderer, *rest, **named)
+
+    monkeypatch.setattr(Text, "draw", draw)
+    yield drawn
+
+
+@pytest.mark.parametrize("case", ["grasped", "wide", "amperes", "table"])
+def test_no_text_of_a_figure_covers_another_or_is_cut_off(
+    case: str, drawn_texts: list[Any]
+) -> None:
+    analysis = fake_analysis(**CASES[case])
+    for picture in PICTURES:
+        figure = picture.draw(analysis)
+        drawn_texts.clear()
+        figure.canvas.draw()
+        boxes = [(text.get_window_extent(), text.get_text()) for text in drawn_texts]
+        assert len(boxes) > 10, picture.name
+        canvas = figure.bbox
+        for index, (box, text) in enumerate(boxes):
+            inside = (
+                box.x0 > canvas.x0 - 1
+                and box.y0 > canvas.y0 - 1
+                and box.x1 < canvas.x1 + 1
+                and box.y1 < canvas.y1 + 1
+            )
+            assert inside, (picture.name, text)
+            for other, words in boxes[index + 1 :]:
+                wide = min(box.x1, other.x1) - max(box.x0, other.x0)
+                high = min(box.y1, other.y1) - max(box.y0, other.y0)
+                assert wide < 1.5 or high < 1.5, (picture.name, text, words)
+
+
+def test_figures_are_the_same_in_threads_and_need_no_display() -> None:
+    analysis = fake_analysis("rigid")
+    few = [picture for picture in PICTURES if picture.name in ("stiffness", "response", "pairs")]
+    alone = [png(picture.draw(analysis)) for picture in few]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(lambda picture: png(picture.draw(analysis)), 2 * few))
+    assert alone + alone == together
+    assert all(picture.startswith(b"\x89PNG") for picture in alone)
+
+
+# ---- the files
+
+
+@pytest.fixture(scope="module")
+def some_pictures() -> dict[str, bytes]:
+    return draw_pictures(fake_analysis("rigid"))
+
+
+@pytest.fixture
+def drawn_once(monkeypatch: pytest.MonkeyPatch, some_pictures: dict[str, bytes]) -> None:
+    """Reports with pictures from the shelf, for the tests that do not look at them."""
+    monkeypatch.setattr(write, "draw_pictures", lambda analysis: some_pictures)
+
+
+def written(analysis: Any, folder: Path) -> Path:
+    page = write_report(analysis, folder)
+    assert page == folder.resolve() / "report.html"
+    return page
+
+
+@pytest.mark.usefixtures("drawn_once")
+def test_everything_is_written_and_nothing_else(tmp_path: Path) -> None:
+    page = written(fake_analysis("rigid"), tmp_path / "deep" / "out")
+    assert {path.name for path in page.parent.iterdir()} == FILES
+    assert [path.name for path in page.parent.parent.iterdir()] == ["out"]
+    assert json.loads((page.parent / "summary.json").read_text(encoding="utf-8"))["version"]
+
+
+@pytest.mark.usefixtures("drawn_once")
+def test_a_second_report_replaces_the_first_and_leaves_other_files(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    written(fake_analysis("rigid"), tmp_path)
+    written(fake_analysis("rigid", title="another.csv", device=None), tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == FILES | {"mine.txt"}
+    assert "another.csv" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("drawn_once")
+@pytest.mark.parametrize("there", [True, False], ids=["over an older report", "new"])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError("disk full")])
+def test_an_interrupted_report_leaves_nothing_half_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: bool, error: Any
+) -> None:
+    out = tmp_path / "out"
+    analysis = fake_analysis("rigid")
+    before = {}
+    if there:
+        written(analysis, out)
+        before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def fail(result: Any) -> str:
+        raise error
+
+    monkeypatch.setattr(write, "summary_json", fail)
+    with pytest.raises(type(error) if isinstance(error, OSError) else error):
+        write_report(fake_analysis("free"), out)
+    assert out.exists() == there
+    if there:
+        assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert [path.name for path in tmp_path.iterdir()] == (["out"] if there else [])
+
+
+@pytest.mark.usefixtures("drawn_once")
+def test_a_file_is_not_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(InputError, match="is a file; name a folder"):
+        write_report(fake_analysis("rigid"), tmp_path / "out")
+
+
+# ---- the page
+
+
+def test_the_page_is_one_light_file_without_scripts_and_links(tmp_path: Path) -> None:
+    page = written(fake_analysis(notices=(FEEDBACK, FEEDBACK)), tmp_path)
+    text = page.read_text(encoding="utf-8")
+    assert page.stat().st_size < 2_000_000
+    assert "<script" not in text and "<link" not in text and "javascript:" not in text
+    assert not re.findall(r'(?:src|href|srcset)="(?!data:image/png;base64,)', text)
+    assert "url(" not in text and "@import" not in text and "http:" not in text
+    assert "default-src 'none'" in text
+    assert text.count(FEEDBACK.text) == 1  # said once, however often it was noticed
+    for picture in PICTURES:
+        assert f'alt="{picture.alternative}"' in html.unescape(text)
+
+
+@pytest.mark.usefixtures("drawn_once")
+def test_names_from_files_cannot_become_markup(tmp_path: Path) -> None:
+    page = written(fake_analysis("rigid", device=None, title="<b>x</b> & y.csv"), tmp_path)
+    text = page.read_text(encoding="utf-8")
+    assert "<b>x</b>" not in text
+    assert "&lt;b&gt;x&lt;/b&gt; &amp; y.csv" in text
+
+
+@pytest.mark.usefixtures("drawn_once")
+def test_an_untrusted_page_calls_nothing_safe(tmp_path: Path) -> None:
+    text = written(fake_analysis(**CASES["amperes"]), tmp_path).read_text(encoding="utf-8")
+    visible = re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL)
+    assert "Safe stiffness" not in visible
+    assert "if the model were right" in visible
+    assert "not to be relied on" in visible
+
+
+@needs_browser
+@pytest.mark.usefixtures("drawn_once")
+@pytest.mark.parametrize("case", ["feedback", "phantom-tip"])
+def test_the_page_in_a_browser(case: str, tmp_path: Path) -> None:
+    page = written(fake_analysis(**CASES[case]), tmp_path / "out")
+    for width in (1200, 520):
+        found = probe(page, tmp_path, width)
+        assert found["texts"] > 200
+        assert found["overlaps"] == []
+        assert found["width"] <= found["window"], "the page scrolls sideways"
+        assert all(name.startswith("data:") for name in found["requests"])
+        assert len(found["images"]) == len(PICTURES)
+        assert all(natural > 300 and 0 < shown <= width for _, natural, shown in found["images"])
+
+
+@needs_browser
+@pytest.mark.usefixtures("drawn_once")
+def test_the_page_as_a_picture_and_on_paper(tmp_path: Path) -> None:
+    from matplotlib.image import imread
+
+    page = written(fake_analysis("rigid"), tmp_path / "out")
+    shot, paper = tmp_path / "page.png", tmp_path / "page.pdf"
+    run(tmp_path, "--window-size=1200,1600", f"--screenshot={shot}", page.as_uri())
+    run(tmp_path, f"--print-to-pdf={paper}", page.as_uri())
+    picture = imread(shot)[..., :3]
+    assert picture.shape[1] == 1200
+    # Ink on every fifth of the first screen, and white space too: laid out, not blank, not a blot.
+    for part in np.array_split(picture, 5):
+        assert 0.005 < np.mean(part < 0.9) < 0.6
+    pages = paper.read_bytes().count(b"/Type /Page\n") or paper.read_bytes().count(b"/Type/Page/")
+    assert paper.stat().st_size > 50_000
+    assert pages <= 12
