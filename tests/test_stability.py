@@ -11,6 +11,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.models import Model, build_model, draw
 from bayeshaptic.models.mechanism import Link, Mechanism
 from bayeshaptic.models.system import LinearSystem
+from bayeshaptic.rig import Bench, critical_limit
 from bayeshaptic.stability import (
     confirms,
     critical_stiffness,
@@ -128,6 +129,17 @@ def test_system_that_says_it_is_not_rational_takes_the_fine_grid():
     assert find_crossings(other, T).critical == pytest.approx(
         find_crossings(system, T).critical, rel=1e-9
     )
+
+
+@pytest.mark.parametrize("delay", [0.0, 2e-4, 1.7e-3])
+@pytest.mark.parametrize(("device", "name"), CASES)
+def test_limit_of_the_virtual_bench(device, name, delay):
+    """The bench closes its own loop, and shares no code with the models."""
+    model = build_model(name, device, delay_s=delay)
+    limit = critical_stiffness(model)
+    truth = critical_limit(Bench.from_device(device, mechanism=name, delay_s=delay))
+    assert limit.value == pytest.approx(truth.stiffness, rel=1e-6)
+    assert limit.frequency_hz[0] == pytest.approx(truth.frequency_hz, rel=1e-4)
 
 
 # ---------------------------------------------------------------- corners

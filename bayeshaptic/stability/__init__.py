@@ -3,6 +3,7 @@
 from bayeshaptic.stability.binding import BindingCrossing
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.crossings import Crossings, find_crossings
+from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.stability.rules import (
     ground_damping,
     passivity_limit,
@@ -15,8 +16,10 @@ __all__ = [
     "BindingCrossing",
     "CriticalStiffness",
     "Crossings",
+    "EtfeCriticalStiffness",
     "confirms",
     "critical_stiffness",
+    "etfe_critical_stiffness",
     "find_crossings",
     "ground_damping",
     "passivity_limit",

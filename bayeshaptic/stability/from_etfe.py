@@ -1,0 +1,205 @@
+"""The critical stiffness read from the measured response itself, with no model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.stability.local_fit import LocalFit, ResponseData, local_fit, response_data
+
+Floats = NDArray[np.float64]
+
+DRAWS = 4000
+_STEP = 0.03  # relative distance of the places where the phase is looked at
+_PLAUSIBLE = 1.0  # standard deviations from -180 degrees from which a stretch counts at all
+_CERTAIN = 2.5  # and from which it counts in every draw
+_POINTS = 201
+_ENOUGH = 0.95  # share of draws with a crossing inside the band that an interval needs
+
+
+@dataclass(frozen=True)
+class EtfeCriticalStiffness:
+    """Model-free critical stiffness of a measurement.
+
+    Attributes
+    ----------
+    q05, q50, q95 : float or None
+        Quantiles of K_CR over the ETFE's own noise, in `unit`; None where it cannot be read.
+    frequency_hz : float or None
+        Median frequency of the binding crossing.
+    unit : str
+    reason : str or None
+        Why there is no number.
+    caveat : str or None
+        Where the phase may cross too, by less than its noise; this is not in the numbers.
+    samples : ndarray, shape (n,)
+        K_CR of each draw of the noise; inf where it has no crossing inside the band.
+    """
+
+    q05: float | None
+    q50: float | None
+    q95: float | None
+    frequency_hz: float | None
+    unit: str
+    reason: str | None = None
+    caveat: str | None = None
+    samples: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
+
+
+class _Run(NamedTuple):
+    """Neighbouring places on one side of -180 degrees: from `start` up to but without `stop`.
+
+    `strength` is the largest distance from -180 degrees, in standard deviations and signed.
+    """
+
+    start: int
+    stop: int
+    strength: float
+
+
+def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> EtfeCriticalStiffness:
+    """Smallest -Re(1/G) over the frequencies of the band where the measured G is real and negative.
+
+    The response is fitted by cubics, each over a span of windows where a quintic is no better.
+    The phase crosses between two stretches of the band that lie on either side of -180
+    degrees.  The coefficients of the cubics at the crossings are drawn from their covariance, and
+    the lowest crossing of each draw is read off.  A stretch that is on its side by no more than
+    noise counts with its neighbours: in all draws below 1 standard deviation, in half of them
+    below 2.5.
+
+    Parameters
+    ----------
+    etfe : Etfe
+    seed : int
+        Of the random numbers.
+    draws : int
+
+    Returns
+    -------
+    EtfeCriticalStiffness
+        Without numbers, and with the reason, where the phase does not reach -180 degrees inside
+        the band.  Crossings outside the band (and the one at the Nyquist frequency) are not seen:
+        the true limit may be lower.
+    """
+    data = response_data(etfe)
+    low, high = etfe.band_hz
+    count = max(int(np.log(high / low) / _STEP), 2)
+    fits = [fit for hz in np.geomspace(low, high, count) if (fit := local_fit(data, hz))]
+    band = f"{low:.4g} and {high:.4g} Hz"
+
+    def missing(reason: str) -> EtfeCriticalStiffness:
+        return EtfeCriticalStiffness(None, None, None, None, etfe.stiffness_unit, reason)
+
+    if len(fits) < 2:
+        return missing(f"the response is too noisy between {band}")
+    value = np.array([fit.inverse for fit in fits])
+    noise = np.array([fit.relative_sd for fit in fits]) * np.abs(value)
+    certain, _ = _runs(value.imag / noise, _CERTAIN)
+    plausible, doubtful = _runs(value.imag / noise, _PLAUSIBLE)
+    if certain[0].strength < 0 and value[certain[0].start].real < 0:
+        return missing(f"the phase is beyond -180 degrees at {fits[0].centre_hz:.3g} Hz already")
+    rng = np.random.default_rng(seed)
+    halves = [_samples(data, fits, runs, rng, draws // 2) for runs in (certain, plausible)]
+    samples, where = np.concatenate(halves, axis=1)
+    crosses = np.isfinite(samples)
+    if not crosses.any():
+        return missing(f"the phase does not reach -180 degrees between {band}")
+    if crosses.mean() < _ENOUGH:
+        share = f"{100 * crosses.mean():.0f} % of the draws of its noise"
+        return missing(f"the phase reaches -180 degrees between {band} in {share} only")
+    q05, q50, q95 = (float(q) for q in np.quantile(samples[crosses], [0.05, 0.5, 0.95]))
+    middle = float(np.median(where[crosses]))
+    caveat = _caveat(fits, doubtful, q05, etfe.stiffness_unit)
+    return EtfeCriticalStiffness(q05, q50, q95, middle, etfe.stiffness_unit, None, caveat, samples)
+
+
+def _runs(side: Floats, threshold: float) -> tuple[list[_Run], list[_Run]]:
+    """Stretches on one side of -180 degrees, and those that were too weak to count.
+
+    `side` is the distance from -180 degrees in standard deviations.  The weakest stretch joins
+    its neighbours until all that are left reach the threshold.
+    """
+
+    def run(start: int, stop: int) -> _Run:
+        part = side[start:stop]
+        return _Run(start, stop, float(part[np.abs(part).argmax()]))
+
+    cuts = np.flatnonzero(np.signbit(side[1:]) != np.signbit(side[:-1])) + 1
+    edges = [0, *cuts.tolist(), len(side)]
+    runs = [run(start, stop) for start, stop in zip(edges[:-1], edges[1:], strict=True)]
+    doubtful = []
+    while len(runs) > 1:
+        weakest = min(range(len(runs)), key=lambda n: abs(runs[n].strength))
+        if abs(runs[weakest].strength) >= threshold:
+            break
+        doubtful.append(runs[weakest])
+        first, last = max(weakest - 1, 0), min(weakest + 1, len(runs) - 1)
+        runs[first : last + 1] = [run(runs[first].start, runs[last].stop)]
+    return runs, doubtful
+
+
+def _samples(
+    data: ResponseData, fits: list[LocalFit], runs: list[_Run], rng: np.random.Generator, draws: int
+) -> tuple[Floats, Floats]:
+    """Lowest K of all crossings between the runs, and its frequency; inf and nan without one."""
+    lowest, where = np.full(draws, np.inf), np.full(draws, np.nan)
+    for left, right in zip(runs[:-1], runs[1:], strict=True):
+        if min(fits[left.stop - 1].inverse.real, fits[right.start].inverse.real) < 0:
+            stiffness, frequency = _lowest_crossing(data, fits, left, right, rng, draws)
+            where = np.where(stiffness < lowest, frequency, where)
+            lowest = np.minimum(stiffness, lowest)
+    return lowest, where
+
+
+def _lowest_crossing(
+    data: ResponseData,
+    fits: list[LocalFit],
+    left: _Run,
+    right: _Run,
+    rng: np.random.Generator,
+    draws: int,
+) -> tuple[Floats, Floats]:
+    """Lowest K between the middles of two runs, and its frequency, for each draw of the noise.
+
+    inf and nan where a draw has no crossing there.
+    """
+    before, after = fits[left.stop - 1], fits[right.start]
+    share = before.inverse.imag / (before.inverse - after.inverse).imag
+    centre = before.centre_hz + share * (after.centre_hz - before.centre_hz)
+    fit = local_fit(data, centre) or before
+    low = max(fits[(left.start + left.stop) // 2].centre_hz, fit.low_hz)
+    high = min(fits[(right.start + right.stop) // 2].centre_hz, fit.high_hz)
+    frequency = np.linspace(min(low, before.centre_hz), max(high, after.centre_hz), _POINTS)
+    inverse = fit.draws(rng, draws, frequency)
+    early, late = inverse[:, :-1], inverse[:, 1:]
+    change = np.signbit(early.imag) != np.signbit(late.imag)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = np.where(change, early.imag / (early.imag - late.imag), 0.0)
+    stiffness = -(early.real + part * (late.real - early.real))
+    stiffness = np.where(change & (stiffness > 0), stiffness, np.inf)
+    pick = stiffness.argmin(axis=1)
+    each = np.arange(draws)
+    lowest = stiffness[each, pick]
+    where = frequency[pick] + part[each, pick] * (frequency[1] - frequency[0])
+    return lowest, np.where(np.isfinite(lowest), where, np.nan)
+
+
+def _caveat(fits: list[LocalFit], doubtful: list[_Run], lowest: float, unit: str) -> str | None:
+    """A sentence on the lowest crossing that the noise may hide or feign; None without one."""
+    places = [
+        (-fits[n].inverse.real, fits[n].centre_hz)
+        for run in doubtful
+        for n in (run.start, run.stop - 1)
+        if 0 < -fits[n].inverse.real < lowest
+    ]
+    if not places:
+        return None
+    stiffness, frequency = min(places)
+    return (
+        f"near {frequency:.3g} Hz the phase is nearer to -180 degrees than its noise; if it "
+        f"crosses there, the limit is {stiffness:.3g} {unit}"
+    )
