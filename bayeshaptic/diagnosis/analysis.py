@@ -131,6 +131,53 @@ def analyse(
         Where the measurement cannot be used, or the model does not fit it in kind.
     """
     report = progress or (lambda share, word: None)
+    begun = begin(
+        measurement,
+        model,
+        device,
+        delay_s,
+        delay_sd_s,
+        band_hz,
+        prior,
+        held,
+        lever_m,
+        seed,
+        report,
+    )
+    return finish(begun, begun.etfe, begun.fit, ess=ess, seed=seed, progress=report)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A measurement with a base model fitted to it: what an analysis, or the loop, begins with.
+
+    Attributes are those of `Analysis`.
+    """
+
+    etfe: Etfe
+    device: Device | None
+    fit: Fit
+    choice: Choice | None
+    notices: tuple[Notice, ...]
+    seconds: dict[str, float]
+    lever_m: float | None
+
+
+def begin(
+    measurement: Recording | Etfe,
+    model: str | Model = "auto",
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    band_hz: tuple[float, float] | None = None,
+    prior: Mapping[str, Prior] | None = None,
+    held: bool | None = None,
+    lever_m: float | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Begun:
+    """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
+    report = progress or (lambda share, word: None)
     clock = _Clock()
     if isinstance(device, str):
         device = load_device(device)
@@ -146,10 +193,36 @@ def analyse(
             etfe = estimate_etfe(measurement, band_hz)
     else:
         etfe = measurement
-    notices += etfe.notices
     with clock.stage("least squares"):
         report(0.06, "fitting")
         fit, choice = _fit(etfe, model, device, delay_s, delay_sd_s, dict(prior or {}), held, seed)
+    if lever_m is None and device is not None:
+        lever_m = device.lever_m
+    return Begun(etfe, device, fit, choice, notices + etfe.notices, clock.seconds, lever_m)
+
+
+def finish(
+    begun: Begun,
+    etfe: Etfe,
+    fit: Fit,
+    ess: float = REPORT_ESS,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Sample a fit's posterior and find its critical stiffness.
+
+    Parameters
+    ----------
+    begun : Begun
+    etfe : Etfe
+        The measurement's, or what the loop made of it.
+    fit : Fit
+        Of the base model, or of the model with its effects.
+    ess, seed, progress
+        As in `analyse`.
+    """
+    report = progress or (lambda share, word: None)
+    clock = _Clock(dict(begun.seconds))
     scale = fit.reduced_chi_square if fit.reduced_chi_square > MISFIT else 1.0
     with clock.stage("sampling"):
         posterior = sample(
@@ -168,17 +241,17 @@ def analyse(
     return Analysis(
         recording=etfe.recording,
         etfe=etfe,
-        device=device,
+        device=begun.device,
         model=fit.model,
-        choice=choice,
+        choice=begun.choice,
         fit=fit,
         posterior=posterior,
         limit=limit,
         etfe_limit=etfe_limit,
-        notices=notices + limit.notices + _misfit_notice(scale),
+        notices=begun.notices + limit.notices + _misfit_notice(scale),
         seconds=clock.seconds,
         noise_scale=scale,
-        lever_m=lever_m if lever_m is not None else (device.lever_m if device else None),
+        lever_m=begun.lever_m,
     )
 
 

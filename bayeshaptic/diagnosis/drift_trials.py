@@ -11,11 +11,12 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from bayeshaptic.diagnosis.state import CHOOSE, FIT, Accepted, Estimate, State, Trial, share
 from bayeshaptic.effects.gain import Gain
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.least_squares import polish, summarise
+from bayeshaptic.inference.least_squares import least_squares, polish, summarise
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
@@ -27,6 +28,7 @@ Floats = NDArray[np.float64]
 
 PARTS = 3
 _SHORTEST_S = 5.0
+_GAIN_PART_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -98,10 +100,38 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         estimates,
     )
     changed = state
-    if gains[1] > 8:
+    if gains[1] > 8 and kind is _GAIN:
+        changed = _with_steady_gain(state, narrow, start)
+    elif gains[1] > 8:
         changed = _on_part(state, parts[worst], dict(zip(narrow.names, found[worst], strict=True)))
     changed = replace(changed, accepted=(*state.accepted, accepted))
     return Trial(accepted, changed, float(gains[0]), float(gains[1]), size)
+
+
+def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> State:
+    """The recording with its command scaled by the gain found over time.
+
+    The gain is set to one where it is largest: there the loop is nearest to instability, and the
+    critical stiffness in units of the command is lowest.
+    """
+    recording = state.etfe.recording
+    assert recording is not None
+    count = int(np.clip(recording.duration_s / _GAIN_PART_S, PARTS, 12))
+    edges = np.linspace(0, recording.samples, count + 1).astype(int)
+    gains = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        part = estimate_etfe(recording.part(a, b), state.etfe.band_hz, minimum_lines=12)
+        windows = compress(part, state.fit.response)
+        gains.append(float(polish(narrow, windows, np.array([start["gain"]]))[0]))
+    centres = 0.5 * (edges[:-1] + edges[1:])
+    course = CubicSpline(centres, gains, bc_type="natural")
+    ends = [course(centres[0]) - course(centres[0], 1) * (centres[0] - edges[0])]
+    ends.append(course(centres[-1]) + course(centres[-1], 1) * (edges[-1] - centres[-1]))
+    times = np.concatenate([[edges[0]], centres, [edges[-1]]])
+    gain = np.interp(np.arange(recording.samples), times, [ends[0], *gains, ends[1]])
+    steady = replace(recording, force=recording.force * gain / gain.max())
+    etfe = estimate_etfe(steady, state.etfe.band_hz)
+    return replace(state, etfe=etfe, fit=least_squares(state.model, etfe, start=state.fit.theta))
 
 
 def _on_part(state: State, part: Etfe, found: dict[str, float]) -> State:

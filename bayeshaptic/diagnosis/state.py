@@ -54,6 +54,8 @@ class Accepted:
         Effects that this recording cannot tell from it.
     told_apart_by : str
         The measurement that would.
+    limit_log_sd : float
+        What the uncertainty of the effect adds to log K_CR, as a standard deviation.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Accepted:
     parameters: tuple[str, ...] = ()
     ties: tuple[str, ...] = ()
     told_apart_by: str = ""
+    limit_log_sd: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,213 @@
+"""A closed loop: the analysis with what explains the residual, and the error before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.analysis import (
+    REPORT_ESS,
+    Analysis,
+    Progress,
+    begin,
+    finish,
+)
+from bayeshaptic.diagnosis.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.loop import Traced, trace
+from bayeshaptic.diagnosis.state import REPORT, Accepted, share
+from bayeshaptic.errors import Notice
+from bayeshaptic.inference.least_squares import Fit, polish
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models import Model, Prior
+from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.recording import Recording
+
+_BEFORE_ESS = 1000
+
+
+@dataclass(frozen=True)
+class Closed:
+    """The result of closing the loop on one measurement.
+
+    Attributes
+    ----------
+    base : Analysis
+        With the model as declared.
+    analysis : Analysis
+        With the accepted effects, and the limit widened by what is unexplained.
+    traced : Traced
+    before, after : mapping
+        Errors in the form of ``summary.json``.
+    """
+
+    base: Analysis
+    analysis: Analysis
+    traced: Traced
+    before: Mapping[str, Any]
+    after: Mapping[str, Any]
+
+    @property
+    def model(self) -> Model:
+        """The model with its linear effects."""
+        return self.analysis.model
+
+    @property
+    def effects(self) -> tuple[Accepted, ...]:
+        """What was found, in the order in which it was accepted."""
+        return self.traced.state.accepted
+
+    @property
+    def verdict(self) -> str:
+        """ "consistent", "explained" or "unexplained"."""
+        return self.traced.verdict
+
+    @property
+    def diagnosis(self) -> dict[str, Any]:
+        """In the form of ``summary.json``."""
+        posterior = self.analysis.posterior.summary()
+        return {
+            "verdict": self.traced.verdict,
+            "residual_class": self.traced.residual_class,
+            "effects": [_effect(effect, posterior) for effect in self.effects],
+            "candidates": [
+                {"name": c.name, "score": c.score, "accepted": c.accepted}
+                for c in self.traced.candidates
+            ],
+        }
+
+
+def close_loop(
+    model: str | Model,
+    measurement: Recording | Etfe,
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    band_hz: tuple[float, float] | None = None,
+    prior: Mapping[str, Prior] | None = None,
+    held: bool | None = None,
+    lever_m: float | None = None,
+    ess: float = REPORT_ESS,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Closed:
+    """Find what the model lacks, add it, and analyse again.
+
+    Parameters
+    ----------
+    model : {"auto", "rigid", "free", "grasped"} or Model
+    measurement : Recording or Etfe
+    device, delay_s, delay_sd_s, band_hz, prior, held, lever_m, ess, seed, progress
+        As in `bayeshaptic.analyse`.
+
+    Returns
+    -------
+    Closed
+
+    Raises
+    ------
+    InputError
+        Where the measurement cannot be used.
+    """
+    report = progress or (lambda part, word: None)
+    begun = begin(
+        measurement,
+        model,
+        device,
+        delay_s,
+        delay_sd_s,
+        band_hz,
+        prior,
+        held,
+        lever_m,
+        seed,
+        lambda part, word: report(0.3 * part, word),
+    )
+    traced = trace(begun.etfe, begun.fit, lambda word: report(0.15, f"trying {word}"))
+    changed = bool(traced.state.accepted)
+    state = traced.state
+    base = finish(
+        begun,
+        begun.etfe,
+        begun.fit,
+        ess=_BEFORE_ESS if changed else ess,
+        seed=seed,
+        progress=lambda part, word: report(0.4 + 0.2 * part, word),
+    )
+    analysis = base
+    if changed:
+        analysis = finish(
+            begun,
+            state.etfe,
+            state.fit,
+            ess=ess,
+            seed=seed,
+            progress=lambda part, word: report(0.6 + 0.3 * part, word),
+        )
+    limit = with_discrepancy(analysis.limit, analysis.posterior, state.fit, traced, seed)
+    notices = analysis.notices + _notices(traced)
+    analysis = replace(analysis, limit=limit, notices=notices)
+    return Closed(base, analysis, traced, _error(base), _error(analysis))
+
+
+def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    keys = ("mean", "sd", "q05", "q50", "q95", "unit")
+    parameters = {name: {k: posterior[name][k] for k in keys} for name in effect.parameters}
+    for name, estimate in effect.estimates.items():
+        sd = estimate.sd if np.isfinite(estimate.sd) else None
+        reach = 1.6449 * sd if sd is not None else 0.0
+        parameters[name] = {
+            "mean": estimate.mean,
+            "sd": sd,
+            "q05": estimate.mean - reach,
+            "q50": estimate.mean,
+            "q95": estimate.mean + reach,
+            "unit": estimate.unit,
+        }
+    return {
+        "name": effect.name,
+        "title": effect.title,
+        "parameters": parameters,
+        "evidence": effect.evidence,
+        "ties": list(effect.ties),
+    }
+
+
+def _error(analysis: Analysis) -> dict[str, Any]:
+    """How far the model is from the measurement."""
+    fit, etfe = analysis.fit, analysis.etfe
+    ratio = fit.response(etfe.frequency_hz) / etfe.value
+    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
+    own = analysis.etfe_limit.q50
+    with np.errstate(divide="ignore", invalid="ignore"):
+        db = 20 * np.log10(q50 / own) if own else None
+    return {
+        "weighted_rms": float(np.sqrt(fit.reduced_chi_square)),
+        "held_out_weighted_rms": held_out_rms(fit),
+        "gain_db_rms": float(np.sqrt(np.mean((20 * np.log10(np.abs(ratio))) ** 2))),
+        "phase_deg_rms": float(np.sqrt(np.mean(np.degrees(np.angle(ratio)) ** 2))),
+        "critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)},
+        "critical_stiffness_db": float(db) if db is not None and np.isfinite(db) else None,
+    }
+
+
+def held_out_rms(fit: Fit) -> float:
+    """Weighted rms on a quarter of the windows, with the model fitted to the others; 1 is noise."""
+    out = share(fit.windows, REPORT)
+    theta = polish(fit.model, fit.windows.part(~out), fit.theta)
+    left = Likelihood(fit.model, fit.windows.part(out)).normalised(theta[None])[0]
+    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
+
+
+def _notices(traced: Traced) -> tuple[Notice, ...]:
+    if traced.verdict != "unexplained":
+        return ()
+    left = max((test for test in traced.after if test.flagged), key=lambda test: test.excess)
+    text = (
+        f"The residual is not explained ({traced.residual_class}): {left.text}. The critical "
+        "stiffness is widened by what remains; treat its upper half with suspicion."
+    )
+    return (Notice("warning", "unexplained", text),)

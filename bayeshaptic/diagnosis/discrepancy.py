@@ -1,0 +1,182 @@
+"""Widening the critical stiffness by what remains unexplained, so that its interval stays true.
+
+A linear remainder multiplies the response by exp(delta), delta a complex Gaussian process over log
+frequency whose size and smoothness the residual itself decides (M. C. Kennedy and A. O'Hagan,
+"Bayesian calibration of computer models", J. R. Statist. Soc. B 63, 2001).  A nonlinear remainder
+would invent crossings there; it widens the limit downwards instead, and keeps its upper end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.diagnosis.loop import UNEXPLAINED, Traced
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.models.structures import GROUND_DAMPERS
+from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+_DRAWS = 2000
+_GRID = 1500
+_SIZES = np.geomspace(3e-4, 1.0, 12)
+_LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
+_BY_VELOCITY = {"sign(v)", "v|v|", "v^3"}
+_DAMPING_LEFT = 0.2  # of the damping, if most of it is friction that was fitted as damping
+_LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
+
+
+def with_discrepancy(
+    limit: CriticalStiffness, posterior: Posterior, fit: Fit, traced: Traced, seed: int = 0
+) -> CriticalStiffness:
+    """The limit with the spread of accepted effects and of what is unexplained."""
+    rng = np.random.default_rng(seed)
+    spread = np.sqrt(sum(effect.limit_log_sd**2 for effect in traced.state.accepted))
+    if spread > 0:
+        factor = np.exp(spread * rng.standard_normal(len(limit.samples)))
+        limit = replace(limit, samples=limit.samples * factor)
+    if traced.verdict != UNEXPLAINED:
+        return limit
+    families = {test.family for test in traced.after if test.flagged}
+    if "linear" in families:
+        limit = _with_linear(limit, posterior, fit, rng)
+    for family in sorted(families - {"linear"}):
+        width = _downwards(fit, traced, family)
+        factor = np.exp(-width * rng.uniform(size=len(limit.samples)))
+        limit = replace(limit, samples=limit.samples * factor)
+    return limit
+
+
+def _downwards(fit: Fit, traced: Traced, family: str) -> float:
+    """How far down, in log stiffness, a remainder of another class may take the limit."""
+    here = critical_stiffness(fit.model, fit.theta).value
+    others = [
+        critical_stiffness(trial.state.model, trial.state.fit.theta).value
+        for trial in traced.rejected
+        if trial.accepted.family == family
+    ]
+    raised = {test.name for test in traced.after if test.flagged}
+    if raised & _BY_VELOCITY:
+        damped = np.array([n in GROUND_DAMPERS for n in fit.model.names])
+        less = np.where(damped, _DAMPING_LEFT * fit.theta, fit.theta)
+        others.append(critical_stiffness(fit.model, less).value)
+    lowest = min([here, *others])
+    return max(_LEAST[family], float(np.log(here / max(lowest, 1e-3 * here))))
+
+
+@dataclass(frozen=True)
+class _Deviation:
+    """Relative deviation of the measured response from the model, window by window."""
+
+    log_f: Floats
+    value: Complexes
+    variance: Floats
+
+
+def _deviation(fit: Fit) -> _Deviation:
+    windows = fit.windows
+    g = fit.response(windows.frequency_hz.ravel()).reshape(windows.frequency_hz.shape)
+    column = np.einsum("wij,wj->wi", windows.design, g)
+    size = np.sum(np.abs(column) ** 2, axis=1)
+    noise = np.sqrt(fit.likelihood.noise_variance)[:, None]
+    left = fit.residual.reshape(windows.target.shape) * noise
+    value = np.sum(column.conj() * left, axis=1) / size
+    log_f = np.log10(windows.frequency_hz.mean(axis=1))
+    return _Deviation(log_f, value, fit.likelihood.noise_variance / size)
+
+
+def _matern(distance: Floats, length: float) -> Floats:
+    scaled = np.sqrt(3) * np.abs(distance) / length
+    return (1 + scaled) * np.exp(-scaled)
+
+
+def _draws_of_deviation(
+    found: _Deviation, at: Floats, count: int, rng: np.random.Generator
+) -> Complexes:
+    """Draws of delta at log frequencies `at`, over sizes and lengths by their evidence."""
+    between = found.log_f[:, None] - found.log_f[None, :]
+    cases = []
+    for length in _LENGTHS:
+        shape = _matern(between, length)
+        for size in _SIZES:
+            root = np.linalg.cholesky(size**2 * shape + np.diag(found.variance))
+            white = np.linalg.solve(root, found.value)
+            # A complex variable: half of the variance in each part.
+            evidence = -float(np.sum(np.abs(white) ** 2)) - 2 * float(np.log(np.diag(root)).sum())
+            cases.append((evidence, size, length))
+    logs = np.array([case[0] for case in cases])
+    weight = np.exp(logs - logs.max())
+    picked = rng.multinomial(count, weight / weight.sum())
+    parts = []
+    for (_, size, length), number in zip(cases, picked, strict=True):
+        if number == 0:
+            continue
+        own = size**2 * _matern(between, length) + np.diag(found.variance)
+        cross = size**2 * _matern(at[:, None] - found.log_f[None, :], length)
+        back = np.linalg.solve(own, cross.T).T
+        mean = back @ found.value
+        cover = size**2 * _matern(at[:, None] - at[None, :], length) - back @ cross.T
+        values, vectors = np.linalg.eigh(cover)
+        root = vectors * np.sqrt(np.maximum(values, 0))
+        normal = rng.standard_normal((2, len(at), number))
+        parts.append(mean[:, None] + root @ (normal[0] + 1j * normal[1]) / np.sqrt(2))
+    return np.concatenate(parts, axis=1).T
+
+
+def _with_linear(
+    limit: CriticalStiffness, posterior: Posterior, fit: Fit, rng: np.random.Generator
+) -> CriticalStiffness:
+    """Crossings of G exp(delta) over draws of both."""
+    period = fit.model.period_s
+    assert period is not None
+    frequency = np.geomspace(0.05 * fit.frequency_hz.min(), 0.5 / period, _GRID)
+    found = _deviation(fit)
+    # Below the band the mechanism alone speaks; above it the deviation may go on.
+    beyond = np.arange(found.log_f[-1] + 0.05, np.log10(frequency[-1]), 0.05)
+    knots = np.concatenate([found.log_f, beyond])
+    delta = _draws_of_deviation(found, knots, _DRAWS, rng)
+    rng.shuffle(delta)
+    knots = np.concatenate([[knots[0] - 0.1], knots])
+    delta = np.concatenate([np.zeros((_DRAWS, 1)), delta], axis=1)
+    pick = rng.integers(len(posterior.draws), size=_DRAWS)
+    samples, places = np.empty(_DRAWS), np.empty(_DRAWS)
+    log_f = np.log10(frequency)
+    step = 100
+    for start in range(0, _DRAWS, step):
+        rows = slice(start, start + step)
+        g = fit.model.response(posterior.draws[pick[rows]], frequency)
+        bent = np.stack(  # interpolated over log frequency
+            [
+                np.interp(log_f, knots, d.real) + 1j * np.interp(log_f, knots, d.imag)
+                for d in delta[rows]
+            ]
+        )
+        samples[rows], places[rows] = _lowest_crossing(g * np.exp(bent), frequency)
+    kept = np.isfinite(samples)
+    samples, places = samples[kept], places[kept]
+    centres = np.log([c.frequency_hz or 1e-9 for c in limit.crossings])
+    group = np.argmin(np.abs(np.log(places)[:, None] - centres[None, :]), axis=1)
+    crossings = tuple(
+        replace(c, probability=float(np.mean(group == i))) for i, c in enumerate(limit.crossings)
+    )
+    return replace(
+        limit, samples=samples, frequency_hz=places, group=group, crossings=crossings, chains=1
+    )
+
+
+def _lowest_crossing(g: Complexes, frequency: Floats) -> tuple[Floats, Floats]:
+    """Smallest -1/Re G where Im G changes sign with Re G negative; inf where it never does."""
+    inverse = -1 / g
+    before, after = inverse[:, :-1], inverse[:, 1:]
+    share = before.imag / (before.imag - after.imag)
+    stiffness = before.real + share * (after.real - before.real)
+    turns = (before.imag * after.imag <= 0) & (stiffness > 0)
+    stiffness = np.where(turns, stiffness, np.inf)
+    index = np.argmin(stiffness, axis=1)
+    rows = np.arange(len(g))
+    return stiffness[rows, index], frequency[index]

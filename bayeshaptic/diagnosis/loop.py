@@ -1,0 +1,177 @@
+"""Closing the loop: find the residual, trace it, add what explains it, and look again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from bayeshaptic.diagnosis.columns import nonlinear_tests
+from bayeshaptic.diagnosis.drift import drift_tests
+from bayeshaptic.diagnosis.drift_trials import drift_trials
+from bayeshaptic.diagnosis.linear_trials import linear_trials
+from bayeshaptic.diagnosis.nonlinear_trials import nonlinear_trials
+from bayeshaptic.diagnosis.residual import Test, frequency_tests
+from bayeshaptic.diagnosis.state import State, Trial
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.recordings.etfe import Etfe
+
+ROUNDS = 3
+_TIE = 6.0  # difference of scores that one recording does not decide
+CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
+Tick = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate effect in the record of the loop.
+
+    Attributes
+    ----------
+    name, title : str
+    score : float
+        Gain in log likelihood on windows that took no part in the fit, less two a parameter.
+    accepted : bool
+    round : int
+        From 1.
+    """
+
+    name: str
+    title: str
+    score: float
+    accepted: bool
+    round: int
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What the loop found.
+
+    Attributes
+    ----------
+    verdict : {"consistent", "explained", "unexplained"}
+    residual_class : str or None
+        Class of what remains ("unexplained"), else of the first effect found.
+    state : State
+        Measurement, model and fit with the accepted effects.
+    before, after : tuple of Test
+        The tests of the residual before and after.
+    candidates : tuple of Candidate
+    rejected : tuple of Trial
+        Trials of the last round that were good but not accepted: how else it could be.
+    """
+
+    verdict: str
+    residual_class: str | None
+    state: State
+    before: tuple[Test, ...]
+    after: tuple[Test, ...]
+    candidates: tuple[Candidate, ...] = ()
+    rejected: tuple[Trial, ...] = ()
+
+
+def residual_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """All tests of the residual of a fit."""
+    return (
+        *frequency_tests(fit),
+        *nonlinear_tests(fit, etfe),
+        *drift_tests(fit, etfe),
+    )
+
+
+def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
+    """Run the loop on a fitted base model.
+
+    Each round tests the residual, tries the candidates of every class that a test raises, each
+    fitted to half of the windows, and accepts the one that best predicts another quarter; until
+    nothing is raised, nothing convinces, or three rounds are over.
+
+    Parameters
+    ----------
+    etfe : Etfe
+    fit : Fit
+        Of the base model.
+    tick : callable, optional
+        Called with what is being tried.
+
+    Returns
+    -------
+    Traced
+    """
+    state = State(etfe, fit)
+    before = tests = residual_tests(fit, etfe)
+    candidates: list[Candidate] = []
+    rejected: tuple[Trial, ...] = ()
+    for number in range(1, ROUNDS + 1):
+        if not any(test.flagged for test in tests):
+            break
+        trials = _trials(state, tests, tick)
+        chosen = _choose(trials)
+        candidates += [
+            Candidate(t.name, t.accepted.title, t.score, t is chosen, number) for t in trials
+        ]
+        rejected = tuple(t for t in trials if t.convincing and t is not chosen)
+        if chosen is None:
+            break
+        state = _with_ties(chosen, trials)
+        tests = _remaining_tests(state)
+    verdict, residual_class = _verdict(state, tests)
+    return Traced(verdict, residual_class, state, before, tests, tuple(candidates), rejected)
+
+
+def _remaining_tests(state: State) -> tuple[Test, ...]:
+    """The tests of what is left.
+
+    Where the response drifts the limit is that of the worst part; that the part drifts a little
+    too is no news.
+    """
+    tests = residual_tests(state.fit, state.etfe)
+    if any(effect.family == "time-varying" for effect in state.accepted):
+        tests = tuple(test for test in tests if test.family != "time-varying")
+    return tests
+
+
+def _trials(state: State, tests: tuple[Test, ...], tick: Tick | None) -> list[Trial]:
+    """Trials of every class that a test raises, best score first."""
+    raised = {test.name for test in tests if test.flagged}
+    families = {test.family for test in tests if test.flagged}
+    trials: list[Trial] = []
+    if "time-varying" in families:
+        trials += drift_trials(state, tick)
+    if "nonlinear" in families:
+        trials += nonlinear_trials(state, raised, tick)
+    if "linear" in families:
+        trials += linear_trials(state, tick)
+    return sorted(trials, key=lambda trial: -trial.score)
+
+
+def _choose(trials: list[Trial]) -> Trial | None:
+    """The best convincing trial; among those as good as it, the one with fewest parameters."""
+    good = [trial for trial in trials if trial.convincing]
+    if not good:
+        return None
+    close = [trial for trial in good if good[0].score - trial.score < _TIE]
+    return min(close, key=lambda trial: (trial.size, -trial.score))
+
+
+def _with_ties(chosen: Trial, trials: list[Trial]) -> State:
+    """The chosen trial's state, its effect naming those that do as well."""
+    ties = tuple(
+        trial.name
+        for trial in trials
+        if trial is not chosen
+        and trial.convincing
+        and trial.accepted.family == chosen.accepted.family
+        and abs(trial.score - chosen.score) < _TIE
+    )
+    *earlier, own = chosen.state.accepted
+    own = replace(own, ties=tuple(dict.fromkeys((*own.ties, *ties))))
+    return replace(chosen.state, accepted=(*earlier, own))
+
+
+def _verdict(state: State, tests: tuple[Test, ...]) -> tuple[str, str | None]:
+    left = [test for test in tests if test.flagged]
+    if left:
+        return UNEXPLAINED, max(left, key=lambda test: test.excess).family
+    if state.accepted:
+        return EXPLAINED, state.accepted[0].family
+    return CONSISTENT, None
