@@ -369,6 +369,8 @@ def test_long_posteriors_are_thinned_along_the_chains():
     limit = critical_stiffness(posterior, max_draws=1000)
     assert limit.samples.shape == (2 * 15 * 32,)
     assert limit.chains == 64
+    # However few are asked for, each chain keeps one.
+    assert critical_stiffness(posterior, max_draws=3).samples.shape == (64,)
     whole = critical_stiffness(posterior)
     np.testing.assert_allclose(limit.samples, whole.samples.reshape(64, 60)[:, 3::4].ravel())
 

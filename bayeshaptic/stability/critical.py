@@ -173,7 +173,7 @@ def _vectors(source: Any, theta: ArrayLike | None, max_draws: int) -> tuple[Floa
         vectors = np.atleast_2d(np.asarray(theta, float))
         return vectors, len(vectors)
     chains = np.asarray(chains)  # (E, S, W, P)
-    every = -(-chains[..., 0].size // max_draws)
+    every = min(-(-chains[..., 0].size // max_draws), chains.shape[1])
     kept = np.swapaxes(chains[:, every - 1 :: every], 1, 2)
     return kept.reshape(-1, kept.shape[-1]), kept.shape[0] * kept.shape[1]
 
