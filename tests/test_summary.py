@@ -181,13 +181,18 @@ def test_infinite_and_vanishing_limits_become_null() -> None:
 def test_what_closing_the_loop_adds() -> None:
     closed = SimpleNamespace(
         analysis=fake_analysis("rigid"),
-        diagnosis={"verdict": "explained", "residual_class": "linear"},
+        diagnosis={
+            "verdict": "explained",
+            "residual_class": "nonlinear",
+            "effects": [{"name": "coulomb_friction"}],
+        },
         before={"weighted_rms": 12.5},
         after={"weighted_rms": np.float64(1.02), "critical_stiffness_db": math.nan},
     )
     found = strictly_parsed(summary_json(closed))
     assert found["diagnosis"]["verdict"] == "explained"
     assert found["diagnosis"]["candidates"] is None
+    assert found["model"]["effects"] == ["coulomb_friction"]
     assert found["error"]["before"]["weighted_rms"] == 12.5
     assert found["error"]["after"]["critical_stiffness_db"] is None
     assert found["error"]["after"]["critical_stiffness"] == dict.fromkeys(QUANTILES)

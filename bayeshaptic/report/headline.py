@@ -162,9 +162,7 @@ def _recommended(analysis: Analysis, risk: float, diagnosis: Any) -> Headline:
             "model."
         )
     if unexplained:
-        details.append(
-            "Something in this recording remains unexplained, and the interval is widened for it."
-        )
+        sentence += " Part of this recording remains unexplained; the interval is widened for it."
     if warnings:
         details.append("Beware: " + " ".join(_sentence(text) for text in warnings))
     return Headline("caution" if any(doubts) else "safe", sentence, tuple(details))

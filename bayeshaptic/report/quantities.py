@@ -129,7 +129,8 @@ def _decimals(value: float, sd: float | None, digits: int) -> int:
     """Decimal places: two digits of `sd`, but at least two and at most seven of `value`."""
     if value == 0.0:
         return 0 if not sd else max(1 - math.floor(math.log10(sd)), 0)
-    exponent = math.floor(math.log10(abs(value)))
+    # Of the rounded number: 0.09998 is written 0.100.
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if sd is None or not math.isfinite(sd) or sd <= 0.0:
         return digits - 1 - exponent
     wanted = 1 - math.floor(math.log10(sd))

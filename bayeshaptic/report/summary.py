@@ -43,6 +43,7 @@ def summary(result: Any) -> dict[str, Any]:
         SI units; None for what is missing, and for numbers that are infinite or not a number.
     """
     analysis = analysis_of(result)
+    diagnosis = _DIAGNOSIS | dict(getattr(result, "diagnosis", None) or {})
     error = {name: getattr(result, name, None) for name in ("before", "after")}
     return plain(
         {
@@ -51,13 +52,13 @@ def summary(result: Any) -> dict[str, Any]:
             "etfe": _etfe(analysis),
             "model": {
                 "name": analysis.model.name,
-                "effects": [effect.name for effect in analysis.model.effects],
+                "effects": _effects(analysis, diagnosis),
                 "parameters": list(analysis.model.names),
             },
             "least_squares": _least_squares(analysis),
             "posterior": _posterior(analysis),
             "critical_stiffness": _critical_stiffness(analysis),
-            "diagnosis": _DIAGNOSIS | dict(getattr(result, "diagnosis", None) or {}),
+            "diagnosis": diagnosis,
             "error": {name: _ERROR | dict(given or {}) for name, given in error.items()},
         }
     )
@@ -88,6 +89,13 @@ def plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return finite(value)
     return value
+
+
+def _effects(analysis: Analysis, diagnosis: Mapping[str, Any]) -> list[str]:
+    """Names of the linear effects in the model, then of the others that were accepted."""
+    linear = [effect.name for effect in analysis.model.effects]
+    accepted = [effect["name"] for effect in diagnosis["effects"] or ()]
+    return list(dict.fromkeys([*linear, *accepted]))
 
 
 def _recording(analysis: Analysis) -> dict[str, Any]:
