@@ -47,7 +47,12 @@ if TYPE_CHECKING:
     )
     from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
     from bayeshaptic.report import write_report
-    from bayeshaptic.stability import CriticalStiffness, critical_stiffness
+    from bayeshaptic.stability import (
+        CriticalStiffness,
+        RelayMeasurement,
+        critical_stiffness,
+        measure_relay,
+    )
 
 __version__ = "0.1.0"
 
@@ -80,7 +85,12 @@ _HOMES = {
     ),
     "bayeshaptic.recordings.etfe": ("Etfe", "estimate_etfe"),
     "bayeshaptic.report": ("write_report",),
-    "bayeshaptic.stability": ("CriticalStiffness", "critical_stiffness"),
+    "bayeshaptic.stability": (
+        "CriticalStiffness",
+        "RelayMeasurement",
+        "critical_stiffness",
+        "measure_relay",
+    ),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -101,6 +111,7 @@ __all__ = [
     "Notice",
     "Posterior",
     "Recording",
+    "RelayMeasurement",
     "Study",
     "Uniform",
     "analyse",
@@ -113,6 +124,7 @@ __all__ = [
     "least_squares",
     "load_device",
     "load_posterior",
+    "measure_relay",
     "read_frf",
     "read_measurement",
     "read_recording",

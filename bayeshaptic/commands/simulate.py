@@ -12,6 +12,7 @@ from bayeshaptic.errors import InputError
 if TYPE_CHECKING:
     from bayeshaptic.rig.bench import Bench
     from bayeshaptic.rig.excitation import Excitation
+    from bayeshaptic.rig.recording import SimulatedRecording
 
 NAME = "simulate"
 SUMMARY = "record a simulated device, with or without a hand on it"
@@ -22,6 +23,7 @@ this is how to try the report, and how well it finds what is there."""
 EXAMPLES = """\
   bayeshaptic simulate lhifam --held -o lhifam-user.csv.gz
   bayeshaptic simulate phantom --excitation multisine --seconds 20 -o multisine.npz
+  bayeshaptic simulate lhifam --held --excitation relay -o relay.csv.gz
   bayeshaptic simulate lhifam --effect coulomb_friction=force:1.5 -o rubbing.csv"""
 
 
@@ -60,15 +62,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--excitation",
-        choices=("noise", "multisine"),
+        choices=("noise", "multisine", "relay"),
         default="noise",
-        help="white noise in the band, or a multisine with lines 1 Hz apart (default: noise)",
+        help="white noise in the band, a multisine with lines 1 Hz apart, or a relay experiment, "
+        "force = -F sign(position) (default: noise)",
+    )
+    parser.add_argument(
+        "--hysteresis",
+        type=non_negative,
+        default=0.0,
+        metavar="Q",
+        help="of the relay: it switches where the position has passed zero by so much, in m or rad "
+        "(default: 0)",
     )
     parser.add_argument(
         "--force-rms",
         type=positive,
         metavar="F",
-        help="root mean square of the excitation, N or N m (default: what is usual for the device)",
+        help="root mean square of the excitation, N or N m; of a relay that is its F (default: "
+        "what is usual for the device, three times that for a relay)",
     )
     parser.add_argument(
         "--band",
@@ -98,11 +110,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the recording; 0."""
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.rig.recording import write_recording
-    from bayeshaptic.rig.simulate import simulate
 
     refuse_place(arguments.output)
     bench = bench_from(arguments)
-    recording = simulate(bench, excitation_from(arguments, bench), seed=arguments.seed)
+    recording = record(arguments, bench)
     path = write_recording(arguments.output, recording)
     with Talk(arguments.quiet) as talk:
         talk.say(
@@ -111,6 +122,24 @@ def run(arguments: argparse.Namespace) -> int:
             f"{'N/m' if bench.force_unit == 'N' else 'N m/rad'}"
         )
     return 0
+
+
+def record(arguments: argparse.Namespace, bench: Bench) -> SimulatedRecording:
+    """The experiment on the bench: an excitation in open loop, or a relay."""
+    from bayeshaptic.rig.loops import run_relay
+    from bayeshaptic.rig.simulate import simulate
+
+    if arguments.excitation == "relay":
+        return run_relay(
+            bench,
+            arguments.force_rms,
+            arguments.seconds,
+            arguments.hysteresis,
+            seed=arguments.seed,
+        )
+    if arguments.hysteresis:
+        raise InputError("--hysteresis is a relay's; add --excitation relay")
+    return simulate(bench, excitation_from(arguments, bench), seed=arguments.seed)
 
 
 def bench_from(arguments: argparse.Namespace) -> Bench:

@@ -4,6 +4,8 @@ from bayeshaptic.stability.binding import BindingCrossing
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.crossings import Crossings, find_crossings
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
+from bayeshaptic.stability.relay import RelayMeasurement, measure_relay
+from bayeshaptic.stability.relay_check import RelayCheck, check_relay
 from bayeshaptic.stability.rules import (
     ground_damping,
     passivity_limit,
@@ -17,11 +19,15 @@ __all__ = [
     "CriticalStiffness",
     "Crossings",
     "EtfeCriticalStiffness",
+    "RelayCheck",
+    "RelayMeasurement",
+    "check_relay",
     "confirms",
     "critical_stiffness",
     "etfe_critical_stiffness",
     "find_crossings",
     "ground_damping",
+    "measure_relay",
     "passivity_limit",
     "quantisation_limit",
     "rigid_limit",
