@@ -117,6 +117,7 @@ def _plausible(name: str, found: Scales, rng: np.random.Generator, count: int) -
     """Random mechanisms around the data's scales: name of the parameter to values."""
 
     def factor(low: float, high: float) -> Floats:
+        low, high = sorted((low, high))  # in a narrow band three times its lower end lies above it
         return np.exp(rng.uniform(np.log(low), np.log(high), count))
 
     def rate(low_hz: float, high_hz: float) -> Floats:

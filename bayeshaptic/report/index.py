@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline
 
 HERE = Path(__file__).parent
-RISK = "0.01"
 HEADS = ("recording", "held by", "configuration", "model", "median limit", "90 % interval",
-         "safe at 1 % risk", "what to do")  # fmt: skip
+         "what to do")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -94,15 +93,14 @@ def _cells(one: Reported) -> tuple[str, ...]:
     """What stands beside the recording's name."""
     assert one.headline is not None
     recording, limit = one.summary["recording"], one.summary["critical_stiffness"]
-    unit = limit["unit"]
-    trusted = one.headline.status != "untrusted"
+    low, high, unit = limit["q05"], limit["q95"], limit["unit"]
+    sd = None if low is None or high is None else (high - low) / 3.29 or None
     configuration = recording["configuration"]
     return (
         recording["user"] or "nobody",
         "" if configuration is None else str(configuration),
         one.summary["model"]["name"],
-        quantity(limit["q50"], unit),
-        interval(limit["q05"], limit["q95"], unit),
-        quantity(limit["safe"][RISK], unit) if trusted else "none",
+        quantity(limit["q50"], unit, sd),
+        interval(low, high, unit, sd),
         one.headline.sentence,
     )
