@@ -24,6 +24,8 @@ Progress = Callable[[float, str], None]
 
 # Effective draws that a report asks for: with them 20 lie below the stiffness of 0.1 % risk.
 REPORT_ESS = 8000
+# Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
+_MISFIT_STEPS = 1500
 
 
 @dataclass(frozen=True)
@@ -232,6 +234,7 @@ def finish(
             ess=ess,
             seed=seed,
             progress=lambda share, word: report(0.1 + 0.7 * share, word),
+            **({"most_steps": _MISFIT_STEPS} if scale > 1 else {}),
         )
     with clock.stage("critical stiffness"):
         report(0.8, "critical stiffness")

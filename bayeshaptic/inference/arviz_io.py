@@ -65,7 +65,7 @@ def to_arviz(posterior: Posterior) -> Any:
     """
     groups = _groups(posterior)
     az = arviz()
-    if hasattr(az, "InferenceData"):
+    if int(az.__version__.split(".")[0]) < 1:  # 1.x has the old name too, but not the old thing
         return az.InferenceData(**groups)
     import xarray
 
