@@ -29,11 +29,12 @@ from bayeshaptic.diagnosis.state import (
 from bayeshaptic.effects.internal_force import CONNECTION, MOTOR, Place, forced_motion
 from bayeshaptic.effects.nonlinear import Motion, NonlinearEffect
 from bayeshaptic.effects.registry import effects
-from bayeshaptic.inference.least_squares import polish, summarise
+from bayeshaptic.inference.least_squares import Fit, polish, summarise
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models.motion import linear_motion
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.random_excitation import points as points_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.windows import Windows, compress
 
@@ -133,7 +134,7 @@ class _Bench:
         theta = polish(model, point.windows, point.theta)
         fit = summarise(model, point.windows, theta)
         accepted = self._accepted(effect, point, self._strength_sd(effect, point))
-        state = State(point.etfe, fit, (*self.state.accepted, accepted))
+        state = State(_with_points(point.etfe, fit), fit, (*self.state.accepted, accepted))
         size = 1 + len(effect.shape)
         return Trial(accepted, state, point.gain_fit, point.gain_choose, size)
 
@@ -243,6 +244,18 @@ class _Bench:
             estimates,
             told_apart_by=effect.told_apart_by,
         )
+
+
+def _with_points(etfe: Etfe, fit: Fit) -> Etfe:
+    """With what a person sees of it made from its own spectra."""
+    found = points_of(etfe.spectra.windows(fit.response))
+    return replace(
+        etfe,
+        frequency_hz=found.frequency_hz,
+        value=found.value,
+        variance=found.variance,
+        coherence=found.coherence,
+    )
 
 
 def _best_gain(points: list[_Point]) -> float:
