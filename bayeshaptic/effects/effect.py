@@ -62,3 +62,7 @@ class LinearEffect(ABC):
     @abstractmethod
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         """The system with the effect; `values` holds every parameter of the model, shape (B,)."""
+
+    def own(self, values: Mapping[str, Floats]) -> tuple[Floats, ...]:
+        """The values of this effect's parameters, in their order, shape (B,) each."""
+        return tuple(values[parameter.name] for parameter in self.parameters)

@@ -1,5 +1,25 @@
 """Imports every effect of this package, so that it is registered."""
 
-from bayeshaptic.effects import extra_delay, friction, springs
+from bayeshaptic.effects import (
+    attached_mass,
+    base_compliance,
+    centring_stiffness,
+    extra_delay,
+    friction,
+    low_pass,
+    reflex,
+    springs,
+    transmission_loss,
+)
 
-__all__ = ["extra_delay", "friction", "springs"]
+__all__ = [
+    "attached_mass",
+    "base_compliance",
+    "centring_stiffness",
+    "extra_delay",
+    "friction",
+    "low_pass",
+    "reflex",
+    "springs",
+    "transmission_loss",
+]

@@ -33,3 +33,14 @@ def evaluate(polynomial: Polynomial, s: NDArray[np.complex128]) -> NDArray[np.co
     for coefficient in polynomial[::-1]:
         value = value * s + coefficient
     return value
+
+
+def roots(polynomial: Polynomial) -> NDArray[np.complex128]:
+    """Roots of a batch of polynomials by the companion matrix, shape (B, degree)."""
+    degree = len(polynomial) - 1
+    if degree == 0:
+        return np.zeros((polynomial.shape[1], 0), complex)
+    companion = np.zeros((polynomial.shape[1], degree, degree))
+    companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+    companion[:, :, -1] = -(polynomial[:-1] / polynomial[-1]).T
+    return np.linalg.eigvals(companion).astype(complex)

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -35,8 +35,8 @@ from bayeshaptic.models.sampled import fastest_pole, laurent, nodes_at
 if TYPE_CHECKING:
     from bayeshaptic.models.system import Filter, LinearSystem
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+Floats = NDArray[Any]
+Complexes = NDArray[Any]
 
 _ALIASES = 8  # on either side
 _TERMS = 16  # of the Chebyshev series
@@ -92,10 +92,12 @@ class Remainder:
     def _add_links(
         self, s: Complexes, value: Callable[[Polynomial], Complexes]
     ) -> tuple[Complexes, Complexes]:
-        inverse = 1 / value(self.denominator)
-        h = {pair: value(numerator) * inverse for pair, numerator in self.compliances.items()}
-        total = np.zeros_like(inverse)
-        difference = np.ones_like(inverse)
+        inverse: Complexes = 1 / value(self.denominator)
+        h: dict[tuple[int, int], Complexes] = {
+            pair: value(numerator) * inverse for pair, numerator in self.compliances.items()
+        }
+        total: Complexes = np.zeros_like(inverse)
+        difference: Complexes = np.ones_like(inverse)
         for number, link in enumerate(self.links, start=1):
             stiffness = link.stiffness(s)
             pivot = 1 + stiffness * h[number, number]
@@ -180,11 +182,12 @@ def sampled_remainder(system: LinearSystem, frequency_hz: Floats, period_s: floa
     theta = nodes.s.imag * period_s
     s = nodes.s[:, None]
     total = remainder.at(s, nodes.polynomial) / s
+    top = float(np.max(theta))
     fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
-    if len(theta) > _TERMS and smooth_aliases(fastest, theta.max()).all():
-        series = aliases(remainder, float(theta.max()), system.delay_s, period_s)
-        total += chebyshev.chebvander(2 * theta / theta.max() - 1, _TERMS - 1) @ series.coefficients
+    if len(theta) > _TERMS and np.all(smooth_aliases(fastest, top)):
+        series = aliases(remainder, top, system.delay_s, period_s)
+        total = total + chebyshev.chebvander(2 * theta / top - 1, _TERMS - 1) @ series.coefficients
     else:
-        total += alias_sums(remainder, theta, system.delay_s, period_s)
-    total *= nodes.hold[:, None] / period_s
-    return np.asarray((total * np.exp(-s * system.delay_s)).T)
+        total = total + alias_sums(remainder, theta, system.delay_s, period_s)
+    hold = nodes.hold[:, None] / period_s
+    return np.asarray((hold * np.exp(-s * system.delay_s) * total).T)

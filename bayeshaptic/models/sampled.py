@@ -70,13 +70,12 @@ def from_poles(
     back = np.exp(-s * period_s)
     first = residues * early * phi(poles * early)
     second = residues * np.exp(poles * early) * late * phi(poles * late)
-    decay = poles * period_s
+    # 1 - e^{(p - s) T} = z^-1 ((z - 1) - (e^{pT} - 1)): accurate where p and s are both near zero.
+    point, centre = np.expm1(s * period_s), np.expm1(poles * period_s)
     total = np.zeros(np.broadcast_shapes(back.shape, (len(poles), 1)), complex)
     for i in range(poles.shape[1]):
-        # 1 - e^{(p - s) T} through expm1: accurate where p and s are both near zero.
-        gap = -np.expm1(decay[:, i, None] - s * period_s)
-        total += (first[:, i, None] + back * second[:, i, None]) / gap
-    return total * np.exp(-s * (whole[:, None] + 1) * period_s)
+        total += (first[:, i, None] + back * second[:, i, None]) / (point - centre[:, i, None])
+    return total * np.exp(-s * whole[:, None] * period_s)
 
 
 class _Nodes:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.models.dynamic_link import DynamicLink, Index
+from bayeshaptic.models.filtered import behind_fast_filters, fast_filters
 from bayeshaptic.models.mechanism import Mechanism
-from bayeshaptic.models.polynomial import Polynomial, evaluate, multiply
+from bayeshaptic.models.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.models.remainder import remainder_of, sampled_remainder
 from bayeshaptic.models.sampled import from_poles, from_polynomials
 
@@ -101,7 +102,7 @@ class LinearSystem:
         """
         poles = [np.linalg.eigvals(self.mechanism.state_matrix()).astype(complex)]
         for factor in self.filters:
-            poles.append(_roots(factor.denominator))
+            poles.append(roots(factor.denominator))
         p = np.concatenate(poles, axis=1)
         numerator, denominator = self.transfer()
         gaps = p[:, :, None] - p[:, None, :]
@@ -135,21 +136,27 @@ class LinearSystem:
 
     def _chunk_response(self, rows: slice, frequency_hz: Floats, period_s: float) -> Complexes:
         part = self.rows(rows) if self.batch > _CHUNK else self
-        response, good = from_polynomials(*part.transfer(), part.delay_s, frequency_hz, period_s)
-        if not good.all():
-            bad = part.rows(~good)
-            response[~good] = from_poles(*bad.poles(), bad.delay_s, frequency_hz, period_s)
+        response = part._rational_response(frequency_hz, period_s)
         if part.dynamic_links:
             response += sampled_remainder(part, frequency_hz, period_s)
         return response
 
-
-def _roots(polynomial: Polynomial) -> Complexes:
-    """Roots of a batch of polynomials by the companion matrix, shape (B, degree)."""
-    degree = len(polynomial) - 1
-    if degree == 0:
-        return np.zeros((polynomial.shape[1], 0), complex)
-    companion = np.zeros((polynomial.shape[1], degree, degree))
-    companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    companion[:, :, -1] = -(polynomial[:-1] / polynomial[-1]).T
-    return np.linalg.eigvals(companion).astype(complex)
+    def _rational_response(self, frequency_hz: Floats, period_s: float) -> Complexes:
+        """The rational part, by the fastest way that holds for each row."""
+        fast = fast_filters(self, period_s) if self.filters else np.zeros(self.batch, bool)
+        if fast.any() and not fast.all():
+            response = np.empty((self.batch, len(frequency_hz)), complex)
+            for part in (fast, ~fast):
+                response[part] = self.rows(part)._rational_response(frequency_hz, period_s)
+            return response
+        if fast.any():
+            response, good = behind_fast_filters(self, frequency_hz, period_s)
+        else:
+            numerator, denominator = self.transfer()
+            response, good = from_polynomials(
+                numerator, denominator, self.delay_s, frequency_hz, period_s
+            )
+        if not good.all():
+            bad = self.rows(~good)
+            response[~good] = from_poles(*bad.poles(), bad.delay_s, frequency_hz, period_s)
+        return response

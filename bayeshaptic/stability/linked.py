@@ -6,6 +6,7 @@ It is that of the rational part, from its poles, and what the links add: see mod
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,8 @@ from bayeshaptic.stability.evaluated import ends, held_at_rest
 from bayeshaptic.stability.grid import search_grid
 from bayeshaptic.stability.response import PoleResponse, pole_response
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+Floats = NDArray[Any]
+Complexes = NDArray[Any]
 Rows = NDArray[np.int_]
 
 _BEYOND = np.geomspace(np.pi, 100 * np.pi, 60)  # angles above the grid's last one

@@ -1,0 +1,65 @@
+"""Where to start fitting a model with one more effect: a dense grid, sieved cheaply."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.inference.coordinates import coordinates
+from bayeshaptic.inference.gauss_newton import jacobian
+from bayeshaptic.inference.least_squares import weighted_residuals
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models import Model
+from bayeshaptic.models.model import LinearEffect
+from bayeshaptic.recordings.windows import Windows
+
+Floats = NDArray[np.float64]
+
+
+def promising_starts(
+    model: Model, effect: LinearEffect, windows: Windows, bases: Floats, own: Floats, keep: int = 24
+) -> Floats:
+    """The best starting vectors for ``model.with_effect(effect)``.
+
+    Every value of the effect beside every base vector is judged by the sum of squares that is left
+    when the base parameters may give way, to first order.  The base vectors have equal shares in
+    what is kept: from a fit alone, bent to the data without the effect, the way to the optimum
+    may be barred.
+
+    Parameters
+    ----------
+    model : Model
+        Without the effect.
+    effect : LinearEffect
+    windows : Windows
+    bases : ndarray, shape (S, P)
+        Vectors of `model`: its fit, the device file's values.
+    own : ndarray, shape (N, number of the effect's parameters)
+        Values of the effect: `LinearEffect.starting_values`.
+    keep : int
+
+    Returns
+    -------
+    ndarray, shape (at most `keep`, P + number of the effect's parameters)
+    """
+    full = model.with_effect(effect)
+    added = [parameter.name for parameter in effect.parameters]
+    where_own = [full.names.index(name) for name in added]
+    where_base = [full.names.index(name) for name in model.names]
+    residuals = weighted_residuals(Likelihood(full, windows), coordinates(full))
+    without = weighted_residuals(Likelihood(model, windows), coordinates(model))
+    bases = np.atleast_2d(bases)
+    kept = []
+    for base in bases:
+        starts = np.empty((len(own), full.size))
+        starts[:, where_own], starts[:, where_base] = own, base
+        with np.errstate(all="ignore"):
+            left = residuals(coordinates(full).coordinate(starts))
+            slope = jacobian(without, coordinates(model).coordinate(base[None]))[0]
+        usable = np.all(np.isfinite(left), axis=1)
+        left = np.where(usable[:, None], left, 0.0)
+        q, _ = np.linalg.qr(np.nan_to_num(slope))
+        cost = np.einsum("bn,bn->b", left, left) - np.einsum("bp,bp->b", *(2 * [left @ q]))
+        order = np.argsort(np.where(usable, cost, np.inf))
+        kept.append(starts[order[: keep // len(bases)]])
+    return np.concatenate(kept)
