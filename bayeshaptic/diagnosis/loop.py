@@ -16,6 +16,7 @@ from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.etfe import Etfe
 
 ROUNDS = 3
+_RIVAL = 0.85  # share of the best score that a rival has at least
 _TIE = 6.0  # difference of scores that one recording does not decide
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 Tick = Callable[[str], None]
@@ -145,12 +146,25 @@ def _trials(state: State, tests: tuple[Test, ...], tick: Tick | None) -> list[Tr
 
 
 def _choose(trials: list[Trial]) -> Trial | None:
-    """The best convincing trial; among those as good as it, the one with fewest parameters."""
+    """The convincing trial that leaves least; of those that leave nothing, the best.
+
+    A wrong effect can gain nearly as much as the right one and then need another to mend it: an
+    alternative is better than an addition.
+    """
     good = [trial for trial in trials if trial.convincing]
     if not good:
         return None
-    close = [trial for trial in good if good[0].score - trial.score < _TIE]
+    rivals = [trial for trial in good if trial.score > _RIVAL * good[0].score]
+    left = [_left(trial.state) for trial in rivals]
+    least = min(left)
+    best = [t for t, rest in zip(rivals, left, strict=True) if rest <= max(1.2 * least, 0.0)]
+    close = [trial for trial in best if best[0].score - trial.score < _TIE]
     return min(close, key=lambda trial: (trial.size, -trial.score))
+
+
+def _left(state: State) -> float:
+    """How far the residual tests of a state are over their thresholds, all together."""
+    return sum(test.excess for test in _remaining_tests(state) if test.flagged)
 
 
 def _with_ties(chosen: Trial, trials: list[Trial]) -> State:
