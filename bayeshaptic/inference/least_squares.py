@@ -114,6 +114,9 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
 def refine(model: Model, windows: Windows, start: Floats) -> tuple[Floats, int]:
     """The best fit to `windows` from many starting vectors, shape (S, P).
 
+    Of the optima found, that with the highest posterior density: masses may swap their parts in
+    the motion and fit as well, and the priors tell which is which.
+
     Returns
     -------
     theta : ndarray, shape (P,)
@@ -123,9 +126,13 @@ def refine(model: Model, windows: Windows, start: Floats) -> tuple[Floats, int]:
     here, low, high = _search_box(model)
     residuals = weighted_residuals(Likelihood(model, windows), here)
     phi = np.clip(here.coordinate(np.atleast_2d(start)), low, high)
-    phi, cost = _best_of_many(residuals, phi, low, high)
-    best = phi[[np.argmin(cost)]]
-    return here.natural(best)[0], int(np.sum(cost < cost.min() + 0.5))
+
+    def penalty(phi: Floats) -> Floats:
+        return -model.log_prior(here.natural(phi)) - here.log_jacobian(phi)
+
+    phi, cost = _best_of_many(residuals, penalty, phi, low, high)
+    best = np.argmin(cost + penalty(phi))
+    return here.natural(phi)[best], int(np.sum(cost < cost[best] + 0.5))
 
 
 def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
@@ -153,7 +160,11 @@ def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[F
 
 
 def _best_of_many(
-    residuals: Callable[[Floats], Floats], phi: Floats, low: Floats, high: Floats
+    residuals: Callable[[Floats], Floats],
+    penalty: Callable[[Floats], Floats],
+    phi: Floats,
+    low: Floats,
+    high: Floats,
 ) -> tuple[Floats, Floats]:
     """Sift the starting points, refine the better ones, converge the best."""
     with np.errstate(all="ignore"):
@@ -161,7 +172,7 @@ def _best_of_many(
     cost = np.where(np.isfinite(cost), cost, np.inf)
     phi = phi[np.argsort(cost)[:_KEPT_STARTS]]
     phi, cost = minimise(residuals, phi, low, high, steps=15, tolerance=1e-2)
-    phi = phi[np.argsort(cost)[:6]]
+    phi = phi[np.argsort(cost + penalty(phi))[:6]]
     return minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
 
 
