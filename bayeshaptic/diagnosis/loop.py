@@ -16,6 +16,8 @@ from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.etfe import Etfe
 
 ROUNDS = 3
+_LAW_ERROR = 0.1  # of the statistic that raised a nonlinear force
+_LINEAR_FIRST = 10.0  # reduced chi-square from which the linear misfit is mended first
 _RIVAL = 0.85  # share of the best score that a rival has at least
 _TIE = 6.0  # difference of scores that one recording does not decide
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
@@ -106,7 +108,7 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
         if not any(test.flagged for test in tests):
             break
         trials = _trials(state, tests, tick)
-        chosen = _choose(trials)
+        chosen = _choose(trials, before)
         candidates += [
             Candidate(t.name, t.accepted.title, t.score, t is chosen, number) for t in trials
         ]
@@ -114,21 +116,33 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
         if chosen is None:
             break
         state = _with_ties(chosen, trials)
-        tests = _remaining_tests(state)
+        tests = _remaining_tests(state, before)
     verdict, residual_class = _verdict(state, tests)
     return Traced(verdict, residual_class, state, before, tests, tuple(candidates), rejected)
 
 
-def _remaining_tests(state: State) -> tuple[Test, ...]:
-    """The tests of what is left.
+def _remaining_tests(state: State, before: tuple[Test, ...]) -> tuple[Test, ...]:
+    """The tests of what is left, and how much of it counts.
 
     Where the response drifts the limit is that of the worst part; that the part drifts a little
-    too is no news.
+    too is no news.  A law of friction is an approximation: a tenth of what it explained may
+    remain.
     """
     tests = residual_tests(state.fit, state.etfe)
-    if any(effect.family == "time-varying" for effect in state.accepted):
+    families = {effect.family for effect in state.accepted}
+    if "time-varying" in families:
         tests = tuple(test for test in tests if test.family != "time-varying")
+    if "nonlinear" in families:
+        explained = max((t.statistic for t in before if t.family == "nonlinear"), default=0.0)
+        tests = tuple(_allowing(test, explained) for test in tests)
     return tests
+
+
+def _allowing(test: Test, explained: float) -> Test:
+    """`test` with the threshold that it has after a nonlinear force was taken off."""
+    if test.family == "nonlinear":
+        return replace(test, threshold=max(test.threshold, _LAW_ERROR * explained))
+    return replace(test, threshold=1.5 * test.threshold)
 
 
 def _trials(state: State, tests: tuple[Test, ...], tick: Tick | None) -> list[Trial]:
@@ -136,16 +150,20 @@ def _trials(state: State, tests: tuple[Test, ...], tick: Tick | None) -> list[Tr
     raised = {test.name for test in tests if test.flagged}
     families = {test.family for test in tests if test.flagged}
     trials: list[Trial] = []
+    if "linear" in families:
+        trials += linear_trials(state, tick)
+        # On a model that is far off, a nonlinear force cannot be sized: first things first.
+        far_off = state.fit.reduced_chi_square > _LINEAR_FIRST
+        if far_off and any(trial.convincing for trial in trials):
+            families = {"linear"}
     if "time-varying" in families:
         trials += drift_trials(state, tick)
     if "nonlinear" in families:
         trials += nonlinear_trials(state, raised, tick)
-    if "linear" in families:
-        trials += linear_trials(state, tick)
     return sorted(trials, key=lambda trial: -trial.score)
 
 
-def _choose(trials: list[Trial]) -> Trial | None:
+def _choose(trials: list[Trial], before: tuple[Test, ...]) -> Trial | None:
     """The convincing trial that leaves least; of those that leave nothing, the best.
 
     A wrong effect can gain nearly as much as the right one and then need another to mend it: an
@@ -155,16 +173,16 @@ def _choose(trials: list[Trial]) -> Trial | None:
     if not good:
         return None
     rivals = [trial for trial in good if trial.score > _RIVAL * good[0].score]
-    left = [_left(trial.state) for trial in rivals]
+    left = [_left(_remaining_tests(trial.state, before)) for trial in rivals]
     least = min(left)
     best = [t for t, rest in zip(rivals, left, strict=True) if rest <= max(1.2 * least, 0.0)]
     close = [trial for trial in best if best[0].score - trial.score < _TIE]
     return min(close, key=lambda trial: (trial.size, -trial.score))
 
 
-def _left(state: State) -> float:
-    """How far the residual tests of a state are over their thresholds, all together."""
-    return sum(test.excess for test in _remaining_tests(state) if test.flagged)
+def _left(tests: tuple[Test, ...]) -> float:
+    """How far tests are over their thresholds, all together."""
+    return sum(test.excess for test in tests if test.flagged)
 
 
 def _with_ties(chosen: Trial, trials: list[Trial]) -> State:
