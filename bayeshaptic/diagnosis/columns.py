@@ -83,7 +83,7 @@ def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, Complexes]:
         other, _ = linear_motion(system, force, recording.period_s, mass=1)
         stretch = x - other
         stretch = stretch / stretch.std()
-        pair = _pair_response(fit, s)
+        pair = pair_response(fit, s)
         found["stretch^3"] = pair * at_lines(-(stretch**3))
         found["clipped stretch"] = pair * at_lines(-np.clip(stretch, -0.5, 0.5))
     return found
@@ -116,7 +116,7 @@ def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped
     return transform
 
 
-def _pair_response(fit: Fit, s: Complexes) -> Complexes:
+def pair_response(fit: Fit, s: Complexes) -> Complexes:
     """Position of the motor over a pair of forces in the connection, +1 on m1 and -1 on m2."""
     mechanism = fit.model.system(fit.theta).mechanism
     numerator = mechanism.mutual(mechanism.drive, (0, 1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -13,11 +14,12 @@ from bayeshaptic.report.quantities import interval, pretty_unit, pure, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.closed import Closed
 
 LIBRARIES = ("numpy", "scipy", "emcee", "arviz", "matplotlib")
 
 
-def assumptions(analysis: Analysis) -> tuple[str, ...]:
+def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, ...]:
     """The assumptions in sentences, the data's first."""
     etfe, posterior = analysis.etfe, analysis.posterior
     ensembles, steps, walkers, _ = posterior.chains.shape
@@ -28,7 +30,6 @@ def assumptions(analysis: Analysis) -> tuple[str, ...]:
         if analysis.noise_scale != 1.0
         else ""
     )
-    effects = ", ".join(effect.name for effect in analysis.model.effects)
     return (
         "The device, its configuration and the way it is held are those of the recording: another "
         "person, posture or configuration has another limit.",
@@ -39,10 +40,9 @@ def assumptions(analysis: Analysis) -> tuple[str, ...]:
         words.delay(analysis),
         f"The force is in command units ({unit}): a wrong force constant makes masses, dampers and "
         "springs wrong by its factor, but cancels in the stiffness that may be commanded.",
-        "The device is linear and does not change during the recording. The limit is that of the "
-        "linear part: it holds at amplitudes where dry friction no longer helps.",
-        f"Model: {analysis.model.structure.title}; "
-        + (f"with {effects}." if effects else "no effect has been added to it."),
+        _constancy(closed),
+        _model(analysis, closed),
+        *_widening(closed),
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
         "extrapolates.",
         "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is "
@@ -53,6 +53,48 @@ def assumptions(analysis: Analysis) -> tuple[str, ...]:
         f"95 % quantile. {ensembles} ensembles of {walkers} walkers, {steps} steps, seed "
         f"{posterior.seed}.",
     )
+
+
+def _constancy(closed: Closed | None) -> str:
+    found = [] if closed is None else closed.effects
+    names = [effect.title for effect in found if effect.family in ("nonlinear", "time-varying")]
+    but = f", but for what was found ({' and '.join(names)})" if names else ""
+    text = (
+        f"The device is linear and does not change during the recording{but}. The limit is that "
+        "of the linear part: it holds at amplitudes where dry friction no longer helps."
+    )
+    if any(effect.family == "time-varying" for effect in found):
+        text += " Of a device or a grip that changes, the limit is that of the worst part."
+    return text
+
+
+def _model(analysis: Analysis, closed: Closed | None) -> str:
+    names = [effect.title for effect in analysis.model.effects]
+    if closed is not None:
+        names = [effect.title for effect in closed.effects]
+    effects = f"with {' and with '.join(names)}" if names else "no effect has been added to it"
+    return f"Model: {analysis.model.structure.title}; {effects}."
+
+
+def _widening(closed: Closed | None) -> tuple[str, ...]:
+    if closed is None:
+        return ()
+    spread = math.sqrt(sum(effect.limit_log_sd**2 for effect in closed.effects))
+    found = []
+    if spread > 0:
+        found.append(
+            "The uncertainty of the effects that are not in the posterior adds "
+            f"{pure(100 * spread, 2)} % (sd) to the limit."
+        )
+    if closed.verdict == "unexplained":
+        found.append(
+            "The limit is widened by what is left unexplained. Where the rest is linear, the "
+            "response is multiplied by a random smooth deviation as large as the residual shows; "
+            "where it is not, the limit is taken down as far as the rejected candidates and the "
+            "damping in doubt would take it. This is an estimate of what an unknown effect does, "
+            "not a bound."
+        )
+    return tuple(found)
 
 
 def priors(analysis: Analysis) -> tuple[tuple[str, str, str], ...]:

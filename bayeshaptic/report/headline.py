@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.inference.least_squares import MISFIT
 from bayeshaptic.report.limits import decibel, own_limit
+from bayeshaptic.report.loop_words import in_short
 from bayeshaptic.report.quantities import estimate, percent, pure, quantity
-from bayeshaptic.report.summary import analysis_of, has_feedback, tip_limit
+from bayeshaptic.report.summary import analysis_of, closed_of, has_feedback, tip_limit
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.closed import Closed
 
 HEADLINE_RISKS = (0.01, 0.05)
 # The reduced chi-square of pure noise scatters by one over the root of the number of points.
@@ -20,6 +22,8 @@ _CHANCE_SDS = 4.0
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001
+# Residual over noise from which a limit widened by what is unexplained is no advice either.
+_TOO_FAR = 3.0
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,8 @@ def headline(result: Any) -> Headline:
             f"{percent(HEADLINE_RISKS[-1])} (fewer than 20 of them lie below any such stiffness)"
         )
         return _untrusted(analysis, (few,))
-    return _recommended(analysis, risk, getattr(result, "diagnosis", None) or {})
+    diagnosis = getattr(result, "diagnosis", None) or {}
+    return _recommended(analysis, risk, diagnosis, closed_of(result))
 
 
 def misfit_is_clear(analysis: Analysis) -> bool:
@@ -85,7 +90,12 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     """Why no stiffness can be recommended; empty where one can."""
     found = []
     verdict = (diagnosis or {}).get("verdict")
-    if verdict is None and misfit_is_clear(analysis):
+    if verdict == "unexplained" and analysis.fit.reduced_chi_square > _TOO_FAR**2:
+        found.append(
+            f"what the model leaves over is {misfit_factor(analysis)} times the noise, and no "
+            "effect that was tried explains it"
+        )
+    if verdict != "unexplained" and misfit_is_clear(analysis):
         found.append(
             "the model does not explain the data (what it leaves over is "
             f"{misfit_factor(analysis)} times the noise, reduced chi-square "
@@ -126,7 +136,9 @@ def _untrusted(analysis: Analysis, objections: tuple[str, ...]) -> Headline:
     return Headline("untrusted", sentence, tuple(details))
 
 
-def _recommended(analysis: Analysis, risk: float, diagnosis: Any) -> Headline:
+def _recommended(
+    analysis: Analysis, risk: float, diagnosis: Any, closed: Closed | None
+) -> Headline:
     limit = analysis.limit
     safe = limit.safe(risk)
     assert safe is not None
@@ -144,7 +156,7 @@ def _recommended(analysis: Analysis, risk: float, diagnosis: Any) -> Headline:
             f"does ({quantity(safe, limit.unit)} at {percent(risk)} risk), and the two must agree "
             "before the model's figure is used."
         )
-    details = []
+    details = [] if closed is None else [text for text in (in_short(closed),) if text]
     tip = tip_limit(analysis)
     if tip is not None and analysis.lever_m is not None:
         lever = analysis.lever_m

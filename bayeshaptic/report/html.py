@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic import __version__
-from bayeshaptic.report import tables, words
+from bayeshaptic.report import loop_tables, loop_words, tables, words
 from bayeshaptic.report.assumptions import assumptions, priors, versions
-from bayeshaptic.report.figures import PICTURES
+from bayeshaptic.report.figures import LOOP_PICTURES, PICTURES
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.summary import analysis_of
+from bayeshaptic.report.summary import analysis_of, closed_of, measured_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -44,7 +44,7 @@ def render(result: Any, pictures: Mapping[str, bytes]) -> str:
     """The page of an analysis (or of what closing the loop returns) with its PNG pictures."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    analysis = analysis_of(result)
+    analysis, closed = analysis_of(result), closed_of(result)
     environment = Environment(
         loader=FileSystemLoader(HERE, encoding="utf-8"),
         autoescape=True,
@@ -59,13 +59,17 @@ def render(result: Any, pictures: Mapping[str, bytes]) -> str:
         version=__version__,
         written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         analysis=analysis,
+        closed=closed,
+        measured=measured_of(result),
         headline=head,
         label=_LABELS[head.status],
         notices=unique(analysis.notices),
         pictures={name: _embedded(name, png) for name, png in pictures.items()},
         words=words,
         tables=tables,
-        assumptions=assumptions(analysis),
+        loop_words=loop_words,
+        loop_tables=loop_tables,
+        assumptions=assumptions(analysis, closed),
         priors=priors(analysis),
         versions=versions(),
     )
@@ -92,6 +96,6 @@ def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
 
 def _embedded(name: str, png: bytes) -> EmbeddedPicture:
     width, height = struct.unpack(">II", png[16:24])  # of the PNG's header
-    alternative = next((p.alternative for p in PICTURES if p.name == name), name)
+    alternative = next((p.alternative for p in (*PICTURES, *LOOP_PICTURES) if p.name == name), name)
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
     return EmbeddedPicture(name, alternative, source, width, height)

@@ -13,6 +13,7 @@ from bayeshaptic.report.limits import RISKS, finite
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.closed import Closed
     from bayeshaptic.stability.critical import CriticalStiffness
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
@@ -48,7 +49,7 @@ def summary(result: Any) -> dict[str, Any]:
     return plain(
         {
             "version": __version__,
-            "recording": _recording(analysis),
+            "recording": _recording(measured_of(result)),
             "etfe": _etfe(analysis),
             "model": {
                 "name": analysis.model.name,
@@ -72,6 +73,17 @@ def summary_json(result: Any) -> str:
 def analysis_of(result: Any) -> Analysis:
     """The analysis itself, of an analysis or of what closing the loop returns."""
     return getattr(result, "analysis", result)
+
+
+def closed_of(result: Any) -> Closed | None:
+    """The closed loop, where there is one."""
+    return result if hasattr(result, "traced") else None
+
+
+def measured_of(result: Any) -> Analysis:
+    """The analysis of the recording as it was measured, before effects changed or cut it."""
+    closed = closed_of(result)
+    return analysis_of(result) if closed is None else closed.base
 
 
 def plain(value: Any) -> Any:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _DELAY = "delay_s"
 
 
-def misfit(analysis: Analysis) -> str:
+def misfit(analysis: Analysis, loop: bool = False) -> str:
     """How the residual compares with the noise, and where it is worst."""
     fit = analysis.fit
     order = np.argsort(fit.frequency_hz)
@@ -29,11 +29,16 @@ def misfit(analysis: Analysis) -> str:
     place = f"{pure(bands.rms[worst], 2)} times the noise around {hertz}"
     chi = f"reduced chi-square {pure(fit.reduced_chi_square)}, where 1 is pure noise"
     if misfit_is_clear(analysis):
+        then = (
+            "What was tried stands above; the limit is widened for what is left."
+            if loop
+            else "Until the cause is found and added to the model, nothing here says how wrong "
+            "the limit may be."
+        )
         return (
             f"The model does not explain this recording: the residual is {misfit_factor(analysis)} "
             f"times the noise ({chi}). It stands out in {outside.sum()} of {len(outside)} third "
-            f"octaves and is worst at {place}. Until the cause is found and added to the model, "
-            "nothing here says how wrong the limit may be."
+            f"octaves and is worst at {place}. {then}"
         )
     if outside.any():
         return (

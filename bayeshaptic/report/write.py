@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.report.figures import draw_pictures
+from bayeshaptic.report.figures import LOOP_PICTURES, draw_pictures
 from bayeshaptic.report.html import render
 from bayeshaptic.report.summary import analysis_of, summary_json
 
@@ -56,7 +56,7 @@ def write_report(result: Any, out_dir: str | Path) -> Path:
 
 def _write_all(result: Any, folder: Path) -> None:
     analysis = analysis_of(result)
-    pictures = draw_pictures(analysis)
+    pictures = draw_pictures(result)
     for name, png in pictures.items():
         (folder / f"{name}.png").write_bytes(png)
     analysis.posterior.save(folder / "posterior.nc")
@@ -68,5 +68,8 @@ def _move(draft: Path, out: Path) -> None:
     if not out.exists():
         draft.rename(out)
         return
+    for picture in LOOP_PICTURES:  # one of an older report would contradict this one
+        if not (draft / f"{picture.name}.png").exists():
+            (out / f"{picture.name}.png").unlink(missing_ok=True)
     for path in sorted(draft.iterdir(), key=lambda path: path.name == _LAST):
         os.replace(path, out / path.name)

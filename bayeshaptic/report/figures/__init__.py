@@ -1,16 +1,21 @@
 """The figures of a report, one module each with ``draw(analysis) -> Figure``.
 
-To add one, write the module and add a line to PICTURES.
+To add one, write the module and add a line to PICTURES; to LOOP_PICTURES, with
+``draw(closed) -> Figure``, where it shows what closing the loop found.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.report.figures import (
     crossings,
+    loop_force,
+    loop_residual,
+    loop_stiffness,
+    loop_tests,
     marginals,
     pairs,
     residuals,
@@ -23,9 +28,9 @@ from bayeshaptic.report.figures.style import png
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.closed import Closed
 
-__all__ = ["PICTURES", "Picture", "draw_pictures", "png"]
+__all__ = ["LOOP_PICTURES", "PICTURES", "Picture", "draw_pictures", "png"]
 
 
 @dataclass(frozen=True)
@@ -33,8 +38,9 @@ class Picture:
     """A figure of the report: the name of its file, how to draw it, and what it shows in words."""
 
     name: str
-    draw: Callable[[Analysis], Figure]
+    draw: Callable[[Any], Figure]
     alternative: str
+    shown: Callable[[Closed], bool] = lambda closed: True
 
 
 PICTURES = (
@@ -48,6 +54,35 @@ PICTURES = (
 )
 
 
-def draw_pictures(analysis: Analysis) -> dict[str, bytes]:
-    """Every figure as PNG, by name."""
-    return {picture.name: png(picture.draw(analysis)) for picture in PICTURES}
+LOOP_PICTURES = (
+    Picture(
+        "loop_residual",
+        loop_residual.draw,
+        "Residual over frequency before and after",
+        shown=lambda closed: closed.verdict != "consistent",
+    ),
+    Picture("loop_tests", loop_tests.draw, "Every test of the residual before and after"),
+    Picture(
+        "loop_force",
+        loop_force.draw,
+        "Residual force over the motion before and after",
+        shown=loop_force.is_shown,
+    ),
+    Picture(
+        "loop_stiffness",
+        loop_stiffness.draw,
+        "Critical stiffness before and after, and the measurement's own",
+        shown=lambda closed: closed.verdict != "consistent",
+    ),
+)
+
+
+def draw_pictures(result: Any) -> dict[str, bytes]:
+    """Every figure of an analysis, or of a closed loop, as PNG, by name."""
+    analysis = getattr(result, "analysis", result)
+    found = {picture.name: png(picture.draw(analysis)) for picture in PICTURES}
+    if hasattr(result, "traced"):
+        for picture in LOOP_PICTURES:
+            if picture.shown(result):
+                found[picture.name] = png(picture.draw(result))
+    return found
