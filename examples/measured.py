@@ -1,0 +1,223 @@
+"""Two measured recordings, and what closing the loop finds in them: figures of docs/measured.md.
+
+    python -m examples.measured [FOLDER] [-o docs/images/measured]
+
+FOLDER holds `two_mass_bench/MultisineTypeA.mat` and `emps/DATA_EMPS.mat`, which the project does not
+contain; docs/measured.md says where they come from.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import bayeshaptic as bh
+from bayeshaptic.diagnosis.harmonic_balance import Balanced, balance
+from bayeshaptic.diagnosis.inverse_dynamics import InverseDynamics, inverse_dynamics
+from bayeshaptic.diagnosis.periodic import FLOOR, PeriodicLoop, close_periodic
+from bayeshaptic.diagnosis.state import REPORT, share
+from bayeshaptic.diagnosis.steady_motion import LOAD, Period, one_period, with_floor
+from bayeshaptic.recordings.windows import Windows, compress
+from bayeshaptic.report.figures.style import CYCLE, DATA, MODEL, OTHER, new_figure, panel
+
+Floats = NDArray[np.float64]
+
+BENCH = "two_mass_bench/MultisineTypeA.mat"
+SERVO = "emps/DATA_EMPS.mat"
+BENCH_COLUMNS = "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"
+WITNESS_COLUMNS = "time=time*1e-6,force=iq_refx[A],position=theta_my*-1[rad]"
+SERVO_COLUMNS = "time=t,force=vir*35.15[N],position=qm[m]"
+_LOAD_HZ = 120.0  # above it the load's encoder shows little but noise
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The two-mass bench: the loop, and its models fitted to three quarters of the lines.
+
+    Attributes
+    ----------
+    loop : PeriodicLoop
+    windows : Windows
+        With the noise of a line at least `FLOOR` of its response.
+    held_out : ndarray of bool
+        Lines that took part neither in fitting nor in choosing.
+    steps : tuple of Balanced
+        From the base model on, none of them fitted to the held-out lines.
+    load : Period
+        The load's encoder, never fitted.
+    """
+
+    loop: PeriodicLoop
+    windows: Windows
+    held_out: NDArray[np.bool_]
+    steps: tuple[Balanced, ...]
+    load: Period
+
+    @property
+    def names(self) -> list[str]:
+        return ["base model", *(a.title for a in self.loop.chosen)]
+
+    def ratio(self, step: Balanced) -> NDArray[np.complex128]:
+        """Model over measurement at every line."""
+        noise = np.sqrt((self.windows.scatter / (self.windows.lines - 2)))
+        measured = self.windows.target[:, 0]
+        return np.asarray(1 - step.residual * noise / measured)
+
+    def phase_deg(self, step: Balanced, lines: NDArray[np.bool_]) -> float:
+        """Rms error of the phase over lines."""
+        return float(np.degrees(np.sqrt(np.mean(np.angle(self.ratio(step)[lines]) ** 2))))
+
+    def load_error(self, step: Balanced) -> Floats:
+        """Relative error of the predicted load at the excited lines below 120 Hz."""
+        predicted = self.load.transform(step.motions[LOAD].position)
+        measured = self.load.transform(self.load.position)
+        hertz = self.load.s.imag / (2 * np.pi)
+        excited = (self.load.harmonics >= self.load.excited[0]) & (hertz <= _LOAD_HZ)
+        return np.asarray(np.abs(predicted / measured - 1)[excited])
+
+
+def bench(path: Path) -> Bench:
+    """Close the loop on the two-mass bench, and predict what was not fitted."""
+    etfe = bh.estimate_etfe(bh.read_recording(path, columns=BENCH_COLUMNS))
+    witness = bh.read_recording(path, columns=WITNESS_COLUMNS)
+    fit = bh.least_squares(bh.free(), etfe)
+    loop = close_periodic(etfe, fit)
+    windows, period = compress(with_floor(etfe, FLOOR)), one_period(etfe)
+    held_out = share(windows, REPORT)
+    stages = [
+        balance(fit.model, windows, period, (), fit.theta),
+        *(a.balanced for a in loop.chosen),
+    ]
+    steps = tuple(
+        balance(s.model, windows, period, s.forces, s.theta, s.strength, ~held_out) for s in stages
+    )
+    return Bench(loop, windows, held_out, steps, one_period(etfe, witness.position))
+
+
+def servo(path: Path) -> tuple[InverseDynamics, InverseDynamics]:
+    """Inverse dynamics of EMPS: the published four coefficients, and what more can be found."""
+    recording = bh.read_recording(path, columns=SERVO_COLUMNS)
+    return inverse_dynamics(recording, terms=("coulomb",)), inverse_dynamics(recording)
+
+
+def draw_bench(found: Bench, folder: Path) -> None:
+    """Three figures of the two-mass bench."""
+    first, last = found.steps[0], found.steps[-1]
+    hertz = found.windows.frequency_hz[:, 0]
+    figure = new_figure(4.2)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    noise = np.sqrt(found.windows.scatter / (found.windows.lines - 2))
+    for step, colour, name in ((first, OTHER, "base model"), (last, MODEL, "with what was found")):
+        size = 100 * np.abs(1 - found.ratio(step))
+        upper.semilogy(hertz, size, color=colour, lw=0.7)
+        upper.semilogy(
+            hertz[found.held_out], size[found.held_out], "o", ms=3, color=colour, label=name
+        )
+        lower.plot(hertz, np.degrees(np.angle(found.ratio(step))), color=colour, lw=0.8)
+    relative = 100 * noise / np.abs(found.windows.target[:, 0])
+    upper.semilogy(hertz, relative, color=DATA, lw=0.6, ls=":", label="noise")
+    panel(upper, "", "error, % of response", title="Two-mass bench; dots: lines not fitted")
+    upper.legend(fontsize=7, frameon=False)
+    panel(lower, "frequency, Hz", "phase error, degrees")
+    lower.set_ylim(-20, 20)
+    figure.savefig(folder / "bench-lines.png")
+
+    figure = new_figure(4.6)
+    upper, lower = figure.subplots(2, 1)
+    seconds = np.arange(found.load.samples) * found.load.period_s
+    measured = found.load.position - found.load.position.mean()
+    upper.plot(seconds, 1e3 * measured, color=DATA, lw=0.6, label="load encoder")
+    for step, colour, name in ((first, OTHER, "base model"), (last, MODEL, "with what was found")):
+        error = measured - step.motions[LOAD].position
+        upper.plot(seconds, 1e3 * error - 250, color=colour, lw=0.7, label=f"error, {name}")
+    panel(upper, "time in the period, s", "load angle, mrad", title="Predicted, never fitted")
+    upper.legend(fontsize=7, frameon=False, ncols=3)
+    excited = found.load.excited[
+        found.load.excited <= _LOAD_HZ * found.load.samples * found.load.period_s
+    ]
+    for step, colour in ((first, OTHER), (last, MODEL)):
+        lower.semilogy(excited, 100 * found.load_error(step), color=colour, lw=0.9)
+    panel(lower, "frequency, Hz", "load error, % of response")
+    figure.savefig(folder / "bench-load.png")
+
+    figure = new_figure(2.8)
+    axes = figure.subplots()
+    velocity = np.linspace(-35, 35, 300)
+    speed = last.motions[LOAD].velocity
+    for basis, strength in zip(last.forces, last.strength, strict=True):
+        if basis.place == LOAD and basis.name == "drag":
+            from bayeshaptic.effects.nonlinear import Motion
+
+            force = strength * basis.force(Motion(0 * velocity, velocity))
+            axes.plot(velocity, force, color=MODEL, label=basis.title)
+    damper = dict(zip(last.model.names, last.theta, strict=True))["b2"]
+    axes.plot(velocity, -damper * velocity, color=DATA, ls="--", label="damper b2")
+    axes.plot(speed[::4], np.full(len(speed[::4]), -0.0), "|", color=CYCLE[6], ms=6)
+    panel(axes, "load velocity, rad/s (ticks: where it goes)", "force, A", title="What was found")
+    axes.legend(fontsize=7, frameon=False)
+    figure.savefig(folder / "bench-drag.png")
+
+
+def draw_servo(published: InverseDynamics, further: InverseDynamics, folder: Path) -> None:
+    """Residual force over velocity, and the error on the half that was not fitted."""
+    figure = new_figure(3.0)
+    left, right = figure.subplots(1, 2)
+    values = [published[name][0] for name in ("mass", "damping", "offset")]
+    path = published.path
+    inertia = values[0] * path.acceleration + values[1] * path.velocity + values[2]
+    for residual, colour, name in (
+        (published.force - inertia, OTHER, "without friction"),
+        (published.force - published.explained, CYCLE[1], "with Coulomb friction"),
+        (further.force - further.explained, MODEL, "with all terms"),
+    ):
+        left.plot(path.velocity, residual, ".", ms=1.5, color=colour, label=name)
+    panel(left, "velocity, m/s", "force not explained, N", title="EMPS: residual force")
+    left.legend(fontsize=7, frameon=False, markerscale=4)
+    names = [step.term for step in further.steps]
+    right.barh(names, [step.held_out_rms for step in further.steps], color=MODEL)
+    right.invert_yaxis()
+    panel(right, "error on the other half, N rms", "", title="Terms as they were added")
+    figure.savefig(folder / "servo.png")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    default = os.environ.get(
+        "BAYESHAPTIC_MEASURED", str(Path(__file__).parents[2] / "shared" / "measured")
+    )
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(default))
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/images/measured"))
+    given = parser.parse_args()
+    given.output.mkdir(parents=True, exist_ok=True)
+    published, further = servo(given.folder / SERVO)
+    draw_servo(published, further, given.output)
+    for found in (published, further):
+        for term in found.terms:
+            print(f"{term.title}: %.4g +- %.2g {term.unit}" % found[term.name])
+        print(f"relative error {100 * found.relative_error:.2f} %, {found.rms:.2f} N rms")
+    for step in further.steps:
+        print(f"{step.term}: {step.held_out_rms:.2f} N on the half not fitted")
+    result = bench(given.folder / BENCH)
+    draw_bench(result, given.output)
+    for name, step in zip(result.names, result.steps, strict=True):
+        out = result.held_out
+        load = result.load_error(step)
+        print(
+            f"{name}: weighted rms {step.rms(~out):.2f} fitted, {step.rms(out):.2f} held out; phase "
+            f"{result.phase_deg(step, out):.2f} degrees held out, "
+            f"{result.phase_deg(step, out | ~out):.2f} all; load off by "
+            f"{100 * np.median(load):.2f} % (median), {100 * np.sqrt(np.mean(load**2)):.2f} % (rms)"
+        )
+    final = result.steps[-1]
+    for basis, value, sd in zip(final.forces, final.strength, final.strength_sd, strict=True):
+        print(f"{basis.title}: {value:.4g} +- {sd * final.rms():.2g} {basis.unit}")
+    print(dict(zip(final.model.names, np.round(final.theta, 7), strict=True)))
+
+
+if __name__ == "__main__":
+    main()

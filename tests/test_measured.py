@@ -1,0 +1,215 @@
+"""Periodic motions and inverse dynamics: on simulated devices, and on the measured recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bayeshaptic as bh
+from bayeshaptic.diagnosis.harmonic_balance import Basis, balance
+from bayeshaptic.diagnosis.inverse_dynamics import inverse_dynamics
+from bayeshaptic.diagnosis.periodic import close_periodic, is_periodic, periodic_tests
+from bayeshaptic.diagnosis.periodic_forces import force_candidates
+from bayeshaptic.diagnosis.state import REPORT, share
+from bayeshaptic.diagnosis.steady_motion import LOAD, one_period, places_of, with_floor
+from bayeshaptic.effects.internal_force import CONNECTION
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.windows import compress
+
+Find = Callable[[str], Path]
+PERIOD_S = 1e-3
+BENCH_COLUMNS = "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"
+WITNESS_COLUMNS = "time=time*1e-6,force=iq_refx[A],position=theta_my*-1[rad]"
+SERVO_COLUMNS = "time=t,force=vir*35.15[N],position=qm[m]"
+TRUE = {"m1": 0.4, "b1": 0.5, "bc": 0.6, "kc": 2e4, "m2": 0.3, "b2": 0.4}
+NOISE = 2e-7
+
+
+def two_masses(drag: float, seed: int = 0, periods: int = 8) -> Recording:
+    """Two masses under a held multisine of 5 to 120 Hz, cubic drag on the body; classical RK4."""
+    rng = np.random.default_rng(seed)
+    samples, substeps = 1000, 8
+    time = np.arange(samples) * PERIOD_S
+    lines = np.arange(5, 121)
+    phases = -np.pi * np.arange(len(lines)) ** 2 / len(lines)
+    force = np.cos(2 * np.pi * lines[:, None] * time + phases[:, None]).sum(axis=0)
+    force *= 4 / force.std()
+    v = TRUE
+    h = PERIOD_S / substeps
+
+    def slope(z: list[float], u: float) -> list[float]:
+        x1, x2, v1, v2 = z
+        pull = v["kc"] * (x1 - x2) + v["bc"] * (v1 - v2)
+        a1 = (u - pull - v["b1"] * v1) / v["m1"]
+        a2 = (pull - v["b2"] * v2 - drag * v2**3) / v["m2"]
+        return [v1, v2, a1, a2]
+
+    z, position = [0.0, 0.0, 0.0, 0.0], []
+    late = np.tile(force, periods + 12).tolist()
+    for u in late:
+        position.append(z[0])
+        for _ in range(substeps):
+            k1 = slope(z, u)
+            k2 = slope([a + h / 2 * b for a, b in zip(z, k1, strict=True)], u)
+            k3 = slope([a + h / 2 * b for a, b in zip(z, k2, strict=True)], u)
+            k4 = slope([a + h * b for a, b in zip(z, k3, strict=True)], u)
+            z = [
+                a + h / 6 * (p + 2 * q + 2 * r + s)
+                for a, p, q, r, s in zip(z, k1, k2, k3, k4, strict=True)
+            ]
+    kept = periods * samples
+    x = np.array(position[-kept:]) + NOISE * rng.standard_normal(kept)
+    return recording_from_arrays(np.array(late[-kept:]), x, period_s=PERIOD_S)
+
+
+def cubic_drag() -> Basis:
+    return Basis("drag", "drag", LOAD, lambda m: -(m.velocity**3))
+
+
+@pytest.fixture(scope="module")
+def dragged() -> Recording:
+    return two_masses(drag=2.0)
+
+
+def known(etfe: bh.Etfe) -> tuple[bh.Model, np.ndarray]:
+    fit = bh.least_squares(bh.free(delay_s=0.0), etfe)
+    return fit.model, fit.theta
+
+
+def test_a_drag_is_sized_from_the_motion_that_it_makes(dragged: Recording) -> None:
+    etfe = bh.estimate_etfe(dragged)
+    windows, period = compress(etfe), one_period(etfe)
+    model, theta = known(etfe)
+    without = balance(model, windows, period, (), theta)
+    found = balance(model, windows, period, (cubic_drag(),), theta)
+    assert found.converged
+    assert without.rms() > 5 and found.rms() < 1.2
+    assert abs(found.strength[0] / 2.0 - 1) < 0.02
+    values = dict(zip(model.names, found.theta, strict=True))
+    assert values["kc"] == pytest.approx(TRUE["kc"], rel=5e-3)
+    assert values["m1"] == pytest.approx(TRUE["m1"], rel=5e-3)
+
+
+def test_the_loop_names_the_drag_and_leaves_noise(dragged: Recording) -> None:
+    etfe = bh.estimate_etfe(dragged)
+    fit = bh.least_squares(bh.free(delay_s=0.0), etfe)
+    loop = close_periodic(etfe, fit, floor=0.0)
+    assert any(test.flagged for test in loop.before)
+    assert [attempt.name for attempt in loop.chosen] == ["drag"]
+    assert loop.chosen[0].addition.place == LOAD
+    assert not any(test.flagged for test in loop.after)
+    assert loop.state.fit.reduced_chi_square < 1.3
+
+
+def test_a_linear_device_gets_nothing() -> None:
+    etfe = bh.estimate_etfe(two_masses(drag=0.0, seed=3))
+    assert is_periodic(etfe)
+    fit = bh.least_squares(bh.free(delay_s=0.0), etfe)
+    assert not any(test.flagged for test in periodic_tests(fit))
+    assert close_periodic(etfe, fit).chosen == ()
+
+
+def test_motion_needs_a_force_that_repeats() -> None:
+    rng = np.random.default_rng(1)
+    force = rng.standard_normal(8000)
+    position = np.cumsum(np.cumsum(force)) * 1e-6
+    etfe = bh.estimate_etfe(recording_from_arrays(force, position, period_s=PERIOD_S))
+    with pytest.raises(InputError, match="repeats"):
+        one_period(etfe)
+
+
+def test_every_force_has_its_place(dragged: Recording) -> None:
+    etfe = bh.estimate_etfe(dragged)
+    model, theta = known(etfe)
+    part = balance(model, compress(etfe), one_period(etfe), (), theta)
+    assert set(part.motions) == set(places_of(model.system(theta)))
+    for variants in force_candidates(model, part.motions).values():
+        for basis in variants:
+            force = basis.force(part.motions[basis.place])
+            assert force.shape == (1000,) and np.all(np.isfinite(force))
+            assert basis.name == "backlash" or basis.unit
+            assert basis.name != "backlash" or basis.place == CONNECTION
+
+
+def servo(friction: float, seed: int = 0) -> Recording:
+    """A mass of 90 kg with dry friction under a PD controller that follows a slow path."""
+    rng = np.random.default_rng(seed)
+    h, mass, damping = 1e-3, 90.0, 200.0
+    time = np.arange(16_000) * h
+    path = 0.1 * np.sin(2 * np.pi * 0.3 * time) + 0.03 * np.sin(2 * np.pi * 0.9 * time)
+    x, v = 0.0, 0.0
+    force, position = np.empty(len(time)), np.empty(len(time))
+    for k, target in enumerate(path):
+        position[k] = x + 1e-6 * rng.standard_normal()
+        force[k] = 5e4 * (target - position[k]) - 3e3 * v - 3.0
+        free = v + h / mass * (force[k] + 3.0 - damping * v)
+        v = float(np.sign(free) * max(abs(free) - h / mass * friction, 0.0))
+        x += h * v
+    return recording_from_arrays(force, position, period_s=h)
+
+
+def test_inverse_dynamics_of_a_servo() -> None:
+    found = inverse_dynamics(servo(20.0), terms=("coulomb",))
+    truth = {"mass": 90.0, "damping": 200.0, "coulomb": 20.0, "offset": -3.0}
+    for name, value in truth.items():
+        estimate, sd = found[name]
+        assert abs(estimate - value) < max(4 * sd, 0.01 * abs(value)), name
+    assert found.steps[1].held_out_rms < 0.3 * found.steps[0].held_out_rms
+
+
+def test_inverse_dynamics_finds_the_friction_first() -> None:
+    found = inverse_dynamics(servo(20.0))
+    assert found.steps[1].term == "coulomb"
+    assert all(b.held_out_rms < a.held_out_rms for a, b in zip(found.steps, found.steps[1:]))
+
+
+def test_inverse_dynamics_refuses_in_one_line() -> None:
+    recording = servo(0.0)
+    with pytest.raises(InputError, match="no term nonsense"):
+        inverse_dynamics(recording, terms=("nonsense",))
+    with pytest.raises(InputError, match="too few"):
+        inverse_dynamics(recording, cutoff_hz=1.0)
+
+
+def test_the_published_values_of_emps(measured: Find) -> None:
+    recording = bh.read_recording(measured("emps/DATA_EMPS.mat"), columns=SERVO_COLUMNS)
+    found = inverse_dynamics(recording, terms=("coulomb",))
+    published = {"mass": 95.1089, "damping": 203.5034, "coulomb": 20.3935, "offset": -3.1648}
+    for name, value in published.items():
+        estimate, sd = found[name]
+        assert abs(estimate - value) < sd, name
+    assert found.relative_error == pytest.approx(0.0408, abs=0.001)
+    linear, friction = (step.held_out_rms for step in found.steps)
+    assert linear == pytest.approx(9.1, abs=0.1) and friction == pytest.approx(2.2, abs=0.1)
+    assert inverse_dynamics(recording).steps[-1].held_out_rms < 1.2
+
+
+def test_drag_predicts_lines_and_a_load_that_were_not_fitted(measured: Find) -> None:
+    path = measured("two_mass_bench/MultisineTypeA.mat")
+    etfe = bh.estimate_etfe(bh.read_recording(path, columns=BENCH_COLUMNS))
+    witness = bh.read_recording(path, columns=WITNESS_COLUMNS)
+    windows, period = compress(with_floor(etfe, 0.002)), one_period(etfe)
+    load = one_period(etfe, witness.position)
+    out = share(windows, REPORT)
+    fit = bh.least_squares(bh.free(), etfe)
+    base = balance(fit.model, windows, period, (), fit.theta, fitted=~out)
+    drags = [
+        b
+        for b in force_candidates(fit.model, base.motions)["drag"]
+        if b.place == LOAD and "power 5" in b.title
+    ]
+    found = balance(fit.model, windows, period, tuple(drags), base.theta, fitted=~out)
+    assert found.converged and found.strength[0] > 20 * found.strength_sd[0]
+    assert found.rms(out) < 0.65 * base.rms(out)
+
+    def load_error(motions: dict) -> float:
+        inside = (load.harmonics >= 11) & (load.harmonics <= 120)
+        predicted = load.transform(motions[LOAD].position)[inside]
+        return float(np.median(np.abs(predicted / load.transform(load.position)[inside] - 1)))
+
+    assert load_error(found.motions) < 0.9 * load_error(base.motions)
