@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.errors import InputError, describe
 from bayeshaptic.recordings.read import recording_name
@@ -43,6 +43,8 @@ class Settings:
     delay_s, delay_sd_s : float or None
     band_hz : (float, float) or None
     seed : int
+    close_loop : bool
+        Whether to look for what the model lacks.
     """
 
     columns: str | None = None
@@ -54,6 +56,7 @@ class Settings:
     delay_sd_s: float | None = None
     band_hz: tuple[float, float] | None = None
     seed: int = 0
+    close_loop: bool = True
 
 
 @dataclass(frozen=True)
@@ -196,25 +199,30 @@ def _report(
 ) -> Reported:
     """Analyse one measurement and write its report."""
     from bayeshaptic.diagnosis.analysis import analyse
+    from bayeshaptic.diagnosis.closed import close_loop
     from bayeshaptic.report import write_report
     from bayeshaptic.report.headline import headline
+    from bayeshaptic.report.summary import analysis_of
 
-    analysis = analyse(
-        measurement,
-        model=settings.model,
-        device=device,
-        delay_s=settings.delay_s,
-        delay_sd_s=settings.delay_sd_s,
-        band_hz=settings.band_hz,
-        prior=prior,
-        held=held,
-        seed=settings.seed,
-        progress=progress,
-    )
-    page = write_report(analysis, folder)
+    options: dict[str, Any] = {
+        "model": settings.model,
+        "device": device,
+        "delay_s": settings.delay_s,
+        "delay_sd_s": settings.delay_sd_s,
+        "band_hz": settings.band_hz,
+        "prior": prior,
+        "held": held,
+        "seed": settings.seed,
+        "progress": progress,
+    }
+    run = close_loop if settings.close_loop else analyse
+    result = run(measurement=measurement, **options)
+    page = write_report(result, folder)
     summary = json.loads((page.parent / "summary.json").read_text(encoding="utf-8"))
-    warnings = tuple(notice.text for notice in analysis.notices if notice.level == "warning")
-    return Reported(name, page, headline(analysis), summary, warnings)
+    warnings = tuple(
+        notice.text for notice in analysis_of(result).notices if notice.level == "warning"
+    )
+    return Reported(name, page, headline(result), summary, warnings)
 
 
 def _refuse_reading_options(job: Job) -> None:

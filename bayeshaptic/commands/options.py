@@ -110,6 +110,12 @@ def add_analysis_options(parser: argparse.ArgumentParser) -> None:
         help="frequencies used, in Hz (default: chosen from the data)",
     )
     analysis.add_argument(
+        "--no-loop",
+        action="store_true",
+        help="take the model as it is, without looking for what it lacks: quicker, and the limit "
+        "may be far off where something is missing",
+    )
+    analysis.add_argument(
         "--seed",
         type=seed,
         default=0,
@@ -132,6 +138,7 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         delay_sd_s=arguments.delay_sd_s,
         band_hz=arguments.band,
         seed=arguments.seed,
+        close_loop=not arguments.no_loop,
     )
 
 

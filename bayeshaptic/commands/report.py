@@ -42,12 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: ./NAME-report, NAME being the source's name without its endings)",
     )
     add_analysis_options(parser)
-    parser.add_argument(
-        "--no-loop",
-        action="store_true",
-        help="fit the model as declared, without looking for what it lacks (as yet, the report "
-        "never looks: it says how far the residual is above the noise)",
-    )
     add_quiet(parser)
 
 
