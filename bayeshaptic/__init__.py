@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bayeshaptic.devices import Device, device_names, load_device
     from bayeshaptic.diagnosis.analysis import Analysis, analyse
+    from bayeshaptic.diagnosis.closed import Closed, close_loop
     from bayeshaptic.errors import BayeshapticWarning, InputError, Notice
     from bayeshaptic.inference import Fit, Posterior, least_squares, load_posterior, sample
     from bayeshaptic.inference.choose import Choice, choose_model
@@ -60,6 +61,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "bayeshaptic.devices": ("Device", "device_names", "load_device"),
     "bayeshaptic.diagnosis.analysis": ("Analysis", "analyse"),
+    "bayeshaptic.diagnosis.closed": ("Closed", "close_loop"),
     "bayeshaptic.errors": ("BayeshapticWarning", "InputError", "Notice"),
     "bayeshaptic.inference": ("Fit", "Posterior", "least_squares", "load_posterior", "sample"),
     "bayeshaptic.inference.choose": ("Choice", "choose_model"),
@@ -98,6 +100,7 @@ __all__ = [
     "Analysis",
     "BayeshapticWarning",
     "Choice",
+    "Closed",
     "CriticalStiffness",
     "Device",
     "Etfe",
@@ -116,6 +119,7 @@ __all__ = [
     "Uniform",
     "analyse",
     "choose_model",
+    "close_loop",
     "critical_stiffness",
     "device_names",
     "estimate_etfe",

@@ -24,7 +24,8 @@ Complexes = NDArray[np.complex128]
 
 # Dense about zero, where friction turns round; no wider than the motion often is.
 _KNOTS = np.array([-2.2, -1.3, -0.7, -0.3, -0.08, 0.08, 0.3, 0.7, 1.3, 2.2])
-VELOCITY, POSITION, STRETCH = "velocity", "position", "stretch"
+_EDGES = (0.003, 0.997)  # share of the time outside of which no knot stands
+VELOCITY, POSITION, STRETCH, COMMAND = "velocity", "position", "stretch", "command"
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,9 @@ class ForceCurve:
     Attributes
     ----------
     over : str
-        "velocity" and "position" of the motor, or "stretch" of the connection.
+        "velocity" and "position" of the motor, "stretch" of the connection, or "command".
     motion : ndarray, shape (K,)
-        Position units, or position units a second.
+        Position units, position units a second, or force units.
     force, sd : ndarray, shape (K,)
         Force units; its mean over the recording is zero, because a constant cannot be seen.
     """
@@ -54,11 +55,12 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
     """
     _, velocity = driven_motion(fit, recording)
     found = {VELOCITY: velocity, POSITION: recording.position - recording.position.mean()}
+    force = recording.force - recording.force.mean()
     system = fit.model.system(fit.theta)
     if len(system.mechanism.masses) > 1:
-        force = recording.force - recording.force.mean()
         ends = [linear_motion(system, force, recording.period_s, mass=n)[0] for n in (0, 1)]
         found[STRETCH] = ends[0] - ends[1]
+    found[COMMAND] = force
     return found
 
 
@@ -70,16 +72,20 @@ def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
     fit : Fit
     etfe : Etfe
         Of a recording with random excitation.
-    over : {"velocity", "position", "stretch"}
+    over : {"velocity", "position", "stretch", "command"}
     motion : ndarray, shape (N,)
         As `motions` gives it.
     """
     assert etfe.recording is not None
+    low, high = np.quantile(motion, _EDGES)
     knots = _KNOTS * motion.std()
+    knots = knots[(knots > low) & (knots < high)]
     hats = [np.interp(motion, knots, row) for row in np.eye(len(knots))]
     s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     if over == STRETCH:
         response = pair_response(fit, s)
+    elif over == COMMAND:
+        response = fit.response(s.imag / (2 * np.pi))
     else:
         response = fit.model.system(fit.theta).continuous_response(s)[0]
     at_lines = line_transform(etfe, etfe.recording)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.report.loop_words import parameter_words
+from bayeshaptic.report.loop_words import parameter_words, shown_estimates
 from bayeshaptic.report.quantities import estimate, pure, quantity, scale
 from bayeshaptic.report.tables import ParameterRow, Rows
 
@@ -146,7 +146,7 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
     """Rows for the parameter table: of effects whose numbers are not in the posterior."""
     rows = []
     for effect, known in zip(closed.effects, closed.diagnosis["effects"], strict=True):
-        for name in effect.estimates:
+        for name in shown_estimates(effect):
             value = known["parameters"][name]
             row = scale(value["mean"], value["unit"])
             sd = value["sd"]
@@ -171,7 +171,8 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
 
 def _parameters(closed: Closed, effect: Accepted, known: Mapping[str, Any]) -> Rows:
     rows = []
-    for name, value in known.items():
+    for name in (*effect.parameters, *shown_estimates(effect)):
+        value = known[name]
         row = scale(value["mean"], value["unit"])
         sd = value["sd"]
         title = (

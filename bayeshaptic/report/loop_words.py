@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _SAME = 0.005  # relative change of an error that is not worth a word
 _SAME_DB = 0.05
 _OVER = "_last_over_first"
+_WORST = "worst_part"  # the evidence says which
 _MOST_NUMBERS = 3
 # Titles with one of these words take no article.
 _UNCOUNTABLE = {"backlash", "damping", "delay", "drag", "friction", "quantisation", "stiffness"}
@@ -109,6 +110,11 @@ def parameter_words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def shown_estimates(effect: Accepted) -> tuple[str, ...]:
+    """Names of the numbers beside the posterior that say something by themselves."""
+    return tuple(name for name in effect.estimates if name != _WORST)
+
+
 def plus_minus(mean: float, sd: float | None, unit: str) -> str:
     """A number with its error and unit: ``"0.590 ± 0.020 N"``."""
     row = scale(mean, unit)
@@ -149,7 +155,7 @@ def _tried(closed: Closed) -> str:
     last = max((c.round for c in closed.traced.candidates), default=0)
     tried = [c for c in closed.traced.candidates if c.round == last and not c.accepted]
     if not tried:
-        return "No effect of the library is of this class and fits this device."
+        return "No effect of the library that could be behind it explains any of it."
     names = ", ".join(c.title for c in sorted(tried, key=lambda c: -c.score))
     return (
         f"Tried without success, the best first: {names}. None of them predicts the part of the "

@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.force_curve import ForceCurve
 
 _TITLES = {
-    "velocity": "velocity of the motor",
-    "position": "position of the motor",
-    "stretch": "stretch of the connection",
+    "velocity": "velocity",
+    "position": "position",
+    "stretch": "stretch",
+    "command": "command",
 }
+_VAGUE = 6.0  # times the usual error of a curve: such a point would only hide the others
 _BEFORE: dict[str, Any] = {
     "color": style.OTHER,
     "fmt": "s--",
@@ -50,7 +52,7 @@ def draw(closed: Closed) -> Figure:
     """A panel for each motion, one unit of force for all."""
     curves = _curves(closed)
     unit = closed.base.etfe.force_unit
-    highest = max(float(np.abs(c.force).max()) for row in curves.values() for c, _ in row)
+    highest = max(float(np.median(np.abs(c.force))) for row in curves.values() for c, _ in row)
     force = scale(highest, unit)
     figure = style.new_figure(3.1)
     panels = figure.subplots(1, len(curves), sharey=True, squeeze=False)[0]
@@ -70,7 +72,7 @@ def draw(closed: Closed) -> Figure:
 
 
 def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]]:
-    from bayeshaptic.diagnosis.force_curve import force_curve, motions
+    from bayeshaptic.diagnosis.force_curve import COMMAND, force_curve, motions
 
     base, analysis = closed.base, closed.analysis
     assert base.recording is not None
@@ -80,6 +82,8 @@ def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]
         analysis.etfe.recording.samples == base.recording.samples
     )
     for over, motion in motions(base.fit, base.recording).items():
+        if over == COMMAND and not _saturates(closed):
+            continue
         row = [(force_curve(base.fit, base.etfe, over, motion), _BEFORE)]
         if nonlinear and same:
             row.append((force_curve(analysis.fit, base.etfe, over, motion), _FORCE))
@@ -89,6 +93,11 @@ def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]
     return found
 
 
+def _saturates(closed: Closed) -> bool:
+    tests = (*closed.traced.before, *closed.traced.after)
+    return any(test.flagged and test.name.startswith("u") for test in tests)
+
+
 def _panel(
     axes: Axes,
     closed: Closed,
@@ -96,15 +105,18 @@ def _panel(
     row: list[tuple[ForceCurve, dict[str, Any]]],
     factor: float,
 ) -> None:
-    unit = closed.base.etfe.position_unit + ("/s" if over == "velocity" else "")
+    etfe = closed.base.etfe
+    unit = etfe.position_unit + ("/s" if over == "velocity" else "")
+    unit = etfe.force_unit if over == "command" else unit
     motion = scale(float(np.abs(row[0][0].motion).max()), unit)
     style.panel(axes, f"{_TITLES[over]}, {motion.unit}")
     axes.axhline(0, color=style.PRIOR, linewidth=0.7)
     for curve, look in row:
+        clear = curve.sd <= _VAGUE * np.median(curve.sd)
         axes.errorbar(
-            curve.motion * motion.factor,
-            curve.force * factor,
-            yerr=2 * curve.sd * factor,
+            curve.motion[clear] * motion.factor,
+            curve.force[clear] * factor,
+            yerr=2 * curve.sd[clear] * factor,
             markersize=3.5,
             linewidth=1.0,
             elinewidth=0.7,

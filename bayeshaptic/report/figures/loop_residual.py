@@ -27,7 +27,7 @@ def draw(closed: Closed) -> Figure:
     """The rms in third octaves above, each window's score below; before and after."""
     figure = style.new_figure(4.2)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    fits = {"before": closed.base.fit}
+    fits = {"before" if closed.effects else "model as declared": closed.base.fit}
     if closed.effects:
         fits["after, with what was added"] = closed.analysis.fit
     style.panel(top, y="rms per third\noctave / noise")

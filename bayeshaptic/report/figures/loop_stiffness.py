@@ -41,13 +41,19 @@ def rows(closed: Closed) -> tuple[Row, ...]:
     for label, analysis, colour in pairs:
         found += _model(label, analysis, colour)
         if analysis is closed.base or closed.effects:
-            mine = "measurement alone" + ("" if analysis is closed.base else ", corrected")
-            found += _own(mine, analysis)
+            found += _own(_own_label(closed, analysis), analysis)
     first, *rest = found
     own = [row for row in rest if row.look == style.DATA]
     if len(own) == 2 and (own[0].low, own[0].high) == (own[1].low, own[1].high):
         rest.remove(own[1])
     return (first, *rest)
+
+
+def _own_label(closed: Closed, analysis: Analysis) -> str:
+    if analysis is closed.base:
+        return "measurement alone"
+    worst = any(effect.family == "time-varying" for effect in closed.effects)
+    return "measurement alone, worst part" if worst else "measurement alone, corrected"
 
 
 def draw(closed: Closed) -> Figure:

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 _LEAST = 0.05
 
 
+def _first(closed: Closed) -> str:
+    return "before" if closed.effects else "model as declared"
+
+
 def draw(closed: Closed) -> Figure:
     """A row a test: its statistic over its threshold, on a logarithmic axis."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -38,7 +42,7 @@ def draw(closed: Closed) -> Figure:
         axes.plot(
             [old], [place], "s", color=style.OTHER, markersize=5, markerfacecolor="white", zorder=3
         )
-    axes.plot([], [], "s", color=style.OTHER, markerfacecolor="white", label="before")
+    axes.plot([], [], "s", color=style.OTHER, markerfacecolor="white", label=_first(closed))
     if after:
         axes.plot([], [], "o", color=style.MODEL, label="after, with what was added")
     axes.set_xscale("log")
