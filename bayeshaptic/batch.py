@@ -199,9 +199,10 @@ def _report(
 ) -> Reported:
     """Analyse one measurement and write its report."""
     from bayeshaptic.diagnosis.analysis import analyse
-    from bayeshaptic.diagnosis.closed import close_loop
+    from bayeshaptic.diagnosis.closed import Closed, close_loop
     from bayeshaptic.report import write_report
     from bayeshaptic.report.headline import headline
+    from bayeshaptic.report.loop_words import in_short
     from bayeshaptic.report.summary import analysis_of
 
     options: dict[str, Any] = {
@@ -222,7 +223,8 @@ def _report(
     warnings = tuple(
         notice.text for notice in analysis_of(result).notices if notice.level == "warning"
     )
-    return Reported(name, page, headline(result), summary, warnings)
+    remark = in_short(result) if isinstance(result, Closed) else ""
+    return Reported(name, page, headline(result), remark, summary, warnings)
 
 
 def _refuse_reading_options(job: Job) -> None:

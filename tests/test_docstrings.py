@@ -60,7 +60,7 @@ def public_classes() -> Iterator[tuple[str, type]]:
 def mentioned(docstring: str) -> set[str]:
     """Names in Parameters and Attributes sections, or for a short docstring every word of it."""
     listed = documented(docstring, "Parameters") + documented(docstring, "Attributes")
-    for reference in re.findall(r"For the \w+ see `(\w+)`", docstring):  # "For the rest see `grasped`."
+    for reference in re.findall(r"For the \w+ see `(\w+)`", docstring):  # ... see `grasped`.
         listed += documented(getattr(bayeshaptic, reference).__doc__, "Parameters")
     return set(listed) or set(re.findall(r"\w+", docstring))
 

@@ -66,6 +66,8 @@ class Talk:
                 failed += 1
                 continue
             self.say(f"{reported.name}: {reported.headline.sentence}")
+            if reported.remark:
+                self.say(f"  {reported.remark}")
             for warning in reported.warnings[:MOST_WARNINGS]:
                 self.say(f"  warning: {warning}")
             more = len(reported.warnings) - MOST_WARNINGS

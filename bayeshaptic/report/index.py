@@ -30,6 +30,8 @@ class Reported:
         Its report; None where it failed.
     headline : Headline or None
         The stiffness to act on, or why there is none.
+    remark : str
+        What closing the loop found, in a sentence; empty without it.
     summary : mapping
         The content of its ``summary.json``; empty where it failed.
     warnings : tuple of str
@@ -40,6 +42,7 @@ class Reported:
     name: str
     page: Path | None = None
     headline: Headline | None = None
+    remark: str = ""
     summary: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     error: str | None = None
