@@ -2,8 +2,8 @@
 
     python -m examples.measured [FOLDER] [-o docs/images/measured]
 
-FOLDER holds `two_mass_bench/MultisineTypeA.mat` and `emps/DATA_EMPS.mat`, which the project does not
-contain; docs/measured.md says where they come from.
+FOLDER holds `two_mass_bench/MultisineTypeA.mat` and `emps/DATA_EMPS.mat`, which the project does
+not contain; docs/measured.md says where they come from.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Bench:
 
     def ratio(self, step: Balanced) -> NDArray[np.complex128]:
         """Model over measurement at every line."""
-        noise = np.sqrt((self.windows.scatter / (self.windows.lines - 2)))
+        noise = np.sqrt(self.windows.scatter / (self.windows.lines - 2))
         measured = self.windows.target[:, 0]
         return np.asarray(1 - step.residual * noise / measured)
 
@@ -134,7 +134,7 @@ def draw_bench(found: Bench, folder: Path) -> None:
     upper.plot(seconds, 1e3 * measured, color=DATA, lw=0.6, label="load encoder")
     for step, colour, name in ((first, OTHER, "base model"), (last, MODEL, "with what was found")):
         error = measured - step.motions[LOAD].position
-        upper.plot(seconds, 1e3 * error - 250, color=colour, lw=0.7, label=f"error, {name}")
+        upper.plot(seconds, 1e4 * error - 280, color=colour, lw=0.7, label=f"10 x error, {name}")
     panel(upper, "time in the period, s", "load angle, mrad", title="Predicted, never fitted")
     upper.legend(fontsize=7, frameon=False, ncols=3)
     excited = found.load.excited[
@@ -200,16 +200,16 @@ def main() -> None:
         for term in found.terms:
             print(f"{term.title}: %.4g +- %.2g {term.unit}" % found[term.name])
         print(f"relative error {100 * found.relative_error:.2f} %, {found.rms:.2f} N rms")
-    for step in further.steps:
-        print(f"{step.term}: {step.held_out_rms:.2f} N on the half not fitted")
+    for added in further.steps:
+        print(f"{added.term}: {added.held_out_rms:.2f} N on the half not fitted")
     result = bench(given.folder / BENCH)
     draw_bench(result, given.output)
     for name, step in zip(result.names, result.steps, strict=True):
         out = result.held_out
         load = result.load_error(step)
         print(
-            f"{name}: weighted rms {step.rms(~out):.2f} fitted, {step.rms(out):.2f} held out; phase "
-            f"{result.phase_deg(step, out):.2f} degrees held out, "
+            f"{name}: weighted rms {step.rms(~out):.2f} fitted, {step.rms(out):.2f} held out; "
+            f"phase {result.phase_deg(step, out):.2f} degrees held out, "
             f"{result.phase_deg(step, out | ~out):.2f} all; load off by "
             f"{100 * np.median(load):.2f} % (median), {100 * np.sqrt(np.mean(load**2)):.2f} % (rms)"
         )

@@ -143,9 +143,33 @@ def balance(
             break
     columns = joint.columns(theta)
     return Balanced(
-        model, theta, forces, strength, joint.sds(theta), columns, motions,
-        joint.residual(theta, strength), converged,
+        model,
+        theta,
+        forces,
+        strength,
+        joint.sds(theta),
+        columns,
+        motions,
+        joint.residual(theta, strength),
+        converged,
     )
+
+
+def promise(
+    part: Balanced, windows: Windows, period: Period, basis: Basis, fitted: NDArray[np.bool_]
+) -> float:
+    """Gain in log likelihood that one more force promises, to first order, the motion as it is.
+
+    The noise is as large as what is left.  Cheap: it tells which forces are worth a balance.
+    """
+    forces = (*part.forces, basis)
+    unit = [period.transform(b.force(part.motions[b.place])) for b in forces]
+    own = np.flatnonzero(fitted)
+    joint = _Joint(part.model, windows, period, forces, np.array(unit), own)
+    left, slope = joint.linearised(part.theta, np.append(part.strength, 0.0))
+    along = np.linalg.qr(slope)[0].T @ left
+    share = min(float(along @ along / (left @ left)), 0.999)
+    return -len(own) * float(np.log1p(-share))
 
 
 def _settle(
@@ -237,12 +261,18 @@ class _Joint:
         size = self.model.size
         return self.here.natural(phi[:, :size])[0], phi[0, size:] * unit
 
+    def linearised(self, theta: Floats, strength: Floats) -> tuple[Floats, Floats]:
+        """Residuals of the lines to fit, (N,), and their slope, (N, P + J)."""
+        columns = self.columns(theta)
+        phi = np.concatenate([self.here.coordinate(theta), strength / self._unit(columns)])[None]
+        residuals = self._residuals(columns)
+        return residuals(phi)[0], jacobian(residuals, phi)[0]
+
     def sds(self, theta: Floats) -> Floats:
         """Standard deviations of the strengths at unit noise, shape (J,)."""
         if not self.forces:
             return np.zeros(0)
-        columns = self.columns(theta)
-        phi = np.concatenate([self.here.coordinate(theta), np.zeros(len(columns))])
-        slope = jacobian(self._residuals(columns), phi[None])[0]
+        slope = self.linearised(theta, np.zeros(len(self.forces)))[1]
         covariance = np.linalg.pinv(slope.T @ slope)
-        return np.sqrt(np.diag(covariance))[self.model.size :] * self._unit(columns)
+        sd = np.sqrt(np.diag(covariance))[self.model.size :]
+        return np.asarray(sd * self._unit(self.columns(theta)))

@@ -217,7 +217,7 @@ def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Te
             f"stribeck_{part:g}",
             f"friction that differs below {part * fast:.3g} {x}/s",
             force,
-            lambda p, part=part: np.sign(p.velocity) * np.exp(-((p.velocity / (part * fast)) ** 2)),
+            _slow_friction(part * fast),
         )
         for part in (0.03, 0.1, 0.3, 1.0)
     )
@@ -248,6 +248,11 @@ def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Te
     )
 
 
+def _slow_friction(velocity: float) -> Callable[[Path], Floats]:
+    """Friction that fades out around a velocity (Stribeck's law, less the Coulomb part)."""
+    return lambda p: np.sign(p.velocity) * np.exp(-((p.velocity / velocity) ** 2))
+
+
 def _grow(
     columns: dict[str, Floats], chosen: list[str], force: Floats, steps: list[Step]
 ) -> list[Step]:
@@ -274,7 +279,7 @@ def _held_out(columns: dict[str, Floats], names: list[str], force: Floats) -> tu
     for own in (first, ~first):
         value = np.linalg.lstsq(design[~own], force[~own], rcond=None)[0]
         squares.append(np.mean((force[own] - design[own] @ value) ** 2))
-    return float(np.sqrt(np.mean(squares))), np.sqrt(squares)
+    return float(np.sqrt(np.mean(squares))), np.sqrt(np.array(squares, dtype=np.float64))
 
 
 def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:

@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.harmonic_balance import Balanced, Basis, balance
+from bayeshaptic.diagnosis.harmonic_balance import Balanced, Basis, balance, promise
 from bayeshaptic.diagnosis.linear_trials import linear_candidates
 from bayeshaptic.diagnosis.periodic_forces import force_candidates
 from bayeshaptic.diagnosis.residual import Test, chi_square_score, frequency_tests, smooth_columns
 from bayeshaptic.diagnosis.state import CHOOSE, FIT, Accepted, Estimate, State, share
 from bayeshaptic.diagnosis.steady_motion import Period, one_period, with_floor
 from bayeshaptic.effects.effect import LinearEffect
+from bayeshaptic.effects.internal_force import Place
 from bayeshaptic.inference.least_squares import Fit, polish, refine, summarise
 from bayeshaptic.inference.screening import promising_starts
 from bayeshaptic.recordings.etfe import Etfe
@@ -35,6 +36,8 @@ ROUNDS = 6
 FLOOR = 0.002
 """No line is trusted to better than this share of its response while candidates are weighed."""
 _ENOUGH = 8.0
+_PROMISE = 2.0  # to first order, on the lines to fit: forces that offer less are not tried,
+_NEAR = 0.25  # nor those that offer so much less than the best one
 _SHARE = 0.15  # of the gain on the lines that were fitted
 _THRESHOLD = 5.0
 
@@ -167,48 +170,54 @@ def _attempts(
     etfe: Etfe, windows: Windows, period: Period, part: Balanced, tick: Tick | None
 ) -> tuple[Attempt, ...]:
     """All candidates, the best variant of each, best score first."""
-    found: dict[tuple[str, object], Attempt] = {}
-    there = {(basis.name, basis.place) for basis in part.forces}
-    for variants in force_candidates(part.model, part.motions).values():
-        for basis in variants:
-            key = (basis.name, basis.place)
-            if key in there:
-                continue
-            if tick and key not in found:
-                tick(basis.title)
-            attempt = _with_force(windows, period, part, basis)
-            if attempt and (key not in found or attempt.score > found[key].score):
-                found[key] = attempt
+    found: dict[tuple[str, Place | None], Attempt] = {}
+    for basis in _promising(windows, period, part):
+        if tick:
+            tick(basis.title)
+        attempt = _with_force(windows, period, part, basis)
+        key = (basis.name, basis.place)
+        if attempt and (key not in found or attempt.score > found[key].score):
+            found[key] = attempt
     rest = replace(windows, target=windows.target - part.added[:, None])
     for effect in linear_candidates(part.model, etfe):
         if tick and (effect.name, None) not in found:
             tick(effect.title)
         attempt = _with_linear(etfe, windows, rest, period, part, effect)
-        key = (effect.name, None)
-        if key not in found or attempt.score > found[key].score:
-            found[key] = attempt
+        own = (effect.name, None)
+        if own not in found or attempt.score > found[own].score:
+            found[own] = attempt
     return tuple(sorted(found.values(), key=lambda attempt: -attempt.score))
 
 
-def _with_force(
-    windows: Windows, period: Period, part: Balanced, basis: Basis
-) -> Attempt | None:
-    tried = balance(
-        part.model,
-        windows,
-        period,
-        (*part.forces, basis),
-        part.theta,
-        np.append(part.strength, 0.0),
-        share(windows, FIT),
-    )
+def _promising(windows: Windows, period: Period, part: Balanced) -> list[Basis]:
+    """Forces that are not there yet and are worth a balance."""
+    there = {(basis.name, basis.place) for basis in part.forces}
+    offers = [
+        (promise(part, windows, period, basis, share(windows, FIT)), basis)
+        for variants in force_candidates(part.model, part.motions).values()
+        for basis in variants
+        if (basis.name, basis.place) not in there
+    ]
+    least = max([_PROMISE, *(_NEAR * offer for offer, _ in offers)])
+    return [basis for offer, basis in offers if offer >= least]
+
+
+def _with_force(windows: Windows, period: Period, part: Balanced, basis: Basis) -> Attempt | None:
+    fitted = share(windows, FIT)
+    forces, strength = (*part.forces, basis), np.append(part.strength, 0.0)
+    tried = balance(part.model, windows, period, forces, part.theta, strength, fitted)
     if not tried.converged or (basis.positive and tried.strength[-1] < 0):
         return None
     return _judged(basis, basis.title, "nonlinear", 1, part, tried, windows)
 
 
 def _with_linear(
-    etfe: Etfe, windows: Windows, rest: Windows, period: Period, part: Balanced, effect: LinearEffect
+    etfe: Etfe,
+    windows: Windows,
+    rest: Windows,
+    period: Period,
+    part: Balanced,
+    effect: LinearEffect,
 ) -> Attempt:
     fitted = share(windows, FIT)
     model = part.model.with_effect(effect)

@@ -21,9 +21,7 @@ _GAPS = (0.1, 0.3, 1.0)  # of the stretch's rms
 _SHARP = 0.02  # of the velocity's rms: where sign(v) is rounded off
 
 
-def force_candidates(
-    model: Model, motions: Mapping[Place, Motion]
-) -> dict[str, tuple[Basis, ...]]:
+def force_candidates(model: Model, motions: Mapping[Place, Motion]) -> dict[str, tuple[Basis, ...]]:
     """Effect name to its variants, for the places that have a motion.
 
     Parameters

@@ -168,7 +168,9 @@ def no_force(period: Period, places: tuple[Place, ...]) -> Applied:
     return Applied(places, zero, zero)
 
 
-def apply(period: Period, forces: Mapping[Place, Floats], motions: Mapping[Place, Motion]) -> Applied:
+def apply(
+    period: Period, forces: Mapping[Place, Floats], motions: Mapping[Place, Motion]
+) -> Applied:
     """Forces over one period, shape (N,) each, taken apart by regression on their motion."""
     proportional, rest = [], []
     for place, force in forces.items():
