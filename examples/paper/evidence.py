@@ -14,7 +14,7 @@ LogLikelihood = Callable[[Floats], Floats]
 
 DRAWS = 800
 MOVES = 6
-RUNS = 3
+RUNS = 2
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,8 @@ class Hypothesis:
     extra : tuple of Unknown
     add : callable
         (system, values) -> system with what is more.
+    known : callable, optional
+        Log density, for each system, of what is known besides; it belongs to the prior.
     """
 
     title: str
@@ -54,6 +56,7 @@ class Hypothesis:
     wider: Mapping[str, float] = field(default_factory=dict)
     extra: tuple[Unknown, ...] = ()
     add: Callable[[LinearSystem, Values], LinearSystem] = lambda system, values: system
+    known: Callable[[LinearSystem], Floats] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -108,17 +111,28 @@ class Weighed:
 
 def weigh(hypotheses: Sequence[Hypothesis], data: RelayData, seed: int = 0) -> list[Weighed]:
     """The evidence of each, and K_CR before and after."""
-    rng = np.random.default_rng(seed)
-    weighed = []
-    for hypothesis in hypotheses:
+    return [_weighed(hypothesis, data, seed) for hypothesis in hypotheses]
 
-        def log_likelihood(z: Floats, of: Hypothesis = hypothesis) -> Floats:
-            with np.errstate(all="ignore"):
-                return data.log_likelihood(of.system(z)).sum(axis=1)
 
-        size = len(hypothesis.names)
-        found = evidence(log_likelihood, size, seed)
-        before, _ = hypothesis.limits(rng.standard_normal((1000, size)))
-        after, frequency = hypothesis.limits(found.draws[:1000])
-        weighed.append(Weighed(hypothesis, found, before, after, frequency))
-    return weighed
+def _weighed(hypothesis: Hypothesis, data: RelayData, seed: int) -> Weighed:
+    """With what is known besides, the evidence is that of all over that of what is known."""
+    size, known = len(hypothesis.names), hypothesis.known
+
+    def log_likelihood(z: Floats) -> Floats:
+        system = hypothesis.system(z)
+        with np.errstate(all="ignore"):
+            relay = data.log_likelihood(system).sum(axis=1)
+        return relay if known is None else relay + known(system)
+
+    found = evidence(log_likelihood, size, seed)
+    before = np.random.default_rng(seed).standard_normal((1000, size))
+    if known is not None:
+        prior = evidence(lambda z: known(hypothesis.system(z)), size, seed)
+        found = replace(
+            found,
+            log_evidence=found.log_evidence - prior.log_evidence,
+            sd=float(np.hypot(found.sd, prior.sd)),
+        )
+        before = prior.draws[:1000]
+    after, frequency = hypothesis.limits(found.draws[:1000])
+    return Weighed(hypothesis, found, hypothesis.limits(before)[0], after, frequency)
