@@ -154,7 +154,9 @@ def inverse_dynamics(
 
     def thin(signal: Floats) -> Floats:
         inner = signal[edge:-edge]
-        return decimate(inner, every, zero_phase=True) if every > 1 else inner
+        if every == 1:
+            return inner
+        return np.asarray(decimate(inner, every, zero_phase=True), dtype=np.float64)
 
     force, time_s = thin(recording.force), np.arange(recording.samples)[edge:-edge:every]
     start, library = _terms(recording, path)
@@ -180,9 +182,9 @@ def inverse_dynamics(
         tuple(steps),
         tuple(tried),
         float(np.linalg.norm(left) / np.linalg.norm(force)),
-        time_s * recording.period_s,
+        np.asarray(time_s * recording.period_s, dtype=np.float64),
         force,
-        design @ value,
+        np.asarray(design @ value, dtype=np.float64),
         Path(*(thin(a) for a in (path.position, path.velocity, path.acceleration, path.jerk))),
         cutoff_hz,
     )
@@ -292,4 +294,5 @@ def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:
     sums = np.add.reduceat(scores, np.arange(0, len(force), block))
     bread = np.linalg.inv(design.T @ design)
     covariance = bread @ (sums.T @ sums) @ bread
-    return value, np.sqrt(np.diag(covariance) * len(sums) / max(len(sums) - design.shape[1], 1))
+    sd = np.sqrt(np.diag(covariance) * len(sums) / max(len(sums) - design.shape[1], 1))
+    return np.asarray(value, dtype=np.float64), np.asarray(sd, dtype=np.float64)
