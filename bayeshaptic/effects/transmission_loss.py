@@ -10,11 +10,13 @@ import numpy as np
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import BODY, MASSES, MOTOR, Typical, apart, grid, typical
-from bayeshaptic.models import HalfNormal, LinearSystem, LogNormal, Model, Parameter
+from bayeshaptic.models import HalfNormal, LinearSystem, LogNormal, Model, Parameter, Uniform
 from bayeshaptic.models.dynamic_link import Complexes, DynamicLink
 from bayeshaptic.recordings.etfe import Etfe
 
 _ENDS = (MASSES[MOTOR], MASSES[BODY])
+_SPECTRUM = 100.0
+_MOST = 0.33
 
 
 def lossy_stiffness(
@@ -32,14 +34,41 @@ def lossy_stiffness(
     return np.asarray(size * np.exp(power * (np.log(np.abs(s)) - np.log(rate))) * turn - stiffness)
 
 
+def relaxing_spectrum(
+    s: Complexes, stiffness: Floats, rate: Floats, loss_factor: Floats
+) -> Complexes:
+    """The same at `rate`, with a constant loss modulus: Maxwell elements evenly over log time.
+
+    They span _SPECTRUM on either side of `rate` (H. P. Liu, D. L. Anderson, H. Kanamori,
+    Geophysical Journal International 47, 1976); what is left for static loads is positive up to a
+    loss factor of _MOST.
+    """
+
+    def spectrum(s: Complexes) -> Complexes:
+        return np.log((1 + s * _SPECTRUM / rate) / (1 + s / (_SPECTRUM * rate)))
+
+    strength = loss_factor * stiffness / (np.arctan(_SPECTRUM) - np.arctan(1 / _SPECTRUM))
+    return np.asarray(strength * (spectrum(s) - np.log(_SPECTRUM)))
+
+
+_LAWS = {"factor": lossy_stiffness, "modulus": relaxing_spectrum}
+
+
 @register
 @dataclass(frozen=True)
 class StructuralDamping(LinearEffect):
-    """The transmission's spring loses the same share of energy a turn at all frequencies.
+    """The transmission's spring loses energy at every frequency, slow motion included.
 
     kc (1 + j loss_factor) at the frequency at which motor and body swing against each other; the
     damper bc stays beside it.
+
+    Attributes
+    ----------
+    constant : {"factor", "modulus"}
+        What is the same at all frequencies: the loss over the stiffness, or the loss itself.
     """
+
+    constant: str = "factor"
 
     name = "structural_damping"
     title = "structural damping of the transmission"
@@ -50,20 +79,22 @@ class StructuralDamping(LinearEffect):
     def candidates(cls, model: Model, etfe: Etfe) -> tuple[LinearEffect, ...]:
         if "kc" not in model.names:
             return ()
-        prior = HalfNormal(0.3)
-        parameter = Parameter("loss_factor", "number", "loss factor of the transmission", prior)
-        return (cls(apart(model, (parameter,))),)
+        title = "loss factor of the transmission"
+        priors = {"factor": HalfNormal(0.3), "modulus": Uniform(0.0, _MOST)}
+        return tuple(
+            cls(apart(model, (Parameter("loss_factor", "number", title, prior),)), constant)
+            for constant, prior in priors.items()
+        )
 
     def starting_values(self, model: Model, etfe: Etfe) -> Floats:
-        return np.array([[0.02], [0.06], [0.15], [0.4]])
+        return np.array([[0.02], [0.06], [0.12], [0.25]])
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         (loss_factor,) = self.own(values)
         spring = values["kc"]
         rate = np.sqrt(spring * (1 / values[MOTOR] + 1 / values[BODY]))
-        return system.with_dynamic_link(
-            DynamicLink(*_ENDS, lossy_stiffness, (spring, rate, loss_factor))
-        )
+        link = DynamicLink(*_ENDS, _LAWS[self.constant], (spring, rate, loss_factor))
+        return system.with_dynamic_link(link)
 
 
 def relaxing_stiffness(s: Complexes, stiffness: Floats, time_s: Floats) -> Complexes:

@@ -39,7 +39,7 @@ def minimise(
     steps : int
         At most so many.
     tolerance : float
-        Stop when no start gains more than this in half its sum of squares.
+        A start rests when it gains less than this in half its sum of squares.
 
     Returns
     -------
@@ -51,19 +51,22 @@ def minimise(
     value = residuals(phi)
     cost = _half_square(value)
     damping = np.full(len(phi), 1e-2)
+    open_ = np.arange(len(phi))  # starts that still move
     for _ in range(steps):
-        slope = jacobian(residuals, phi, value)
-        trial = np.clip(phi + _damped_step(slope, value, damping, phi, low, high), low, high)
+        here, there = phi[open_], value[open_]
+        slope = jacobian(residuals, here, there)
+        step = _damped_step(slope, there, damping[open_], here, low, high)
+        trial = np.clip(here + step, low, high)
         trial_value = residuals(trial)
-        trial_cost = _half_square(_finite(trial_value))
-        better = trial_cost < cost
-        gain = np.where(better, cost - trial_cost, 0.0)
-        phi = np.where(better[:, None], trial, phi)
-        value = np.where(better[:, None], trial_value, value)
-        cost = np.where(better, trial_cost, cost)
-        damping = np.where(better, damping * 0.2, damping * 8.0)
-        settled = np.where(better, gain < tolerance, damping > 1e6)
-        if settled.all():
+        gain = cost[open_] - _half_square(_finite(trial_value))
+        better = gain > 0
+        won = open_[better]
+        phi[won], value[won] = trial[better], trial_value[better]
+        cost[won] -= gain[better]
+        damping[open_] *= np.where(better, 0.2, 8.0)
+        settled = np.where(better, gain < tolerance, damping[open_] > 1e6)
+        open_ = open_[~settled]
+        if not len(open_):
             break
     return phi, cost
 
