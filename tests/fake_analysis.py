@@ -8,6 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.loop import Candidate, Traced
+from bayeshaptic.diagnosis.residual import Test
+from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.inference.least_squares import Fit
@@ -217,3 +221,103 @@ CASES: dict[str, dict[str, Any]] = {
     "not-converged": {"converged": False},
     "table": {"table": True, "name": "rigid"},
 }
+
+
+def fake_closed(verdict: str = "explained", family: str = "nonlinear", **options: Any) -> Closed:
+    """A closed loop of an invented recording.
+
+    Parameters
+    ----------
+    verdict : {"consistent", "explained", "unexplained"}
+        An unexplained one has found nothing.
+    family : {"linear", "nonlinear", "time-varying"}
+        Class of the effect that was found, or of what is left.
+    options
+        Of `fake_analysis`.
+    """
+    after = fake_analysis("grasped", **options)
+    base = fake_analysis("grasped", misfit=1.0 if verdict == "consistent" else 4.0)
+    accepted = (_FOUND[family],) if verdict == "explained" else ()
+    calm = _tests(1.0)
+    loud = _tests(9.0, family)
+    candidates = [
+        Candidate(e.name, e.title, 300.0 - 200 * n, n == 0 and verdict == "explained", 1)
+        for n, e in enumerate((_FOUND[family], *_FOUND.values()))
+    ]
+    traced = Traced(
+        verdict,
+        None if verdict == "consistent" else family,
+        State(after.etfe, after.fit, accepted),
+        calm if verdict == "consistent" else loud,
+        loud if verdict == "unexplained" else calm,
+        () if verdict == "consistent" else tuple(candidates),
+    )
+    error = _error(after, 1.02)
+    return Closed(
+        after if verdict != "explained" else base,
+        after,
+        traced,
+        error if verdict != "explained" else _error(base, 1.6, 1.66),
+        error,
+    )
+
+
+_FOUND = {
+    "linear": Accepted(
+        "reflex",
+        "reflex of the hand",
+        "linear",
+        "raises the log likelihood of windows it was not fitted to by 120",
+        parameters=("kh", "bh"),
+        ties=("arm_mode",),
+        told_apart_by="another posture or a relaxed grip",
+    ),
+    "nonlinear": Accepted(
+        "coulomb_friction",
+        "dry (Coulomb) friction at the motor",
+        "nonlinear",
+        "raises the log likelihood of windows it was not fitted to by 5323",
+        {"friction_force": Estimate(0.5934, 0.0203, "N")},
+        limit_log_sd=0.03,
+    ),
+    "time-varying": Accepted(
+        "grip_drift",
+        "a grip that changes during the recording",
+        "time-varying",
+        "letting kh differ between 3 parts of the recording; the limit is that of part 2",
+        {
+            "kh_last_over_first": Estimate(1.58, float("nan"), ""),
+            "bh_last_over_first": Estimate(1.1, float("nan"), ""),
+            "worst_part": Estimate(2.0, 0.0, ""),
+        },
+    ),
+}
+
+
+def _tests(statistic: float, family: str = "") -> tuple[Test, ...]:
+    kinds = (("bands", "linear"), ("sign(v)", "nonlinear"), ("a steady change", "time-varying"))
+    return tuple(
+        Test(
+            name,
+            kind,
+            statistic if kind == family else 1.0,
+            4.5,
+            87.0 if kind == "linear" else None,
+            f"{name} stands {statistic if kind == family else 1.0:.1f} standard deviations out",
+        )
+        for name, kind in kinds
+    )
+
+
+def _error(analysis: Any, rms: float, factor: float = 1.0) -> dict[str, Any]:
+    quantiles = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+    return {
+        "weighted_rms": rms,
+        "held_out_weighted_rms": rms,
+        "gain_db_rms": 0.1,
+        "phase_deg_rms": 0.8,
+        "critical_stiffness": {
+            name: factor * analysis.limit.quantile(p) for name, p in quantiles.items()
+        },
+        "critical_stiffness_db": None,
+    }

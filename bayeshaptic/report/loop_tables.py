@@ -99,12 +99,12 @@ def unshown(closed: Closed) -> int:
     return len(closed.traced.candidates) - len(candidates(closed))
 
 
-def tests(closed: Closed) -> Rows:
+def outcomes(closed: Closed) -> Rows:
     """(what was asked, class, threshold, before, after), with a word where it is flagged."""
     later = {test.name: test for test in closed.traced.after}
     return tuple(
         (
-            test_words(test),
+            question(test),
             test.family,
             pure(test.threshold),
             _outcome(test),
@@ -114,7 +114,7 @@ def tests(closed: Closed) -> Rows:
     )
 
 
-def test_words(test: Test) -> str:
+def question(test: Test) -> str:
     """What a test asks."""
     return _TESTS.get(test.name, test.name)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bayeshaptic.diagnosis.loop import CONSISTENT, UNEXPLAINED
 from bayeshaptic.report.limits import decibel
 from bayeshaptic.report.quantities import estimate, interval, pretty_unit, pure, quantity, scale
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 _SAME = 0.005  # relative change of an error that is not worth a word
 _SAME_DB = 0.05
+_LESS = 0.9  # of the noise, to be worth a word
 _OVER = "_last_over_first"
 _WORST = "worst_part"  # the evidence says which
 _MOST_NUMBERS = 3
@@ -53,8 +56,8 @@ def lacked(closed: Closed) -> str:
     it = "it" if len(named) == 1 else "them"
     size = f" ({count} parameter{'' if count == 1 else 's'})" if count else ""
     return (
-        f"The model lacked {' and '.join(named)}; adding {it}{size} {_error_change(closed)}; "
-        f"{_limit_change(closed)}."
+        f"The model lacked {' and '.join(named)}; adding {it}{size} {_error_change(closed)}"
+        f"{_noise_change(closed)}; {_limit_change(closed)}."
     )
 
 
@@ -212,9 +215,21 @@ def _numbers(closed: Closed, effect: Accepted) -> str:
 def _error_change(closed: Closed) -> str:
     before, after = (e["held_out_weighted_rms"] for e in (closed.before, closed.after))
     if abs(after / before - 1) < _SAME:
-        return f"leaves the held-out error at {_times(after)} times the noise"
+        return f"left the held-out error at {_times(after)} times the noise"
     verb = "cut" if after < before else "raised"
     return f"{verb} the held-out error from {_times(before)} to {_times(after)} times the noise"
+
+
+def _noise_change(closed: Closed) -> str:
+    """What had passed for noise: a force that is not linear scatters the response."""
+    old, new = closed.base.fit, closed.analysis.fit
+    if old.windows is None or new.windows is None:
+        return ""
+    if len(old.windows.scatter) != len(new.windows.scatter):
+        return ""
+    ratio = new.likelihood.noise_variance / old.likelihood.noise_variance
+    share = float(np.sqrt(np.median(ratio)))
+    return f", and the noise itself to {pure(share, 2)} of what it seemed" if share < _LESS else ""
 
 
 def _times(error: float) -> str:

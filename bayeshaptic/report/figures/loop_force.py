@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bayeshaptic.recordings.etfe import RandomSpectra
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.quantities import scale
 
@@ -40,7 +41,7 @@ _AFTER: dict[str, Any] = {"color": style.MODEL, "fmt": "o-", "label": "after: le
 def is_shown(closed: Closed) -> bool:
     """Where a nonlinear force was found, or is suspected, in a recording that can show it."""
     etfe = closed.base.etfe
-    if etfe.recording is None or etfe.period_lines is not None:
+    if etfe.recording is None or not isinstance(etfe.spectra, RandomSpectra):
         return False
     tests = (*closed.traced.before, *closed.traced.after)
     return any(e.family == "nonlinear" for e in closed.effects) or any(
@@ -94,8 +95,8 @@ def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]
 
 
 def _saturates(closed: Closed) -> bool:
-    tests = (*closed.traced.before, *closed.traced.after)
-    return any(test.flagged and test.name.startswith("u") for test in tests)
+    """Where something in the command, not in the motion, is still in question."""
+    return any(test.flagged and test.name == "u^3" for test in closed.traced.after)
 
 
 def _panel(

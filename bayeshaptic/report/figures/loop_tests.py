@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.loop_tables import test_words
+from bayeshaptic.report.loop_tables import question
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +50,7 @@ def draw(closed: Closed) -> Figure:
     axes.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(FuncFormatter(style.plain))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_yticks(range(len(before)), [test_words(test) for test in before])
+    axes.set_yticks(range(len(before)), [question(test) for test in before])
     axes.set_ylim(len(before) - 0.4, -0.6)
     style.legend(axes, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)
     return figure

@@ -1,0 +1,218 @@
+"""The report of a closed loop: what it says for each verdict, its figures, its files."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import needs_browser, probe
+from fake_analysis import fake_analysis, fake_closed
+
+from bayeshaptic import read_recording, write_report
+from bayeshaptic.diagnosis.force_curve import force_curve, motions
+from bayeshaptic.inference.least_squares import summarise
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.recordings.windows import compress
+from bayeshaptic.report import summary
+from bayeshaptic.report.assumptions import assumptions
+from bayeshaptic.report.figures import LOOP_PICTURES, loop_stiffness
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.loop_tables import candidates, errors, estimates, found, outcomes
+from bayeshaptic.report.loop_words import lacked, verdict
+
+RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
+FAMILIES = ("linear", "nonlinear", "time-varying")
+LOOP_FILES = {f"{picture.name}.png" for picture in LOOP_PICTURES}
+
+
+# ---- words
+
+
+def test_what_was_lacking_in_one_sentence() -> None:
+    text = lacked(fake_closed())
+    assert "lacked dry (Coulomb) friction at the motor (friction force 0.593 ± 0.020 N)" in text
+    assert "adding it (1 parameter) cut the held-out error from 1.60 to 1.02 times" in text
+    # 1.66 is 4.4 dB.
+    assert re.search(r"K_CR moved from 3\d\.\d+ to 2\d\.\d+ kN/m \(−4\.4 dB\)", text), text
+
+
+def test_an_effect_that_changes_little_is_said_so() -> None:
+    closed = fake_closed()
+    closed = replace(closed, before=closed.after)
+    text = lacked(closed)
+    assert "left the held-out error at 1.02" in text
+    assert "K_CR stayed at" in text
+
+
+def test_linear_effects_show_what_the_posterior_says() -> None:
+    closed = fake_closed(family="linear")
+    text = lacked(closed)
+    assert text.startswith("The model lacked a reflex of the hand (")
+    assert "(2 parameters)" in text
+    mean = closed.analysis.posterior.summary()["kh"]["mean"]
+    assert f"{mean:.0f}"[:2] in text
+
+
+def test_of_a_drift_what_changed_most_is_named() -> None:
+    text = lacked(fake_closed(family="time-varying"))
+    assert "lacked a grip that changes during the recording (kh ends at 1.58 times" in text
+    assert "parameter" not in text
+
+
+def test_two_effects_are_both_named() -> None:
+    closed = fake_closed(family="linear")
+    state = closed.traced.state
+    both = (*state.accepted, *fake_closed().effects)
+    closed = replace(closed, traced=replace(closed.traced, state=replace(state, accepted=both)))
+    text = lacked(closed)
+    assert "a reflex of the hand" in text and " and dry (Coulomb) friction" in text
+    assert "adding them (3 parameters)" in text
+    assert [row.name for row in found(closed)] == ["reflex", "coulomb_friction"]
+
+
+def test_consistent_says_that_there_is_nothing() -> None:
+    closed = fake_closed("consistent")
+    (text,) = verdict(closed)
+    assert text.startswith("Nothing to find: 3 tests")
+    assert headline(closed).status == "safe"
+    assert "explains the recording" in " ".join(headline(closed).details)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_unexplained_says_class_place_trials_widening_and_what_next(family: str) -> None:
+    closed = fake_closed("unexplained", family)
+    text = " ".join(verdict(closed))
+    assert f"Its class is {family}" in text
+    assert ("around 87" in text) == (family == "linear")
+    assert "Tried without success" in text
+    assert "was widened" in text
+    assert "What to measure next" in text
+    head = headline(closed)
+    assert head.status == "caution"
+    assert "unexplained" in head.sentence
+
+
+def test_far_beyond_the_noise_no_stiffness_is_recommended() -> None:
+    closed = fake_closed("unexplained", misfit=13.0)
+    head = headline(closed)
+    assert head.status == "untrusted"
+    assert "no effect that was tried explains it" in head.sentence
+
+
+def test_an_explained_misfit_is_no_objection_any_more() -> None:
+    closed = fake_closed()
+    assert headline(closed.base).status == "untrusted"
+    head = headline(closed)
+    assert head.status == "safe"
+    assert "lacked dry (Coulomb) friction" in head.details[0]
+
+
+def test_assumptions_say_what_was_added_and_widened() -> None:
+    closed = fake_closed()
+    text = " ".join(assumptions(closed.analysis, closed))
+    assert "but for what was found (dry (Coulomb) friction" in text
+    assert "adds 3 % (sd) to the limit" in text
+    closed = fake_closed("unexplained")
+    text = " ".join(assumptions(closed.analysis, closed))
+    assert "widened by what is left unexplained" in text
+    assert "widened" not in " ".join(assumptions(closed.analysis))
+
+
+# ---- tables
+
+
+def test_tables_hold_what_the_loop_holds() -> None:
+    closed = fake_closed(family="linear")
+    (effect,) = found(closed)
+    assert effect.ties == "arm mode"
+    assert effect.told_apart_by == "Another posture or a relaxed grip."
+    assert len(effect.parameters) == 2
+    rows = {row[0]: row for row in outcomes(closed)}
+    assert rows["residual, band by band"][-2:] == ("9.0, flagged", "1.0")
+    assert candidates(closed)[0][1:] == ("reflex of the hand", "300", "accepted")
+    assert [row[0] for row in errors(closed)][1] == "residual over the noise, data held out"
+    assert errors(closed)[1][1:] == ("1.60", "1.02")
+    assert errors(closed)[-1][1:] == ("–", "–")
+
+
+def test_numbers_beside_the_posterior_stand_in_the_parameter_table() -> None:
+    (row,) = estimates(fake_closed())
+    assert (row.name, row.unit, row.posterior) == ("friction_force", "N", "0.593 ± 0.020")
+    assert "beside the posterior" in row.remarks
+    drift = estimates(fake_closed(family="time-varying"))
+    assert [row.name for row in drift] == ["kh_last_over_first", "bh_last_over_first"]
+    assert estimates(fake_closed(family="linear")) == ()
+
+
+def test_before_and_after_stand_beside_the_measurement() -> None:
+    labels = [row.label for row in loop_stiffness.rows(fake_closed())]
+    assert labels[0] == "model as declared"
+    assert "model with what was added" in labels and "measurement alone" in labels
+    labels = [row.label for row in loop_stiffness.rows(fake_closed("unexplained"))]
+    assert "the same, widened" in labels
+
+
+# ---- the force
+
+
+def test_the_curve_of_the_force_is_the_friction() -> None:
+    """Around the linear part of the bench, what is left over the velocity is its dry friction."""
+    etfe = estimate_etfe(read_recording(RECORDINGS / "lhifam-user-b.csv.gz"))
+    model = build_model("grasped", "lhifam")
+    hand = {"bs": 75.0, "ks": 49e3, "mh": 1.21, "bh": 22.5, "kh": 181.0}
+    truth = dict(zip(model.names, model.values, strict=True)) | hand
+    theta = np.array([truth[name] for name in model.names])
+    fit = summarise(model, compress(etfe, partial(model.response, theta)), theta)
+    assert etfe.recording is not None
+    moving = motions(fit, etfe.recording)
+    curve = force_curve(fit, etfe, "velocity", moving["velocity"])
+    fast = np.abs(curve.motion) > 0.5 * moving["velocity"].std()
+    assert fast.sum() >= 4
+    np.testing.assert_allclose(curve.force[fast], -0.6 * np.sign(curve.motion[fast]), rtol=0.1)
+    assert np.all(curve.sd[fast] < 0.05)
+    # Over the stretch there is no force; what little there is comes from the velocity.
+    stretch = force_curve(fit, etfe, "stretch", moving["stretch"])
+    assert np.abs(stretch.force).max() < 0.2
+
+
+# ---- files
+
+
+@pytest.mark.parametrize(
+    ("state", "family"),
+    [("consistent", "linear"), ("unexplained", "linear"), *(("explained", f) for f in FAMILIES)],
+)
+def test_the_summary(state: str, family: str) -> None:
+    closed = fake_closed(state, family)
+    data = summary(closed)
+    assert data["diagnosis"]["verdict"] == state
+    assert data["diagnosis"]["residual_class"] == (None if state == "consistent" else family)
+    assert data["model"]["effects"] == [effect.name for effect in closed.effects]
+    assert data["error"]["before"]["held_out_weighted_rms"] == closed.before["weighted_rms"]
+    json.dumps(data, allow_nan=False)
+
+
+@needs_browser
+@pytest.mark.parametrize("family", ["linear", "nonlinear"])
+def test_the_page_in_a_browser(family: str, tmp_path: Path) -> None:
+    closed = fake_closed(family=family)
+    page = write_report(closed, tmp_path / "out")
+    files = {path.name for path in page.parent.iterdir()}
+    assert files & LOOP_FILES == LOOP_FILES - {"loop_force.png"}
+    text = html.unescape(page.read_text(encoding="utf-8"))
+    assert lacked(closed) in text
+    assert text.index("What the model lacked") < text.index("What was measured")
+    for width in (1200, 520):
+        seen = probe(page, tmp_path, width)
+        assert seen["overlaps"] == []
+        assert seen["width"] <= seen["window"], "the page scrolls sideways"
+    # A plain analysis in the same folder leaves no picture that contradicts it.
+    write_report(fake_analysis("rigid"), tmp_path / "out")
+    assert not {path.name for path in page.parent.iterdir()} & LOOP_FILES
