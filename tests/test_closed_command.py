@@ -1,4 +1,4 @@
-"""Closing the loop by the command: on a recording with something hidden in it, and on a clean one."""
+"""Closing the loop by the command: with something hidden in the recording, and without."""
 
 from __future__ import annotations
 

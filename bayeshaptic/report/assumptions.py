@@ -69,7 +69,7 @@ def _constancy(closed: Closed | None) -> str:
 
 
 def _model(analysis: Analysis, closed: Closed | None) -> str:
-    names = [effect.title for effect in analysis.model.effects]
+    names = [effect.name for effect in analysis.model.effects]
     if closed is not None:
         names = [effect.title for effect in closed.effects]
     effects = f"with {' and with '.join(names)}" if names else "no effect has been added to it"

@@ -171,9 +171,8 @@ def _widened(closed: Closed) -> str:
 
     limit = closed.analysis.limit
     narrow = critical_stiffness(closed.analysis.posterior)
-    ends = (0.05, 0.95)
-    before = interval(*(narrow.quantile(p) for p in ends), limit.unit)
-    after = interval(*(limit.quantile(p) for p in ends), limit.unit)
+    before = interval(narrow.quantile(0.05), narrow.quantile(0.95), limit.unit)
+    after = interval(limit.quantile(0.05), limit.quantile(0.95), limit.unit)
     return (
         f"The critical stiffness was widened for it: the 90 % interval goes from {before} to "
         f"{after}. Use its lower end."
