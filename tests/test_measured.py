@@ -13,6 +13,7 @@ from bayeshaptic.diagnosis.harmonic_balance import Basis, balance
 from bayeshaptic.diagnosis.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.periodic import close_periodic, is_periodic, periodic_tests
 from bayeshaptic.diagnosis.periodic_forces import force_candidates
+from bayeshaptic.diagnosis.periodic_trace import traced
 from bayeshaptic.diagnosis.state import REPORT, share
 from bayeshaptic.diagnosis.steady_motion import LOAD, one_period, places_of, with_floor
 from bayeshaptic.effects.internal_force import CONNECTION
@@ -104,6 +105,9 @@ def test_the_loop_names_the_drag_and_leaves_noise(dragged: Recording) -> None:
     assert loop.chosen[0].addition.place == LOAD
     assert not any(test.flagged for test in loop.after)
     assert loop.state.fit.reduced_chi_square < 1.3
+    told = traced(loop)
+    assert (told.verdict, told.residual_class) == ("explained", "nonlinear")
+    assert [c.name for c in told.candidates if c.accepted] == ["drag"]
 
 
 def test_a_linear_device_gets_nothing() -> None:

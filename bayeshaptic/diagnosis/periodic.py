@@ -223,7 +223,7 @@ def _with_linear(
     model = part.model.with_effect(effect)
     own = effect.starting_values(part.model, etfe)
     inner = rest.part(fitted)
-    starts = promising_starts(part.model, effect, inner, part.theta[None], own, keep=8)
+    starts = promising_starts(part.model, effect, inner, part.theta[None], own, keep=4)
     theta, _ = refine(model, inner, starts)
     tried = balance(model, windows, period, part.forces, theta, part.strength, fitted)
     size = len(effect.parameters)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bayeshaptic.diagnosis.loop import CONSISTENT, EXPLAINED, UNEXPLAINED, Candidate, Traced
-from bayeshaptic.diagnosis.periodic import close_periodic
+from bayeshaptic.diagnosis.periodic import PeriodicLoop, close_periodic
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.etfe import Etfe
 
@@ -25,9 +25,13 @@ def trace_periodic(etfe: Etfe, fit: Fit, tick: Callable[[str], None] | None = No
     -------
     Traced
     """
-    loop = close_periodic(etfe, fit, tick)
+    return traced(close_periodic(etfe, fit, tick))
+
+
+def traced(loop: PeriodicLoop) -> Traced:
+    """Verdict, class of what remains, and the record of candidates."""
     candidates = tuple(
-        Candidate(a.name, a.title, a.score, a in loop.chosen, number)
+        Candidate(a.name, a.title, a.score, any(a is c for c in loop.chosen), number)
         for number, attempts in enumerate(loop.history, 1)
         for a in attempts
     )
