@@ -160,12 +160,13 @@ def _name(
     axes.annotate(
         text,
         (hertz, gain),
-        xytext=(-8, 12) if above else (-2 if hertz > 50 else 8, -14),
+        xytext=(-8, 34 if device == "phantom" else 12) if above else (-2 if hertz > 90 else 8, -14),
         textcoords="offset points",
         fontsize=style.SMALL,
         color=COLOURS[name],
-        ha="right" if above or hertz > 50 else "left",
+        ha="right" if above or hertz > 90 else "left",
         va="bottom" if above else "top",
+        bbox={"facecolor": "white", "alpha": 0.85, "linewidth": 0, "pad": 1.0},
     )
 
 
