@@ -22,10 +22,13 @@ import bayeshaptic
 from bayeshaptic import batch, cli, executors
 from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.simulate import parse_effect
+from bayeshaptic.commands.talk import Talk
 from bayeshaptic.devices import device_names
 from bayeshaptic.diagnosis import analysis, closed
 from bayeshaptic.errors import InputError
 from bayeshaptic.report import summary_json
+from bayeshaptic.report.headline import Headline
+from bayeshaptic.report.index import Reported
 
 Run = Callable[..., tuple[int, str, str]]
 # The quickest analysis: two parameters, below the first mode.
@@ -507,6 +510,32 @@ class TestReport:
         assert status == 0 and "feedback" in out and "warning: The force was computed" in out
         summary = json.loads(Path("DATA_EMPS-report/summary.json").read_text())
         assert summary["recording"]["feedback"] is True
+
+
+def test_what_is_said_of_each_recording(capsys: pytest.CaptureFixture[str]) -> None:
+    head = Headline("safe", "Render walls of at most 1 N/m.", ())
+    warnings = ("one", "two", "three", "four", "five")
+    done = [
+        Reported("a", Path("a.html"), head, "The model lacked a spring.", {}, warnings),
+        Reported("b", error="b.csv: empty"),
+        Reported("c", error="what is wrong"),
+    ]
+    with Talk(quiet=False) as talk:
+        assert talk.tell(done) == 2
+    out, err = capsys.readouterr()
+    assert out.splitlines() == [
+        "a: Render walls of at most 1 N/m.",
+        "  The model lacked a spring.",
+        "  warning: one",
+        "  warning: two",
+        "  warning: three",
+        "  and 2 more in the report",
+        "  report: a.html",
+    ]
+    assert err.splitlines() == [
+        "bayeshaptic: error: b: b.csv: empty",
+        "bayeshaptic: error: c: what is wrong",
+    ]
 
 
 # --- batch: executors ---------------------------------------------------------------------------
