@@ -1,0 +1,46 @@
+"""Positions that were cut off at the end of the sensor's range."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.diagnosis.prediction import Mask, Samples
+
+THRESHOLD = 6.0
+_FEWEST = 4  # samples on an extreme that are worth a look
+_LEVELS = 4  # a position that takes fewer is none
+
+
+def clipped(samples: Samples) -> tuple[Mask, float]:
+    """Samples on an extreme that, by all others, must have been beyond it.
+
+    A motion that merely turns round stays on its last level for a while too, but does not lead
+    beyond it.
+
+    Returns
+    -------
+    wrong : ndarray of bool, shape (N,)
+    statistic : float
+        How far beyond the extreme the motion led, over the error of a prediction.
+    """
+    position = samples.recording.position
+    wrong, statistic = np.zeros(len(position), dtype=bool), 0.0
+    extremes = [(+1, position == position.max()), (-1, position == position.min())]
+    extremes = [(sign, there) for sign, there in extremes if there.sum() >= _FEWEST]
+    if not extremes or len(np.unique(position)) <= _LEVELS:
+        return wrong, statistic
+    trial = samples.without(np.any([there for _, there in extremes], axis=0))
+    if trial.predictor is None:
+        return wrong, statistic
+    error = max(trial.predictor.spread, 0.4 * samples.unit)
+    inner = np.zeros_like(wrong)  # those between samples on both sides
+    inner[trial.predictor.order : -trial.predictor.order] = True
+    for sign, there in extremes:
+        beyond = sign * (trial.position - position)[there & inner] / error
+        if len(beyond) < _FEWEST:
+            continue
+        beyond = np.sort(beyond)
+        statistic = max(statistic, float(beyond[-_FEWEST // 2]))
+        if beyond[-_FEWEST // 2] > THRESHOLD:
+            wrong |= there
+    return wrong, statistic

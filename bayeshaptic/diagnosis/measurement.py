@@ -1,0 +1,116 @@
+"""What encoder, clock and logger did to a recording, and the recording without it.
+
+Nothing here asks whether the model is right: samples are compared with what the samples around them
+and the force predict (`prediction`), lines of the spectrum with the lines beside them (`tones`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from bayeshaptic.diagnosis import findings
+from bayeshaptic.diagnosis.clipped import clipped
+from bayeshaptic.diagnosis.excess import excess_noise_test
+from bayeshaptic.diagnosis.faults import faults
+from bayeshaptic.diagnosis.findings import Finding
+from bayeshaptic.diagnosis.held import held
+from bayeshaptic.diagnosis.jitter import jitter
+from bayeshaptic.diagnosis.prediction import as_recorded
+from bayeshaptic.diagnosis.residual import Test
+from bayeshaptic.diagnosis.resolution import resolution
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.tones import find_tones
+from bayeshaptic.inference.least_squares import Fit, polish, refine, summarise
+from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.windows import compress
+
+
+def measurement_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """A test for each measurement effect, by its name, and one of excess noise.
+
+    None without a recording. Jitter cannot be mended, and stays flagged when it is known.
+    """
+    if etfe.recording is None:
+        return ()
+    found, _ = inspect(etfe.recording, fit, etfe)
+    return (*(finding.test for finding in found), *excess_noise_test(fit, etfe))
+
+
+def repair_measurement(state: State) -> State:
+    """The state with the measurement effects that the samples show, the recording mended.
+
+    Clipped, held, wild and missing samples are filled in from what all others and the force
+    predict, tones are subtracted; the ETFE is estimated again in the same band and fitted again.
+
+    Returns
+    -------
+    State
+        The very same where nothing was found.
+    """
+    recording = state.etfe.recording
+    if recording is None:
+        return state
+    found, mended = inspect(recording, state.fit, state.etfe)
+    found = [finding for finding in found if finding.flagged]
+    known = {effect.name for effect in state.accepted}
+    new = tuple(finding.accepted for finding in found if finding.effect.name not in known)
+    if new:
+        state = replace(state, accepted=(*state.accepted, *new))
+    if any(finding.mended for finding in found):
+        return _fitted_again(state, mended)
+    # What cannot be mended is known from now on.
+    return replace(state, etfe=replace(state.etfe, recording=mended)) if new else state
+
+
+def _fitted_again(state: State, recording: Recording) -> State:
+    """ETFE of the mended recording in the same band, and the fit to it from the current one.
+
+    From the device's own values, too: clipping may have led the current fit far away.
+    """
+    model, theta = state.model, state.fit.theta
+    etfe = estimate_etfe(recording, state.etfe.band_hz)
+    etfe = replace(etfe, notices=state.etfe.notices)
+    nominal = np.array([model.reference.get(name, np.nan) for name in model.names])
+    starts = np.stack([theta, np.where(np.isfinite(nominal), nominal, theta)])
+    theta, _ = refine(model, compress(etfe), starts)
+    for _ in range(2):
+        windows = compress(etfe, partial(model.response, theta))
+        theta = polish(model, windows, theta)
+    return replace(state, etfe=etfe, fit=summarise(model, windows, theta))
+
+
+def inspect(recording: Recording, fit: Fit, etfe: Etfe) -> tuple[list[Finding], Recording]:
+    """All findings, and the recording without what could be mended.
+
+    In this order, because each hides the next: clipping, held samples, missing rows, jitter, wild
+    samples, tones.
+    """
+    samples, unit = as_recorded(recording), recording.position_unit
+    counts = resolution(samples, etfe)
+    coarse = findings.of_resolution(counts, unit)
+    wrong, statistic = clipped(samples)
+    cut = findings.of_clipping(recording, wrong, statistic)
+    samples = samples.without(wrong)
+    wrong, statistic = held(samples)
+    repeated = findings.of_held(wrong, statistic)
+    if repeated.flagged:
+        samples = samples.without(wrong)
+    faulty = faults(samples)
+    missing = findings.of_missing(faulty)
+    samples = faulty.samples
+    late = findings.of_jitter(jitter(samples), recording.period_s)
+    if late.flagged:  # then samples far off are not wild
+        faulty = replace(faulty, wild_score=0.0)
+    wild = findings.of_wild(faulty)
+    if wild.flagged:
+        samples = samples.without(faulty.wild)
+    mended = samples.mended
+    lines = find_tones(mended, etfe.band_hz, fit.response)
+    humming = findings.of_tones(lines, unit)
+    found = [coarse, cut, repeated, missing, late, wild, humming]
+    count = counts.count if coarse.flagged else recording.encoder_resolution
+    return found, replace(mended, position=lines.taken_off(mended), encoder_resolution=count)
