@@ -5,18 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from bayeshaptic.diagnosis.columns import nonlinear_tests
 from bayeshaptic.diagnosis.drift import drift_tests
 from bayeshaptic.diagnosis.drift_trials import drift_trials
 from bayeshaptic.diagnosis.linear_trials import linear_trials
+from bayeshaptic.diagnosis.measurement import measurement_tests, repair_measurement
 from bayeshaptic.diagnosis.nonlinear_trials import nonlinear_trials
+from bayeshaptic.diagnosis.periodic import is_periodic
 from bayeshaptic.diagnosis.residual import Test, frequency_tests
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.stability.critical import critical_stiffness
 
 ROUNDS = 3
 _LAW_ERROR = 0.1  # of the statistic that raised a nonlinear force
+_LAW_REST = 3.0  # what one law may leave more than another, in thresholds
+_MENDED = 1.5  # factor on the thresholds of a recording that something was taken off
 _LINEAR_FIRST = 10.0  # reduced chi-square from which the linear misfit is mended first
 _RIVAL = 0.85  # share of the best score that a rival has at least
 _TIE = 6.0  # difference of scores that one recording does not decide
@@ -32,10 +39,11 @@ class Candidate:
     ----------
     name, title : str
     score : float
-        Gain in log likelihood on windows that took no part in the fit, less two a parameter.
+        Gain in log likelihood on windows that took no part in the fit, less two a parameter; of
+        measurement effects the statistic of their own test.
     accepted : bool
     round : int
-        From 1.
+        From 1; 0 for what was wrong with the measurement itself.
     """
 
     name: str
@@ -78,6 +86,7 @@ def residual_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
         *frequency_tests(fit),
         *nonlinear_tests(fit, etfe),
         *drift_tests(fit, etfe),
+        *measurement_tests(fit, etfe),
     )
 
 
@@ -100,9 +109,17 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
     -------
     Traced
     """
-    state = State(etfe, fit)
+    if is_periodic(etfe):  # its residual repeats: lines are held out, not windows of noise
+        from bayeshaptic.diagnosis.periodic_trace import trace_periodic
+
+        return trace_periodic(etfe, fit, tick)
     before = tests = residual_tests(fit, etfe)
-    candidates: list[Candidate] = []
+    state = repair_measurement(State(etfe, fit))
+    candidates = [
+        Candidate(e.name, e.title, _score_of(e.name, before), True, 0) for e in state.accepted
+    ]
+    if state.accepted:
+        tests = _remaining_tests(state, before)
     rejected: tuple[Trial, ...] = ()
     for number in range(1, ROUNDS + 1):
         if not any(test.flagged for test in tests):
@@ -121,28 +138,37 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
     return Traced(verdict, residual_class, state, before, tests, tuple(candidates), rejected)
 
 
+def _score_of(name: str, tests: tuple[Test, ...]) -> float:
+    """The statistic of a measurement effect's own test."""
+    return max((test.statistic for test in tests if test.name == name), default=0.0)
+
+
 def _remaining_tests(state: State, before: tuple[Test, ...]) -> tuple[Test, ...]:
     """The tests of what is left, and how much of it counts.
 
     Where the response drifts the limit is that of the worst part; that the part drifts a little
     too is no news.  A law of friction is an approximation: a tenth of what it explained may
-    remain.
+    remain; and a mended recording is not as good as a sound one.
     """
-    tests = residual_tests(state.fit, state.etfe)
+    known = {effect.name for effect in state.accepted if effect.family == "measurement"}
+    tests = tuple(t for t in residual_tests(state.fit, state.etfe) if t.name not in known)
+    if known:  # which is where the excess of noise comes from
+        tests = tuple(test for test in tests if test.family != "measurement")
     families = {effect.family for effect in state.accepted}
     if "time-varying" in families:
         tests = tuple(test for test in tests if test.family != "time-varying")
+    explained = 0.0
     if "nonlinear" in families:
         explained = max((t.statistic for t in before if t.family == "nonlinear"), default=0.0)
+    if families & {"nonlinear", "measurement"}:
         tests = tuple(_allowing(test, explained) for test in tests)
     return tests
 
 
 def _allowing(test: Test, explained: float) -> Test:
-    """`test` with the threshold that it has after a nonlinear force was taken off."""
-    if test.family == "nonlinear":
-        return replace(test, threshold=max(test.threshold, _LAW_ERROR * explained))
-    return replace(test, threshold=1.5 * test.threshold)
+    """`test` with the threshold that it has after something was taken off the recording."""
+    least = _LAW_ERROR * explained if test.family == "nonlinear" else 0.0
+    return replace(test, threshold=max(_MENDED * test.threshold, least))
 
 
 def _trials(state: State, tests: tuple[Test, ...], tick: Tick | None) -> list[Trial]:
@@ -175,8 +201,10 @@ def _choose(trials: list[Trial], before: tuple[Test, ...]) -> Trial | None:
     rivals = [trial for trial in good if trial.score > _RIVAL * good[0].score]
     left = [_left(_remaining_tests(trial.state, before)) for trial in rivals]
     least = min(left)
-    best = [t for t, rest in zip(rivals, left, strict=True) if rest <= max(1.2 * least, 0.0)]
-    close = [trial for trial in best if best[0].score - trial.score < _TIE]
+    # Laws of one force differ in what they leave by chance; linear effects do not.
+    more = _LAW_REST if good[0].accepted.family == "nonlinear" else 0.0
+    best = [t for t, rest in zip(rivals, left, strict=True) if rest <= 1.2 * least + more]
+    close = [trial for trial in best if _ties(best[0], trial)]
     return min(close, key=lambda trial: (trial.size, -trial.score))
 
 
@@ -185,18 +213,31 @@ def _left(tests: tuple[Test, ...]) -> float:
     return sum(test.excess for test in tests if test.flagged)
 
 
+def _ties(best: Trial, other: Trial) -> bool:
+    """Whether the recording hardly tells two effects of a class apart.
+
+    Two laws of friction differ by less than either differs from the truth: there a twentieth of
+    the score counts as nothing.
+    """
+    if other.accepted.family != best.accepted.family:
+        return False
+    law = 0.05 * best.score if best.accepted.family == "nonlinear" else 0.0
+    return abs(best.score - other.score) < max(_TIE, law)
+
+
 def _with_ties(chosen: Trial, trials: list[Trial]) -> State:
-    """The chosen trial's state, its effect naming those that do as well."""
-    ties = tuple(
-        trial.name
-        for trial in trials
-        if trial is not chosen
-        and trial.convincing
-        and trial.accepted.family == chosen.accepted.family
-        and abs(trial.score - chosen.score) < _TIE
-    )
+    """The chosen trial's state, its effect naming those that do as well, and their spread."""
+    rivals = [t for t in trials if t is not chosen and t.convincing and _ties(chosen, t)]
     *earlier, own = chosen.state.accepted
-    own = replace(own, ties=tuple(dict.fromkeys((*own.ties, *ties))))
+    spread = own.limit_log_sd
+    if own.family == "nonlinear" and rivals:
+        here, *others = (
+            critical_stiffness(t.state.model, t.state.fit.theta).value for t in (chosen, *rivals)
+        )
+        apart = max(abs(np.log(max(other, 1e-9) / max(here, 1e-9))) for other in others)
+        spread = float(np.hypot(spread, 0.5 * apart))
+    names = tuple(dict.fromkeys((*own.ties, *(t.name for t in rivals))))
+    own = replace(own, ties=names, limit_log_sd=spread)
     return replace(chosen.state, accepted=(*earlier, own))
 
 

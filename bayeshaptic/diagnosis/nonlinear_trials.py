@@ -37,11 +37,13 @@ from bayeshaptic.recordings.etfe import Etfe
 from bayeshaptic.recordings.random_excitation import points as points_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.windows import Windows, compress
+from bayeshaptic.stability.critical import critical_stiffness
 
 Floats = NDArray[np.float64]
 
 SUBSTEPS = 8
 _HAND_HZ = 20.0
+_LAW_SD = 0.03  # relative; how well a law and its shape are known at best
 _INNER = 3  # fits a strength: the damping that hid the force gives way step by step
 
 
@@ -133,7 +135,7 @@ class _Bench:
         model = self.state.model
         theta = polish(model, point.windows, point.theta)
         fit = summarise(model, point.windows, theta)
-        accepted = self._accepted(effect, point, self._strength_sd(effect, point))
+        accepted = self._accepted(effect, point, *self._spread(effect, point))
         state = State(_with_points(point.etfe, fit), fit, (*self.state.accepted, accepted))
         size = 1 + len(effect.shape)
         return Trial(accepted, state, point.gain_fit, point.gain_choose, size)
@@ -214,20 +216,28 @@ class _Bench:
         pointwise = Likelihood(self.state.model, windows).pointwise(theta[None])[0]
         return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
 
-    def _strength_sd(self, effect: NonlinearEffect, point: _Point) -> float:
-        """From the curvature of the profile: each side simulated and fitted anew."""
-        step = 0.03
-        sides = [
-            self._point(effect, point.strength * factor, point.theta).gain_fit
-            for factor in (1 - step, 1 + step)
-        ]
-        drop = point.gain_fit - 0.5 * (sides[0] + sides[1])
-        # Half of the windows were used: the whole recording has twice the information.
-        sd = step * abs(point.strength) / np.sqrt(2 * 2 * max(drop, 1e-3))
-        # Neither the law nor its shape is known better than this.
-        return float(np.hypot(sd, 0.02 * abs(point.strength)))
+    def _spread(self, effect: NonlinearEffect, point: _Point) -> tuple[float, float]:
+        """Standard deviations of the strength, and of log K_CR because of it.
 
-    def _accepted(self, effect: NonlinearEffect, point: _Point, sd: float) -> Accepted:
+        From the curvature of the profile, each side simulated and fitted anew.
+        """
+        step = 0.03
+        low, high = (
+            self._point(effect, point.strength * factor, point.theta)
+            for factor in (1 - step, 1 + step)
+        )
+        drop = point.gain_fit - 0.5 * (low.gain_fit + high.gain_fit)
+        # Half of the windows were used: the whole recording has twice the information.
+        relative = step / np.sqrt(2 * 2 * max(drop, 1e-3))
+        # Neither the law nor its shape is known better than this.
+        relative = float(np.clip(np.hypot(relative, _LAW_SD), 0.0, 0.5))
+        limits = critical_stiffness(self.state.model, np.stack([low.theta, high.theta])).samples
+        slope = abs(float(np.log(max(limits[1], 1e-9) / max(limits[0], 1e-9)))) / (2 * step)
+        return relative * abs(point.strength), min(slope * relative, 1.0)
+
+    def _accepted(
+        self, effect: NonlinearEffect, point: _Point, sd: float, limit_log_sd: float
+    ) -> Accepted:
         model = self.state.model
         units = (model.force_unit, model.position_unit)
         name, dimension = effect.strength
@@ -243,6 +253,7 @@ class _Bench:
             describe_gain(point.gain_choose),
             estimates,
             told_apart_by=effect.told_apart_by,
+            limit_log_sd=limit_log_sd,
         )
 
 
