@@ -2,11 +2,13 @@
 
 Positive parameters are known up to a factor and go in as logarithms.  Dampers to the ground may be
 zero: they stay linear, with a wall at zero, because every coordinate that pushes the wall away to
-infinity mixes badly there.
+infinity mixes badly there.  Other dampers, too, are sampled as they are where the data know them:
+often it is the sum of some dampers that the data know best, and only then its ridge is straight.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +17,8 @@ from numpy.typing import NDArray
 from bayeshaptic.models import Model
 
 Floats = NDArray[np.float64]
+_SUMS = ("mass", "damping")  # quantities whose sums the data know best
+_KNOWN = 0.8  # log standard deviation, of prior and data together, below which one is known
 
 
 @dataclass(frozen=True)
@@ -28,17 +32,15 @@ class Coordinates:
     scale : ndarray, shape (P,)
     low, high : ndarray, shape (P,)
         The support of the priors, in phi.
+    walls : ndarray of bool, shape (P,)
+        Which parameters have a wall at the low end that the posterior may lean on.
     """
 
     log: NDArray[np.bool_]
     scale: Floats
     low: Floats
     high: Floats
-
-    @property
-    def walls(self) -> NDArray[np.bool_]:
-        """Which parameters have a wall at the low end that the posterior may lean on."""
-        return ~self.log & np.isfinite(self.low)
+    walls: NDArray[np.bool_]
 
     def natural(self, phi: Floats) -> Floats:
         return np.where(self.log, np.exp(np.where(self.log, phi, 0.0)), phi * self.scale)
@@ -56,17 +58,32 @@ class Coordinates:
         return np.all((phi >= self.low) & (phi <= self.high), axis=-1)
 
 
-def coordinates(model: Model) -> Coordinates:
-    """The coordinates of `model`, whose priors must be set."""
+def coordinates(model: Model, linear: Collection[str] = ()) -> Coordinates:
+    """The coordinates of `model`, whose priors must be set; those named in `linear` as they are."""
     priors = [model.prior(name) for name in model.names]
-    log = np.array([prior.coordinate == "log" for prior in priors])
+    asked = np.isin(model.names, list(linear))
+    log = np.array([prior.coordinate == "log" for prior in priors]) & ~asked
     spread = np.array([float(p.quantile(0.84) - p.quantile(0.16)) for p in priors])
     scale = np.where(log, 1.0, spread)
     support = np.array([prior.support for prior in priors])
     with np.errstate(divide="ignore"):
         logs = np.where(log[:, None], np.log(np.where(log[:, None], support, 1.0)), 0.0)
     low, high = np.where(log[:, None], logs, support / scale[:, None]).T
-    return Coordinates(log, scale, low, high)
+    at_low = np.array([float(p.log_density(p.support[0])) for p in priors])
+    return Coordinates(log, scale, low, high, ~log & np.isfinite(low) & np.isfinite(at_low))
+
+
+def sampling_coordinates(model: Model, theta: Floats, sd: Floats) -> Coordinates:
+    """The coordinates to sample `model` in, after a fit with `theta` and `sd` of shape (P,)."""
+    known = set()
+    for name, value, error in zip(model.names, theta, sd, strict=True):
+        prior = model.prior(name)
+        if prior.coordinate == "log" and model.parameter(name).dimension in _SUMS:
+            believed = 0.5 * float(np.log(prior.quantile(0.84) / prior.quantile(0.16)))
+            measured = error / value if error > 0 else np.inf  # nan at a bound
+            if np.hypot(1 / believed, 1 / measured) > 1 / _KNOWN:
+                known.add(name)
+    return coordinates(model, known)
 
 
 def reach(model: Model, prior_sds: float) -> tuple[Floats, Floats]:

@@ -26,7 +26,8 @@ class Density:
         inside = self.coordinates.inside(phi) & np.all(np.abs(phi) < 600, axis=1)
         if inside.any():
             out[inside] = self._log_prior(phi[inside])
-            out[inside] += self.likelihood(self.coordinates.natural(phi[inside]))
+            with np.errstate(all="ignore"):  # far-away proposals may overflow: they are refused
+                out[inside] += self.likelihood(self.coordinates.natural(phi[inside]))
         return np.where(np.isfinite(out), out, -np.inf)
 
     def _log_prior(self, phi: Floats) -> Floats:

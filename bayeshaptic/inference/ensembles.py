@@ -1,4 +1,4 @@
-"""Independent emcee ensembles with a frozen proposal: warm-up, then batches of steps."""
+"""Independent emcee ensembles with a frozen proposal, and how they are warmed up."""
 
 from __future__ import annotations
 
@@ -10,25 +10,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.inference.importance import Adapted
-from bayeshaptic.inference.mixture import StudentMixture, fit_student_mixture
+from bayeshaptic.inference.mixture import StudentMixture, fit_student_mixture, student
+from bayeshaptic.inference.straight import Straightening, nothing_to_straighten, straighten
 
 Floats = NDArray[np.float64]
+LogDensity = Callable[[Floats], Floats]
 ENSEMBLES = 4
 WALKERS = 64
 _WARM_UP = 80
-_COMPONENTS = 3
+_ROUNDS = 12  # of warm-up, at most
+_GOOD = 0.4  # acceptance of independent proposals from which another round gains nothing
+_CLIMB = 0.1  # rise of the mean log density, in its standard deviations, that is no accident
+_MOST_POINTS = 20_000  # that a proposal is fitted to
+_POINTS_A_COMPONENT = 1000
+_TRIED = 1000
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Independent proposals: a mixture in straight coordinates."""
+
+    straightening: Straightening
+    mixture: StudentMixture
 
 
 @dataclass
 class Ensemble:
-    """One emcee ensemble with its own random state.
+    """One emcee ensemble with its own random state; it runs in straight coordinates.
 
     emcee copies the global random state into every sampler: without a state of its own,
     "independent" ensembles would be identical.
+
+    Attributes
+    ----------
+    density : callable
+        Log density of points of shape (B, P).
+    proposal : Proposal
+    share : float
+        Of the moves that are independent proposals; the others are differential evolution.
+    positions : ndarray, shape (walkers, P)
+    state : tuple
+        State of a `numpy.random.RandomState`.
     """
 
-    density: Callable[[Floats], Floats]
-    proposal: StudentMixture
+    density: LogDensity
+    proposal: Proposal
     share: float
     positions: Floats
     state: Any
@@ -37,10 +63,12 @@ class Ensemble:
     def __post_init__(self) -> None:
         import emcee
 
+        straightening, mixture = self.proposal.straightening, self.proposal.mixture
+
         def independence(coords: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
             generator = np.random.default_rng(rng.randint(2**31))
-            drawn = self.proposal.sample(generator, len(coords))
-            return drawn, self.proposal.log_density(coords) - self.proposal.log_density(drawn)
+            drawn = mixture.sample(generator, len(coords))
+            return drawn, mixture.log_density(coords) - mixture.log_density(drawn)
 
         size = self.positions.shape[1]
         moves = [
@@ -48,50 +76,98 @@ class Ensemble:
             (emcee.moves.DEMove(), 1 - self.share),
         ]
         self.sampler = emcee.EnsembleSampler(
-            len(self.positions), size, self.density, moves=moves, vectorize=True
+            len(self.positions),
+            size,
+            lambda y: self.density(straightening.bent(y)),
+            moves=moves,
+            vectorize=True,
         )
         self.sampler.random_state = self.state
 
     def advance(self, steps: int) -> tuple[Floats, Floats]:
         """Go on by `steps`: positions (steps, walkers, P) and log densities (steps, walkers)."""
         self.sampler.reset()
+        straightening = self.proposal.straightening
+        start = straightening.straight(self.positions)
         # The walkers are checked for independence at the start only; later they may well meet.
-        last = self.sampler.run_mcmc(self.positions, steps, skip_initial_state_check=True)
-        self.positions, self.state = last.coords, self.sampler.random_state
-        return self.sampler.get_chain(), self.sampler.get_log_prob()
-
-    @property
-    def acceptance(self) -> float:
-        return float(np.mean(self.sampler.acceptance_fraction))
+        last = self.sampler.run_mcmc(start, steps, skip_initial_state_check=True)
+        self.positions, self.state = straightening.bent(last.coords), self.sampler.random_state
+        chain = self.sampler.get_chain()
+        bent = straightening.bent(chain.reshape(-1, chain.shape[2]))
+        return bent.reshape(chain.shape), self.sampler.get_log_prob()
 
 
 def warmed_up(
-    density: Callable[[Floats], Floats], adapted: Adapted, seed: np.random.SeedSequence
+    density: LogDensity, adapted: Adapted, seed: np.random.SeedSequence
 ) -> list[Ensemble]:
     """Ensembles that have forgotten their starts, with one proposal, refitted and frozen.
 
-    Each begins at its own widened draws, so that R-hat between them can see a second mode.
+    Each begins at its own widened draws, so that R-hat between them can see a second mode.  After
+    each round of warm-up the proposal is fitted to where the walkers have been.  Rounds follow
+    while the walkers, out of the sample that the proposal was fitted to, accept it too rarely,
+    and that or their density still improves.
     """
-    seeds = seed.spawn(2 * ENSEMBLES + 1)
-    histories = []
-    warm = []
-    for own, later in zip(seeds[:ENSEMBLES], seeds[ENSEMBLES:-1], strict=True):
-        rng = np.random.default_rng(own)
-        start = _spread_start(density, adapted, rng)
-        ensemble = Ensemble(density, adapted.proposal, 0.6, start, _state(own))
-        chain, _ = ensemble.advance(_WARM_UP)
-        histories.append(chain[_WARM_UP // 2 :: 2].reshape(-1, chain.shape[2]))
-        warm.append((ensemble.positions, later))
-    found = np.concatenate(histories)
+    seeds = seed.spawn(ENSEMBLES + 1)
     rng = np.random.default_rng(seeds[-1])
-    proposal = fit_student_mixture(found, np.ones(len(found)), _COMPONENTS, 10.0, rng)
-    proposal = proposal.with_component(adapted.proposal, 0.1)
-    return [Ensemble(density, proposal, 0.75, positions, _state(s)) for positions, s in warm]
+    size = adapted.points.shape[1]
+    proposal = Proposal(nothing_to_straighten(size), adapted.proposal)
+    ensembles = []
+    for own in seeds[:ENSEMBLES]:
+        start = _spread_start(density, adapted, np.random.default_rng(own))
+        ensembles.append(Ensemble(density, proposal, 0.6, start, _state(own)))
+    before, level = 0.0, -np.inf
+    for _ in range(_ROUNDS):
+        runs = [ensemble.advance(_WARM_UP) for ensemble in ensembles]
+        found = np.concatenate([chain[_WARM_UP // 2 :: 2].reshape(-1, size) for chain, _ in runs])
+        values = np.concatenate([value[_WARM_UP // 2 :: 2].ravel() for _, value in runs])
+        acceptance = _acceptance(density, proposal, found, values, rng)
+        proposal = _fitted(found, rng)
+        ensembles = [_with(e, proposal) for e in ensembles]
+        climbing = values.mean() - level > _CLIMB * values.std()
+        if acceptance > _GOOD or not (acceptance > 1.1 * before or climbing):
+            break
+        before, level = acceptance, values.mean()
+    return ensembles
 
 
-def _spread_start(
-    density: Callable[[Floats], Floats], adapted: Adapted, rng: np.random.Generator
-) -> Floats:
+def refitted(ensembles: list[Ensemble], chains: Floats, rng: np.random.Generator) -> list[Ensemble]:
+    """The ensembles where they are, with a proposal fitted to their `chains` (E, S, W, P)."""
+    found = chains.reshape(-1, chains.shape[-1])
+    proposal = _fitted(found[:: max(4, -(-len(found) // _MOST_POINTS))], rng)
+    return [_with(ensemble, proposal) for ensemble in ensembles]
+
+
+def _with(ensemble: Ensemble, proposal: Proposal) -> Ensemble:
+    return Ensemble(ensemble.density, proposal, 0.75, ensemble.positions, ensemble.state)
+
+
+def _fitted(found: Floats, rng: np.random.Generator) -> Proposal:
+    """A proposal for a density from which `found` are draws."""
+    straightening = straighten(found)
+    y = straightening.straight(found)
+    components = max(3, len(y) // _POINTS_A_COMPONENT)
+    mixture = fit_student_mixture(y, np.ones(len(y)), components, 10.0, rng)
+    wide = student(y.mean(axis=0), 1.5 * np.cov(y.T), 5.0)
+    return Proposal(straightening, mixture.with_component(wide, 0.1))
+
+
+def _acceptance(
+    density: LogDensity,
+    proposal: Proposal,
+    found: Floats,
+    values: Floats,
+    rng: np.random.Generator,
+) -> float:
+    """How often walkers at `found`, whose log densities are `values`, would accept a proposal."""
+    here = rng.choice(len(found), _TRIED)
+    drawn = proposal.mixture.sample(rng, _TRIED)
+    there = density(proposal.straightening.bent(drawn)) - proposal.mixture.log_density(drawn)
+    straight = proposal.straightening.straight(found[here])
+    gain = there - (values[here] - proposal.mixture.log_density(straight))
+    return float(np.mean(np.exp(np.minimum(gain, 0.0))))
+
+
+def _spread_start(density: LogDensity, adapted: Adapted, rng: np.random.Generator) -> Floats:
     """Walkers where the density is positive: from the proposal, which is wider than the target."""
     start = np.empty((0, adapted.points.shape[1]))
     for _ in range(50):

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.coordinates import coordinates
+from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.density import Density
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
-from bayeshaptic.inference.ensembles import Ensemble, warmed_up
+from bayeshaptic.inference.ensembles import Ensemble, refitted, warmed_up
 from bayeshaptic.inference.importance import adapt
 from bayeshaptic.inference.laplace import laplace
 from bayeshaptic.inference.least_squares import Fit, least_squares
@@ -27,6 +27,8 @@ Progress = Callable[[float, str], None]
 
 DEFAULT_ESS = 2000
 _FIRST_STEPS = 100
+_PATIENCE = 2.0  # a run that must still grow by this factor is better begun again
+_REFITS = 4
 _MOST_STEPS = 20_000
 
 
@@ -81,16 +83,16 @@ def sample(
     report = progress or (lambda share, word: None)
     fit = start if start is not None else least_squares(model, etfe, seed=seed)
     report(0.02, "finding the peak")
-    here = coordinates(fit.model)
+    here = sampling_coordinates(fit.model, fit.theta, fit.sd)
     density = Density(fit.likelihood, here)
     seeds = np.random.SeedSequence(seed)
-    tune, run = seeds.spawn(2)
+    tune, run, refit = seeds.spawn(3)
     _, proposal = laplace(density, here.coordinate(fit.theta))
     report(0.1, "adapting the proposal")
     adapted = adapt(density, proposal, np.random.default_rng(tune))
     report(0.2, "warming up")
     ensembles = warmed_up(density, adapted, run)
-    chains, found = _run(ensembles, ess, most_steps, report)
+    chains, found = _run(ensembles, ess, most_steps, report, np.random.default_rng(refit))
     natural = here.natural(chains)
     log_likelihood = _log_likelihoods(density, chains, found)
     diagnostics = diagnose(natural)
@@ -110,29 +112,44 @@ def sample(
 
 
 def _run(
-    ensembles: list[Ensemble], ess: float, most_steps: int, report: Progress
+    ensembles: list[Ensemble],
+    ess: float,
+    most_steps: int,
+    report: Progress,
+    rng: np.random.Generator,
 ) -> tuple[Floats, Floats]:
-    """Advance all ensembles side by side until they are done, forecasting how far to go."""
+    """Advance all ensembles side by side until they are done, forecasting how far to go.
+
+    Where that is far, the proposal is fitted again to the draws at hand, and these are thrown
+    away: what is kept comes from one frozen proposal.
+    """
     chains: list[Floats] = []
     densities: list[Floats] = []
-    steps, more = 0, _FIRST_STEPS
+    gone, steps, more, refits = 0, 0, min(_FIRST_STEPS, most_steps), 0
     while True:
         advanced = []
         for index, ensemble in enumerate(ensembles):
             advanced.append(ensemble.advance(more))
             share = 0.25 + 0.75 * (steps + more * (index + 1) / len(ensembles)) / (steps + more)
-            report(min(share, 0.99), f"step {steps + more}")
+            report(min(share, 0.99), f"step {gone + more}")
         chains.append(np.stack([chain for chain, _ in advanced]))
         densities.append(np.stack([values for _, values in advanced]))
-        steps += more
+        gone, steps = gone + more, steps + more
         joined = np.concatenate(chains, axis=1)
         diagnostics = diagnose(joined)
-        if _is_done(diagnostics, ess) or steps >= most_steps:
+        if _is_done(diagnostics, ess) or gone >= most_steps:
             return joined, np.concatenate(densities, axis=1)
         # Effective draws grow with the steps: go as far as that promises, and a little further.
         wanted = 1.05 * steps * ess / max(diagnostics.ess, 1.0)
-        more = int(np.clip(wanted - steps, _FIRST_STEPS, 4 * steps))
-        more = min(more, most_steps - steps)
+        poor = wanted > _PATIENCE * steps or diagnostics.rhat.max() > RHAT_LIMIT
+        if poor and refits < _REFITS:
+            ensembles = refitted(ensembles, joined, rng)
+            more, steps, refits = 2 * more, 0, refits + 1
+            chains.clear()
+            densities.clear()
+        else:
+            more = int(np.clip(wanted - steps, _FIRST_STEPS, 4 * steps))
+        more = min(more, most_steps - gone)
 
 
 def _is_done(diagnostics: Diagnostics, ess: float) -> bool:
