@@ -24,8 +24,11 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis, analyse
     from bayeshaptic.diagnosis.closed import Closed, close_loop
     from bayeshaptic.errors import BayeshapticWarning, InputError, Notice
-    from bayeshaptic.inference import Fit, Posterior, least_squares, load_posterior, sample
+    from bayeshaptic.inference.arviz_io import load_posterior
     from bayeshaptic.inference.choose import Choice, choose_model
+    from bayeshaptic.inference.least_squares import Fit, least_squares
+    from bayeshaptic.inference.posterior import Posterior
+    from bayeshaptic.inference.sampler import sample
     from bayeshaptic.models import (
         HalfNormal,
         LogNormal,

@@ -14,8 +14,8 @@ import os
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
-import numpy as np
-from calibration import CASES, Outcome, calibrate, combined, uniform
+import numpy as np  # noqa: E402
+from calibration import CASES, Outcome, calibrate, combined, uniform  # noqa: E402
 
 
 def pooled(outcomes: list[Outcome], field: str) -> np.ndarray:

@@ -21,7 +21,8 @@ def clipped(samples: Samples) -> tuple[Mask, float]:
     -------
     wrong : ndarray of bool, shape (N,)
     statistic : float
-        How far beyond the extreme the motion led, over the error of a prediction.
+        How far beyond the extreme the motion led, over the error of a prediction; infinite, with
+        no sample wrong, where too few others are left to say what is.
     """
     position = samples.recording.position
     wrong, statistic = np.zeros(len(position), dtype=bool), 0.0
@@ -29,9 +30,10 @@ def clipped(samples: Samples) -> tuple[Mask, float]:
     extremes = [(sign, there) for sign, there in extremes if there.sum() >= _FEWEST]
     if not extremes or len(np.unique(position)) <= _LEVELS:
         return wrong, statistic
-    trial = samples.without(np.any([there for _, there in extremes], axis=0))
-    if trial.predictor is None:
-        return wrong, statistic
+    at_extremes = np.any([there for _, there in extremes], axis=0)
+    trial = samples.without(at_extremes)
+    if trial.predictor is None:  # hardly anything is left to predict from
+        return wrong, np.inf if at_extremes.mean() > 0.5 else 0.0
     error = max(trial.predictor.spread, 0.4 * samples.unit)
     inner = np.zeros_like(wrong)  # those between samples on both sides
     inner[trial.predictor.order : -trial.predictor.order] = True

@@ -37,7 +37,7 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     if _counts_a_sample(recording) < _ROUNDED:
         return ()
     floor = _floor(recording, etfe.band_hz)
-    windows = fit.windows
+    windows = RandomSpectra.windows(spectra, fit.response)  # as measured, nothing discounted
     centre = windows.frequency_hz[:, 1]
     driven = centre > (_HAND_HZ if fit.model.name == "grasped" else _FREE_HZ)
     if floor is None or driven.sum() < _TOGETHER:

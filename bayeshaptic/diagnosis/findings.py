@@ -44,6 +44,8 @@ class Finding:
     estimates : mapping
     mended : bool
         Whether the recording can be mended.
+    known : bool
+        Whether it is understood; otherwise the test stays flagged.
     frequency_hz : float or None
     """
 
@@ -53,6 +55,7 @@ class Finding:
     text: str
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
     mended: bool = True
+    known: bool = True
     frequency_hz: float | None = None
 
     @property
@@ -96,6 +99,8 @@ def of_clipping(recording: Recording, wrong: Mask, statistic: float) -> Finding:
     """Samples at the end of the sensor's range."""
     unit, estimates = recording.position_unit, {"share": _share(wrong)}
     text = "no position is cut off at an extreme"
+    if np.isinf(statistic):
+        text = "nearly all positions stay at an extreme: too few are left to find the device"
     if wrong.any():
         limits = np.unique(recording.position[wrong])
         where = " and ".join(f"{limit:.4g}" for limit in limits)
@@ -105,7 +110,14 @@ def of_clipping(recording: Recording, wrong: Mask, statistic: float) -> Finding:
         )
         for number, limit in enumerate(limits, 1):
             estimates[f"limit_{number}"] = Estimate(float(limit), 0.0, unit)
-    return Finding(PositionClipping, statistic, CLIPPED_THRESHOLD, text, estimates)
+    return Finding(
+        PositionClipping,
+        statistic,
+        CLIPPED_THRESHOLD,
+        text,
+        estimates,
+        known=bool(np.isfinite(statistic)),
+    )
 
 
 def of_held(wrong: Mask, statistic: float) -> Finding:

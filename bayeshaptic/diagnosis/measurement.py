@@ -6,7 +6,7 @@ and the force predict (`prediction`), lines of the spectrum with the lines besid
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -15,6 +15,7 @@ from bayeshaptic.diagnosis import findings
 from bayeshaptic.diagnosis.clipped import clipped
 from bayeshaptic.diagnosis.excess import excess_noise_test
 from bayeshaptic.diagnosis.faults import faults
+from bayeshaptic.diagnosis.filled import discounted
 from bayeshaptic.diagnosis.findings import Finding
 from bayeshaptic.diagnosis.held import held
 from bayeshaptic.diagnosis.jitter import jitter
@@ -36,8 +37,8 @@ def measurement_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     """
     if etfe.recording is None:
         return ()
-    found, _ = inspect(etfe.recording, fit, etfe)
-    return (*(finding.test for finding in found), *excess_noise_test(fit, etfe))
+    tests = (finding.test for finding in inspect(etfe.recording, fit, etfe).findings)
+    return (*tests, *excess_noise_test(fit, etfe))
 
 
 def repair_measurement(state: State) -> State:
@@ -54,26 +55,26 @@ def repair_measurement(state: State) -> State:
     recording = state.etfe.recording
     if recording is None:
         return state
-    found, mended = inspect(recording, state.fit, state.etfe)
-    found = [finding for finding in found if finding.flagged]
+    look = inspect(recording, state.fit, state.etfe)
+    found = [finding for finding in look.findings if finding.flagged and finding.known]
     known = {effect.name for effect in state.accepted}
     new = tuple(finding.accepted for finding in found if finding.effect.name not in known)
     if new:
         state = replace(state, accepted=(*state.accepted, *new))
     if any(finding.mended for finding in found):
-        return _fitted_again(state, mended)
-    # What cannot be mended is known from now on.
-    return replace(state, etfe=replace(state.etfe, recording=mended)) if new else state
+        return _fitted_again(state, look)
+    # The recording has another resolution than was thought.
+    return replace(state, etfe=replace(state.etfe, recording=look.mended)) if new else state
 
 
-def _fitted_again(state: State, recording: Recording) -> State:
+def _fitted_again(state: State, look: Inspection) -> State:
     """ETFE of the mended recording in the same band, and the fit to it from the current one.
 
     From the device's own values, too: clipping may have led the current fit far away.
     """
     model, theta = state.model, state.fit.theta
-    etfe = estimate_etfe(recording, state.etfe.band_hz)
-    etfe = replace(etfe, notices=state.etfe.notices)
+    etfe = estimate_etfe(look.mended, state.etfe.band_hz)
+    etfe = discounted(replace(etfe, notices=state.etfe.notices), look.measured)
     nominal = np.array([model.reference.get(name, np.nan) for name in model.names])
     starts = np.stack([theta, np.where(np.isfinite(nominal), nominal, theta)])
     theta, _ = refine(model, compress(etfe), starts)
@@ -83,8 +84,26 @@ def _fitted_again(state: State, recording: Recording) -> State:
     return replace(state, etfe=etfe, fit=summarise(model, windows, theta))
 
 
-def inspect(recording: Recording, fit: Fit, etfe: Etfe) -> tuple[list[Finding], Recording]:
-    """All findings, and the recording without what could be mended.
+@dataclass(frozen=True)
+class Inspection:
+    """What the samples show.
+
+    Attributes
+    ----------
+    findings : list of Finding
+    mended : Recording
+        Without what could be mended.
+    measured : float
+        Share of its samples that was not filled in.
+    """
+
+    findings: list[Finding]
+    mended: Recording
+    measured: float
+
+
+def inspect(recording: Recording, fit: Fit, etfe: Etfe) -> Inspection:
+    """Look at every sample and every line, and mend what is wrong.
 
     In this order, because each hides the next: clipping, held samples, missing rows, jitter, wild
     samples, tones.
@@ -94,6 +113,8 @@ def inspect(recording: Recording, fit: Fit, etfe: Etfe) -> tuple[list[Finding], 
     coarse = findings.of_resolution(counts, unit)
     wrong, statistic = clipped(samples)
     cut = findings.of_clipping(recording, wrong, statistic)
+    if not cut.known:  # there is nothing to look at
+        return Inspection([coarse, cut], recording, 1.0)
     samples = samples.without(wrong)
     wrong, statistic = held(samples)
     repeated = findings.of_held(wrong, statistic)
@@ -113,4 +134,6 @@ def inspect(recording: Recording, fit: Fit, etfe: Etfe) -> tuple[list[Finding], 
     humming = findings.of_tones(lines, unit)
     found = [coarse, cut, repeated, missing, late, wild, humming]
     count = counts.count if coarse.flagged else recording.encoder_resolution
-    return found, replace(mended, position=lines.taken_off(mended), encoder_resolution=count)
+    mended = replace(mended, position=lines.taken_off(mended), encoder_resolution=count)
+    measured = getattr(etfe.spectra, "measured", 1.0) * (1 - float(samples.missing.mean()))
+    return Inspection(found, mended, measured)

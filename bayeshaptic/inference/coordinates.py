@@ -2,8 +2,8 @@
 
 Positive parameters are known up to a factor and go in as logarithms.  Dampers to the ground may be
 zero: they stay linear, with a wall at zero, because every coordinate that pushes the wall away to
-infinity mixes badly there.  Other dampers, too, are sampled as they are where the data know them:
-often it is the sum of some dampers that the data know best, and only then its ridge is straight.
+infinity mixes badly there.  Other dampers, and masses, too, are sampled as they are where they are
+known roughly: the data know their sums best, and only so the ridges along them are straight.
 """
 
 from __future__ import annotations

@@ -104,7 +104,9 @@ def _gradient(density: Density, phi: Floats, widths: Floats) -> Floats:
     moves = np.concatenate([moves, -moves])
     values = density.beyond_walls((phi[:, None, :] + moves).reshape(-1, size))
     values = values.reshape(count, 2, size)
-    return (values[:, 0] - values[:, 1]) / (2 * _STEP * widths)
+    with np.errstate(invalid="ignore"):  # where both sides are impossible, the data say nothing
+        slopes = (values[:, 0] - values[:, 1]) / (2 * _STEP * widths)
+    return np.nan_to_num(slopes, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _hessian(density: Density, phi: Floats, widths: Floats) -> Floats:

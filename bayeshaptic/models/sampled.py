@@ -99,10 +99,11 @@ class _Nodes:
     @cached_property
     def beyond(self) -> tuple[_Nodes, list[tuple[int, _Nodes]]]:
         """The high frequencies by themselves, and their nearest aliases with their numbers."""
-        omega = self.s.imag[self.high]
+        omega: Floats = self.s.imag[self.high]
         step = 2 * np.pi / self.period_s
         here, *aliases = (
-            _Nodes((omega + k * step) / (2 * np.pi), self.period_s) for k in (0, -1, 1)
+            _Nodes(np.asarray((omega + k * step) / (2 * np.pi), float), self.period_s)
+            for k in (0, -1, 1)
         )
         return here, list(zip((-1, 1), aliases, strict=True))
 

@@ -100,7 +100,7 @@ class LinearSystem:
         The residues assume simple poles; beside a double pole they blow up (`sampled_response`
         does not use them there).
         """
-        poles = [np.linalg.eigvals(self.mechanism.state_matrix()).astype(complex)]
+        poles = [_eigenvalues(self.mechanism.state_matrix())]
         for factor in self.filters:
             poles.append(roots(factor.denominator))
         p = np.concatenate(poles, axis=1)
@@ -160,3 +160,11 @@ class LinearSystem:
             bad = self.rows(~good)
             response[~good] = from_poles(*bad.poles(), bad.delay_s, frequency_hz, period_s)
         return response
+
+
+def _eigenvalues(matrices: Floats) -> Complexes:
+    """Eigenvalues of a batch; nan for parameters so far away that a matrix overflows."""
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    values = np.full(matrices.shape[:2], np.nan, complex)
+    values[finite] = np.linalg.eigvals(matrices[finite])
+    return values
