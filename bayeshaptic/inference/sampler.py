@@ -29,7 +29,7 @@ DEFAULT_ESS = 2000
 _FIRST_STEPS = 100
 _PATIENCE = 2.0  # a run that must still grow by this factor is better begun again
 _REFITS = 4
-_MOST_STEPS = 20_000
+_MOST_STEPS = 6000
 
 
 @single_threaded

@@ -54,10 +54,11 @@ class Straightening:
     def bent(self, y: Floats) -> Floats:
         """The points whose straight coordinates are `y`."""
         v = y + self.constant
-        for k, matrix in enumerate(self.quadratic):
-            below = v[:, :k]
-            v[:, k] += np.sum((below @ matrix[:k, :k]) * below, axis=1)
-        return v @ self.colour + self.mean
+        with np.errstate(over="ignore", invalid="ignore"):  # far out there is nothing to find
+            for k, matrix in enumerate(self.quadratic):
+                below = v[:, :k]
+                v[:, k] += np.sum((below @ matrix[:k, :k]) * below, axis=1)
+            return v @ self.colour + self.mean
 
 
 def nothing_to_straighten(size: int) -> Straightening:

@@ -99,10 +99,10 @@ class _Nodes:
     @cached_property
     def beyond(self) -> tuple[_Nodes, list[tuple[int, _Nodes]]]:
         """The high frequencies by themselves, and their nearest aliases with their numbers."""
-        omega: Floats = self.s.imag[self.high]
+        omega = np.asarray(self.s.imag[self.high], np.float64)
         step = 2 * np.pi / self.period_s
         here, *aliases = (
-            _Nodes(np.asarray((omega + k * step) / (2 * np.pi), float), self.period_s)
+            _Nodes(np.asarray((omega + k * step) / (2 * np.pi), np.float64), self.period_s)
             for k in (0, -1, 1)
         )
         return here, list(zip((-1, 1), aliases, strict=True))

@@ -1,0 +1,178 @@
+"""Student mixtures, their fit, and the straightening of curved densities."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import kstest, multivariate_t
+from scipy.stats import t as student_t
+
+from bayeshaptic.inference.importance import adapt
+from bayeshaptic.inference.mixture import StudentMixture, fit_student_mixture, student
+from bayeshaptic.inference.straight import nothing_to_straighten, straighten
+
+
+def two_humps(size: int = 2, freedom: float = 8.0) -> StudentMixture:
+    rng = np.random.default_rng(1)
+    spread = rng.standard_normal((size, size))
+    first = student(np.zeros(size), spread @ spread.T + np.eye(size), freedom)
+    second = student(np.full(size, 6.0), 0.3 * np.eye(size), freedom)
+    return first.with_component(second, 0.3)
+
+
+@pytest.mark.parametrize("freedom", [3.0, 8.0, 50.0])
+def test_density_of_one_component_is_the_textbooks(freedom):
+    rng = np.random.default_rng(0)
+    spread = rng.standard_normal((3, 3))
+    scale, mean = spread @ spread.T + 0.1 * np.eye(3), rng.standard_normal(3)
+    x = mean + 3 * rng.standard_normal((40, 3))
+    truth = multivariate_t(mean, scale, df=freedom).logpdf(x)
+    assert student(mean, scale, freedom).log_density(x) == pytest.approx(truth, abs=1e-9)
+
+
+def test_density_integrates_to_one():
+    line = student(np.array([1.0]), np.array([[4.0]]), 5.0).with_component(
+        student(np.array([-3.0]), np.array([[0.1]]), 5.0), 0.25
+    )
+    area, _ = quad(lambda x: np.exp(line.log_density(np.array([[x]]))[0]), -np.inf, np.inf)
+    assert area == pytest.approx(1.0, abs=1e-6)
+    plane = two_humps()
+    grid = np.linspace(-40, 46, 801)
+    points = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1).reshape(-1, 2)
+    total = np.exp(plane.log_density(points)).sum() * (grid[1] - grid[0]) ** 2
+    assert total == pytest.approx(1.0, abs=2e-3)
+
+
+def test_draws_follow_the_density():
+    mixture = two_humps()
+    x = mixture.sample(np.random.default_rng(3), 20_000)
+    mean = 0.3 * 6.0
+    assert x.mean(axis=0) == pytest.approx([mean, mean], abs=5 * x.std() / np.sqrt(len(x)))
+    scales = [root @ root.T * 8 / 6 for root in mixture.roots]  # a t's covariance
+    covariance = 0.7 * scales[0] + 0.3 * scales[1] + 0.21 * 36 * np.ones((2, 2))
+    assert np.cov(x.T) == pytest.approx(covariance, rel=0.05)
+    direction = np.array([0.6, -0.8])
+    centres = mixture.means @ direction
+    widths = np.sqrt([direction @ root @ root.T @ direction for root in mixture.roots])
+
+    def below(value):
+        return sum(
+            w * student_t(8.0).cdf((value - c) / s)
+            for w, c, s in zip(mixture.weights, centres, widths, strict=True)
+        )
+
+    assert kstest(below(x @ direction), "uniform").pvalue > 1e-3
+
+
+def test_a_fit_finds_the_components():
+    rng = np.random.default_rng(4)
+    truth = two_humps(3)
+    x = truth.sample(rng, 20_000)
+    fitted = fit_student_mixture(x, np.ones(len(x)), 2, 8.0, rng)
+    order = np.argsort(-fitted.weights)
+    assert fitted.weights[order] == pytest.approx([0.7, 0.3], abs=0.02)
+    assert fitted.means[order] == pytest.approx(truth.means, abs=0.1)
+    # Kullback and Leibler's distance between truth and fit, by the draws.
+    loss = np.mean(truth.log_density(x) - fitted.log_density(x))
+    assert -0.01 < loss < 0.01
+
+
+def test_a_fit_to_weighted_points():
+    rng = np.random.default_rng(5)
+    wide = student(np.array([1.0, 0.0]), 9 * np.eye(2), 8.0)
+    truth = student(np.array([0.0, 1.0]), np.array([[1.0, 0.8], [0.8, 1.0]]), 8.0)
+    x = wide.sample(rng, 20_000)
+    weights = np.exp(truth.log_density(x) - wide.log_density(x))
+    fitted = fit_student_mixture(x, weights, 2, 8.0, rng)
+    drawn = truth.sample(rng, 5000)
+    assert abs(np.mean(truth.log_density(drawn) - fitted.log_density(drawn))) < 0.02
+
+
+def test_points_on_a_line_do_not_break_a_fit():
+    rng = np.random.default_rng(6)
+    x = np.outer(rng.standard_normal(500), [1.0, 2.0, -1.0])
+    fitted = fit_student_mixture(x, np.ones(500), 3, 8.0, rng)
+    assert np.isfinite(fitted.log_density(x)).all()
+    assert np.isfinite(fitted.sample(rng, 10)).all()
+
+
+def test_adapting_finds_a_density_that_the_first_guess_hardly_knows():
+    target = two_humps(4)
+    first = student(np.full(4, 3.0), 16 * np.eye(4))
+    adapted = adapt(target.log_density, first, np.random.default_rng(7))
+    assert adapted.efficiency > 0.5
+    assert adapted.weights.sum() == pytest.approx(1.0)
+    assert adapted.weights @ adapted.points == pytest.approx(np.full(4, 1.8), abs=0.2)
+
+
+def test_adapting_leaves_a_good_guess_alone():
+    target = student(np.zeros(3), np.eye(3), 50.0)
+    guess = student(np.zeros(3), 1.1 * np.eye(3))
+    assert adapt(target.log_density, guess, np.random.default_rng(8)).proposal is guess
+
+
+def test_adapting_survives_a_guess_outside_the_support():
+    def target(x):
+        return np.where(np.all(x > 5, axis=1), -0.5 * np.sum(x**2, axis=1), -np.inf)
+
+    guess = student(np.zeros(2), np.eye(2))
+    adapted = adapt(target, guess, np.random.default_rng(9))
+    assert np.isfinite(adapted.weights).all()
+    nowhere = adapt(lambda x: np.full(len(x), -np.inf), guess, np.random.default_rng(9))
+    assert np.isfinite(nowhere.weights).all()
+
+
+def banana(rng: np.random.Generator, count: int) -> np.ndarray:
+    """A ridge bent twice in five dimensions, a hundred times longer than it is thick."""
+    z = rng.standard_normal((count, 5)) * [3.0, 1.0, 0.03, 0.05, 0.5]
+    z[:, 2] += 0.02 * z[:, 0] ** 2 + 0.5 * z[:, 0]
+    z[:, 3] += 0.1 * z[:, 4] ** 2 - z[:, 1]
+    return z + 7.0
+
+
+def test_straightening_goes_there_and_back_and_keeps_volumes():
+    x = banana(np.random.default_rng(10), 3000)
+    straightening = straighten(x)
+    y = straightening.straight(x)
+    assert straightening.bent(y) == pytest.approx(x, rel=1e-9)
+    determinants = []
+    for point in x[:5]:
+        corners = np.vstack([point, point + 1e-5 * np.eye(5)])
+        image = straightening.straight(corners)
+        determinants.append(np.linalg.det((image[1:] - image[0]) / 1e-5))
+    assert determinants == pytest.approx([determinants[0]] * 5, rel=1e-3)
+
+
+def test_straightening_makes_a_bent_ridge_normal():
+    rng = np.random.default_rng(11)
+    straightening = straighten(banana(rng, 3000))
+    fresh = banana(rng, 5000)
+
+    def entropy(points):  # of the normal distribution with their covariance
+        return 0.5 * np.linalg.slogdet(np.cov(points.T))[1]
+
+    # Volume, in logarithms, that one normal distribution needs for it: 2.3 too much at first.
+    exact = np.log([3.0, 1.0, 0.03, 0.05, 0.5]).sum()
+    change = np.linalg.slogdet(straightening.whiten)[1]
+    assert entropy(fresh) > exact + 2.2
+    assert entropy(straightening.straight(fresh)) - change < exact + 0.8
+
+
+def test_far_points_do_not_warn():
+    straightening = straighten(banana(np.random.default_rng(14), 3000))
+    far = straightening.bent(np.full((1, 5), 1e200))
+    assert not np.isfinite(far).all()
+
+
+def test_nothing_to_straighten():
+    x = np.random.default_rng(12).standard_normal((20, 3))
+    same = nothing_to_straighten(3)
+    assert np.array_equal(same.straight(x), x) and np.array_equal(same.bent(x), x)
+
+
+def test_few_points_decide_few_terms():
+    x = np.random.default_rng(13).standard_normal((100, 12))
+    straightening = straighten(x)
+    assert np.count_nonzero(straightening.quadratic[-1]) <= 100 / 30
+    assert straightening.bent(straightening.straight(x)) == pytest.approx(x, abs=1e-9)

@@ -1,0 +1,230 @@
+"""Models: parameters, units, delays, priors from device files, the data or the user, and errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_bench import LHIFAM_FREE, LHIFAM_HELD, Device, tremor
+
+from bayeshaptic.devices import load_device
+from bayeshaptic.errors import InputError
+from bayeshaptic.models import (
+    HalfNormal,
+    LogNormal,
+    Normal,
+    Uniform,
+    build_model,
+    free,
+    grasped,
+    rigid,
+)
+from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.models.start import informed, scales, starting_points
+from bayeshaptic.models.structures import STRUCTURES
+from bayeshaptic.recordings import Recording
+from bayeshaptic.recordings.etfe import estimate_etfe
+
+FREE = ("m1", "b1", "bc", "kc", "m2", "b2")
+
+
+def recording(chain=LHIFAM_FREE, seconds=12.0, seed=0, held=False, force_unit="N", rms=3.0):
+    rng = np.random.default_rng(seed)
+    force = rms * rng.standard_normal(int(seconds / 1e-3))
+    device = Device(chain)
+    position = device.simulate(force)
+    if held:
+        position = position + device.simulate(0.1 * rms * tremor(rng, len(force), 1e-3), mass=2)
+    position = position + 1e-3 * np.std(np.diff(position)) * rng.standard_normal(len(force))
+    unit = "m" if force_unit == "N" else "rad"
+    return Recording(force, position, 1e-3, force_unit, unit)
+
+
+@pytest.fixture(scope="module")
+def etfe():
+    return estimate_etfe(recording())
+
+
+@pytest.mark.parametrize(
+    ("make", "names"),
+    [(rigid, ("m", "b")), (free, FREE), (grasped, (*FREE, "bs", "ks", "mh", "bh", "kh"))],
+)
+def test_names_and_the_delay_comes_last(make, names):
+    assert make().names == (*names, "delay_s")
+    assert make("lhifam").names == names
+    assert make("lhifam", delay_sd_s=2e-5).names == (*names, "delay_s")
+    model = make("lhifam")
+    assert model.size == len(names) == len(model.values)
+    assert make.__name__ == model.name and model.name in STRUCTURES
+
+
+def test_a_delay_is_known_uncertain_or_free():
+    known = free("lhifam")
+    assert known.fixed == {"delay_s": 2e-4}
+    assert free("lhifam", delay_s=3e-4).fixed == {"delay_s": 3e-4}
+    uncertain = free("lhifam", delay_s=3e-4, delay_sd_s=5e-5)
+    assert uncertain.prior("delay_s") == Normal(3e-4, 5e-5, low=0.0)
+    assert uncertain.values[-1] == 3e-4
+    loose = free("lhifam", delay_sd_s=np.inf)
+    assert loose.prior("delay_s") == HalfNormal(2e-3)  # two periods
+    assert not loose.fixed
+    unknown = free(period_s=4e-4)
+    assert unknown.prior("delay_s") == HalfNormal(8e-4)
+    assert free().parameter("delay_s").prior is None  # until the data say the period
+    response = known.response(known.values, [10.0, 100.0])
+    same = uncertain.response([*known.values, 2e-4], [10.0, 100.0])
+    assert np.allclose(response, same, rtol=1e-12)
+
+
+def test_a_device_with_an_uncertain_delay():
+    from dataclasses import replace
+
+    device = replace(load_device("lhifam"), delay_sd_s=1e-5)
+    assert free(device).prior("delay_s") == Normal(2e-4, 1e-5, low=0.0)
+    assert free(device, delay_s=3e-4).fixed == {"delay_s": 3e-4}  # the user's word is exact
+    assert "delay_s" in free(replace(device, delay_s=None, delay_sd_s=None)).names
+
+
+def test_priors_around_the_device_file():
+    model = grasped("phantom")
+    values = load_device("phantom").parameters["grasped"]
+    assert model.prior("kc") == LogNormal(values["kc"], 0.5)
+    assert model.prior("ks") == LogNormal(values["ks"], 0.7)  # people differ more than devices
+    assert model.prior("b2") == HalfNormal(2 * (values["b1"] + values["b2"]))
+    assert np.array_equal(model.values, [values[name] for name in model.names])
+    centre = np.array([[model.prior(name).quantile(0.5) for name in model.names]])
+    assert np.isfinite(model.log_prior(centre)).all()
+    outside = centre.copy()
+    outside[0, model.names.index("b1")] = -1e-9
+    assert model.log_prior(outside)[0] == -np.inf
+
+
+def test_a_rigid_device_is_the_sum_of_its_parts():
+    from dataclasses import replace
+
+    device = load_device("lhifam")
+    bare = replace(device, parameters={"free": device.parameters["free"]})
+    assert rigid(bare).values == pytest.approx([5.39, 6.9])
+
+
+def test_the_users_own_priors_replace_the_others(etfe):
+    mine = {"kc": Uniform(1e4, 1e5), "m1": LogNormal(0.2, 0.1)}
+    model = free("lhifam", prior=mine)
+    assert model.prior("kc") == mine["kc"] and model.prior("m1") == mine["m1"]
+    assert model.prior("m2") == free("lhifam").prior("m2")
+    weak = informed(free(prior=mine), etfe)
+    assert weak.prior("kc") == mine["kc"]
+    assert isinstance(weak.prior("m2"), LogNormal)
+    with pytest.raises(InputError, match="no parameter kk in the free model; it has m1, b1"):
+        free("lhifam", prior={"kk": Uniform(0, 1)})
+    with pytest.raises(InputError, match="no parameter ks"):
+        free("lhifam").with_prior({"ks": Uniform(0, 1)})
+
+
+@pytest.mark.parametrize(
+    ("force", "position", "mass", "damping", "stiffness"),
+    [
+        ("N", "m", "kg", "N s/m", "N/m"),
+        ("Nm", "rad", "kg m^2", "N m s/rad", "N m/rad"),
+        ("A", "rad", "A s^2/rad", "A s/rad", "A/rad"),
+        ("A", "m", "A s^2/m", "A s/m", "A/m"),
+    ],
+)
+def test_units(force, position, mass, damping, stiffness):
+    units = [unit_of(kind, force, position) for kind in ("mass", "damping", "stiffness")]
+    assert units == [mass, damping, stiffness]
+    assert unit_of("time", force, position) == "s"
+    assert unit_of("position", force, position) == position
+
+
+def test_units_of_models(etfe):
+    assert free("lhifam").unit("kc") == "N/m"
+    assert free("phantom").unit("kc") == free("phantom").stiffness_unit == "N m/rad"
+    assert free("lhifam", delay_sd_s=1e-5).unit("delay_s") == "s"
+
+
+def test_a_force_in_amperes_gives_units_in_amperes():
+    etfe = estimate_etfe(recording(force_unit="A"))
+    model = informed(free(), etfe)
+    assert model.unit("kc") == model.stiffness_unit == "A/rad"
+    assert model.unit("m1") == "A s^2/rad"
+    assert model.period_s == 1e-3
+
+
+@pytest.mark.parametrize(("chain", "held"), [(LHIFAM_FREE, False), (LHIFAM_HELD, True)])
+def test_the_scales_of_an_unknown_device(chain, held):
+    """The mass lies between the motor's and the whole; a peak stands where a vibration mode is."""
+    found = scales(estimate_etfe(recording(chain, held=held, seed=2)))
+    masses = chain["masses"]
+    assert 0.8 * masses[0] < found.mass < 1.2 * sum(masses)
+    poles = np.linalg.eigvals(Device(chain).a)
+    modes = np.abs(poles[np.abs(poles.imag) > 5 * np.abs(poles.real)]) / (2 * np.pi)
+    assert np.abs(np.log(found.peaks_hz[:, None] / modes)).min() < 0.05
+
+
+@pytest.mark.parametrize("make", [rigid, free, grasped])
+def test_weak_priors_and_starts_make_sense(make, etfe):
+    model = informed(make(), etfe)
+    assert model.has_priors and model.names[-1] == "delay_s"
+    starts = starting_points(model, etfe, np.random.default_rng(0))
+    assert starts.shape[1] == model.size and len(starts) > 100
+    assert np.isfinite(starts).all() and (starts >= 0).all()
+    assert np.isfinite(model.log_prior(starts)).all()
+    response = model.response(starts[:64], etfe.frequency_hz)
+    assert np.isfinite(response).all()
+    again = starting_points(model, etfe, np.random.default_rng(0))
+    assert np.array_equal(starts, again)
+
+
+def test_shapes_of_the_response():
+    model = grasped("lhifam")
+    one = model.response(model.values, [1.0, 10.0, 100.0])
+    many = model.response(np.tile(model.values, (200, 1)), [1.0, 10.0, 100.0])
+    assert one.shape == (3,) and many.shape == (200, 3)
+    assert np.allclose(many, one, rtol=1e-12)
+    assert model.log_prior(np.tile(model.values, (4, 1))).shape == (4,)
+
+
+def test_another_period():
+    model = free("lhifam").with_period(5e-4)
+    assert model.period_s == 5e-4
+    assert free("lhifam", period_s=5e-4).period_s == 5e-4
+    assert not np.allclose(
+        model.response(model.values, [100.0]),
+        free("lhifam").response(model.values, [100.0]),
+        rtol=1e-3,
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: build_model("stiff"), "no model 'stiff'; there are rigid, free, grasped"),
+        (lambda: free("no-such-device"), "no-such-device"),
+        (lambda: free(delay_s=-1e-4), "delay_s is -0.0001 s"),
+        (lambda: free(delay_s=np.nan), "delay_s is nan s"),
+        (lambda: free(delay_s=1e-4, delay_sd_s=-1.0), "delay_sd_s is -1.0 s"),
+        (lambda: free(period_s=0.0), "period_s is 0.0 s"),
+        (lambda: free(period_s=1000.0), "period_s is 1000.0 s"),
+        (lambda: free().values, "no values for m1, b1"),
+        (lambda: free().prior("kc"), "prior of kc is not set"),
+        (lambda: free().response(np.ones(7), [1.0]), "no sampling period"),
+        (lambda: free("lhifam").response(np.ones(5), [1.0]), "has 6 parameters .* 5 were given"),
+        (
+            lambda: free("lhifam").response(free("lhifam").values, [1.0], "pade"),
+            'approximation is "exact" or "continuous", not .pade.',
+        ),
+    ],
+)
+def test_wrong_use_is_refused_in_one_line(call, message):
+    with pytest.raises(InputError, match=message) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_device_file_with_an_impossible_value():
+    from dataclasses import replace
+
+    device = load_device("lhifam")
+    values = dict(device.parameters["free"], kc=0.0)
+    with pytest.raises(InputError, match="kc = 0.0; it must be positive"):
+        free(replace(device, parameters={"free": values}))
