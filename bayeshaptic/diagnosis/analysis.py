@@ -146,7 +146,8 @@ def analyse(
         seed,
         report,
     )
-    return finish(begun, begun.etfe, begun.fit, ess=ess, seed=seed, progress=report)
+    done = finish(begun, begun.etfe, begun.fit, ess=ess, seed=seed, progress=report)
+    return replace(done, notices=done.notices + _residual_notice(begun))
 
 
 @dataclass(frozen=True)
@@ -282,6 +283,21 @@ def _with_noise(fit: Fit, scale: float) -> Fit:
     """The fit with `scale` times the noise variance in its windows."""
     windows = replace(fit.windows, scatter=fit.windows.scatter * scale)
     return replace(fit, windows=windows)
+
+
+def _residual_notice(begun: Begun) -> tuple[Notice, ...]:
+    """What the tests of the residual find where nobody traces it."""
+    from bayeshaptic.diagnosis.loop import residual_tests
+
+    found = [test for test in residual_tests(begun.fit, begun.etfe) if test.flagged]
+    if not found:
+        return ()
+    worst = max(found, key=lambda test: test.excess)
+    text = (
+        f"The residual is not noise: {worst.text} ({worst.family}). Close the loop to find out "
+        "what the model lacks; until then its critical stiffness may be far too high."
+    )
+    return (Notice("warning", "residual", text),)
 
 
 def _misfit_notice(scale: float) -> tuple[Notice, ...]:

@@ -101,6 +101,10 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"{misfit_factor(analysis)} times the noise, reduced chi-square "
             f"{pure(analysis.fit.reduced_chi_square)})"
         )
+    if verdict is None and any(n.topic == "residual" for n in analysis.notices):
+        found.append(
+            "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
+        )
     if has_feedback(analysis):
         found.append(
             "the force was computed from the motion (feedback), which biases the response that "
