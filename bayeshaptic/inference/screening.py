@@ -11,9 +11,32 @@ from bayeshaptic.inference.least_squares import weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.model import LinearEffect
+from bayeshaptic.models.structures import HAND
 from bayeshaptic.recordings.windows import Windows
 
 Floats = NDArray[np.float64]
+
+
+def starting_bases(model: Model, theta: Floats) -> Floats:
+    """Base vectors to start from: the fit `theta`, and what is believed without it.
+
+    With a device file its own values too, and the fit with the file's hand: what the model lacks
+    is often taken for a strange hand.
+
+    Parameters
+    ----------
+    model : Model
+        Without the effect.
+    theta : ndarray, shape (P,)
+
+    Returns
+    -------
+    ndarray, shape (S, P)
+    """
+    believed = np.array([model.reference.get(name, np.nan) for name in model.names])
+    nominal = np.where(np.isnan(believed), theta, believed)
+    hand = np.isin(model.names, HAND)
+    return np.unique(np.stack([theta, nominal, np.where(hand, nominal, theta)]), axis=0)
 
 
 def promising_starts(
@@ -33,7 +56,7 @@ def promising_starts(
     effect : LinearEffect
     windows : Windows
     bases : ndarray, shape (S, P)
-        Vectors of `model`: its fit, the device file's values.
+        Vectors of `model`: see `starting_bases`.
     own : ndarray, shape (N, number of the effect's parameters)
         Values of the effect: `LinearEffect.starting_values`.
     keep : int
@@ -60,6 +83,19 @@ def promising_starts(
         left = np.where(usable[:, None], left, 0.0)
         q, _ = np.linalg.qr(np.nan_to_num(slope))
         cost = np.einsum("bn,bn->b", left, left) - np.einsum("bp,bp->b", *(2 * [left @ q]))
-        order = np.argsort(np.where(usable, cost, np.inf))
+        order = _spread(own, np.where(usable, cost, np.inf))
         kept.append(starts[order[: keep // len(bases)]])
     return np.concatenate(kept)
+
+
+def _spread(own: Floats, cost: Floats) -> NDArray[np.int_]:
+    """Order of the values: the best of every row of the grid (along its first axis), then the next.
+
+    The lowest costs alone are neighbours that lead to the same optimum.
+    """
+    row = np.unique(own[:, 1:], axis=0, return_inverse=True)[1].ravel()
+    by_row = np.lexsort((cost, row))
+    first = np.searchsorted(row[by_row], row[by_row])
+    place = np.empty(len(own), int)
+    place[by_row] = np.arange(len(own)) - first
+    return np.lexsort((cost, place))
