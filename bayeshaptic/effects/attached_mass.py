@@ -80,6 +80,7 @@ class SecondMode(AttachedMass):
 
     name = "second_mode"
     title = "second vibration mode"
+    ties = ("base_compliance",)
     places = (MOTOR, BODY)
     prefix = "mode"
     part = "the further mass"
