@@ -16,9 +16,7 @@ measurement says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +24,10 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.stability.relay_estimate import estimate, jackknife, oscillation_share
 from bayeshaptic.stability.relay_spectra import (
-    NEAR,
     STEADY_DB,
     STEADY_SHARE,
-    Spectra,
-    oscillation,
     pieces,
     spectra_of,
     steady_from,
@@ -41,10 +37,8 @@ Floats = NDArray[np.float64]
 
 SEGMENT = 2048  # samples, where the recording is long enough
 LEAST_SEGMENTS = 8
-BLOCKS = 10  # of the jackknife
 SINUSOIDAL = 0.8  # share of the motion's variance that the oscillation has
 LEAST_STEADY_S = 15.0  # what Diaz and Gil recorded
-_LINES = 4  # reach of the local fit on either side, at least
 _CERTAIN_DB = 0.7  # a critical stiffness that is less certain than this is none
 
 
@@ -111,17 +105,6 @@ class RelayMeasurement:
         return _relative_db(self.critical_stiffness_sd / self.critical_stiffness)
 
 
-@dataclass(frozen=True)
-class _Estimate:
-    """Of one set of segments: what the jackknife repeats."""
-
-    frequency_hz: float
-    gain: float
-    phase_deg: float
-    crossing_hz: float
-    critical: float
-
-
 def measure_relay(recording: Recording) -> RelayMeasurement:
     """Gain margin and frequency of a relay experiment.
 
@@ -155,11 +138,11 @@ def measure_relay(recording: Recording) -> RelayMeasurement:
         )
     first = steady_from(force, position, recording.period_s, segment)
     spectra = spectra_of(force[first:], position[first:], recording.period_s, segment)
-    linear, quadratic = (_estimate(spectra, order) for order in (1, 2))
-    sd = _jackknife(spectra, quadratic)
+    linear, quadratic = (estimate(spectra, order) for order in (1, 2))
+    sd = jackknife(spectra, quadratic)
     unit = unit_of("stiffness", recording.force_unit, recording.position_unit)
     end = len(force) * recording.period_s
-    share = _share(spectra, quadratic.frequency_hz)
+    share = oscillation_share(spectra, quadratic.frequency_hz)
     bound = 180 * quadratic.frequency_hz * recording.period_s
     # A curved response: half of what the curvature brought is an error of the next order.
     curved = 0.5 * abs(np.log(quadratic.critical / linear.critical))
@@ -182,65 +165,6 @@ def measure_relay(recording: Recording) -> RelayMeasurement:
     )
     found = tuple(_notices(measured, recording, force[first:], position[first:], segment))
     return RelayMeasurement(**{**vars(measured), "notices": (*recording.notices, *found)})
-
-
-def _estimate(spectra: Spectra, order: int) -> _Estimate:
-    """U = D Y around the oscillation by least squares, D a polynomial; its value and crossing.
-
-    The dynamic stiffness D = 1/G is smooth where G has a resonance.
-    """
-    centre, width = oscillation(spectra)
-    half = max(3 * width, _LINES * spectra.bin_hz)
-    use = np.abs(spectra.frequency_hz - centre) < half
-    x = (spectra.frequency_hz[use] - centre) / half
-    basis = (spectra.position[:, use, None] * x[:, None] ** np.arange(order + 1)).reshape(
-        -1, order + 1
-    )
-    stiffness = np.linalg.lstsq(basis, spectra.force[:, use].ravel(), rcond=None)[0][::-1]
-    here = stiffness[-1]
-    root = _nearest_root(np.asarray(stiffness.imag, float))
-    critical = -np.polyval(stiffness.real, root) if abs(root) < np.inf else np.nan
-    return _Estimate(
-        centre,
-        float(abs(here)),
-        float(np.degrees(np.angle(-1 / here))),
-        float(centre + half * root),
-        float(critical) if critical > 0 else np.nan,
-    )
-
-
-def _nearest_root(coefficients: Floats) -> float:
-    """The real root nearest to zero of a polynomial, highest power first; inf without one."""
-    roots = np.roots(coefficients)
-    real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots))].real
-    return float(real[np.argmin(np.abs(real))]) if len(real) else np.inf
-
-
-def _jackknife(spectra: Spectra, whole: _Estimate) -> dict[str, float]:
-    """Standard deviations: of the frequency in Hz, of the stiffnesses' logarithms."""
-    count = len(spectra.force)
-    blocks = np.array_split(np.arange(count), min(BLOCKS, count))
-    without = [
-        _estimate(spectra.only(np.setdiff1d(np.arange(count), block)), 2) for block in blocks
-    ]
-
-    def spread(read: Callable[[_Estimate], Any]) -> float:
-        values = np.array([read(estimate) for estimate in without], float)
-        scatter = ((values - values.mean()) ** 2).sum()
-        return float(np.sqrt((len(blocks) - 1) / len(blocks) * scatter))
-
-    return {
-        "frequency_hz": spread(lambda e: e.frequency_hz),
-        "gain": spread(lambda e: np.log(e.gain)),
-        "critical": spread(lambda e: np.log(e.critical)) if whole.critical > 0 else np.nan,
-    }
-
-
-def _share(spectra: Spectra, frequency_hz: float) -> float:
-    power = (np.abs(spectra.position) ** 2).mean(axis=0)
-    counted = spectra.frequency_hz > 0.5 * frequency_hz
-    near = np.abs(spectra.frequency_hz - frequency_hz) < NEAR * frequency_hz
-    return float(power[near].sum() / power[counted].sum())
 
 
 def _relative_db(relative: float) -> float:
