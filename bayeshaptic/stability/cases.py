@@ -1,0 +1,187 @@
+"""Free or held, this person or another, here or there: a device must be stable in all its cases."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.models.model import Model
+from bayeshaptic.stability.critical import ENOUGH_BELOW, MOST_DRAWS, CriticalStiffness
+from bayeshaptic.stability.effective import effective_draws
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+
+FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A situation that a device must stay stable in: who holds it, in which configuration.
+
+    Attributes
+    ----------
+    label : str
+        For example "nobody holds it", "user ana", "a new person", "configuration 0.3, held".
+    group : {"free", "held", "new person", "configuration"}
+    model : Model
+    draws : ndarray, shape (n, P)
+        Equally weighted, in the order of `model.names`.
+    limit : CriticalStiffness
+        Of these draws, in the same order.
+    """
+
+    label: str
+    group: str
+    model: Model
+    draws: Floats = field(repr=False)
+    limit: CriticalStiffness = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Binding:
+    """How probable it is that one case sets the device's limit.
+
+    Attributes
+    ----------
+    case, group : str
+        Label and group of the case.
+    probability : float
+    """
+
+    case: str
+    group: str
+    probability: float
+
+
+@dataclass(frozen=True)
+class DeviceLimit:
+    """The critical stiffness over all cases of a device: in each joint draw, the smallest.
+
+    Attributes
+    ----------
+    samples : ndarray, shape (n,)
+        The smallest K_CR of each joint draw, in `unit`.
+    which : ndarray of int, shape (n,)
+        Index into `cases` of the case that binds; -1 where nothing limits any of them.
+    cases : tuple of Case
+    unit : str
+    """
+
+    samples: Floats = field(repr=False)
+    which: Ints = field(repr=False)
+    cases: tuple[Case, ...]
+    unit: str
+
+    @property
+    def binding(self) -> tuple[Binding, ...]:
+        """Every case with its probability of setting the limit, the most probable first."""
+        found = [
+            Binding(case.label, case.group, float(np.mean(self.which == number)))
+            for number, case in enumerate(self.cases)
+        ]
+        return tuple(sorted(found, key=lambda binding: -binding.probability))
+
+    def by_group(self) -> dict[str, float]:
+        """Probability that a case of each group ("free", "held", ...) sets the limit."""
+        shares: dict[str, float] = {}
+        for binding in self.binding:
+            shares[binding.group] = shares.get(binding.group, 0.0) + binding.probability
+        return shares
+
+    def quantile(self, p: ArrayLike) -> Any:
+        """The stiffness that the limit is below with probability `p`; a float, or an array."""
+        levels = np.asarray(p, float)
+        method = "linear" if np.isfinite(self.samples).all() else "inverted_cdf"
+        quantile = np.quantile(self.samples, levels, method=method)  # type: ignore[call-overload]
+        return float(quantile) if levels.ndim == 0 else quantile
+
+    def db(self, p: ArrayLike = 0.5) -> Any:
+        """`quantile` of `p` in decibels, 20 log10 of the number in `unit`."""
+        with np.errstate(divide="ignore"):
+            return 20 * np.log10(self.quantile(p))
+
+    def probability_unstable(self, stiffness: ArrayLike) -> Any:
+        """P(limit < stiffness), a float, or an array as `stiffness`."""
+        below = np.searchsorted(np.sort(self.samples), stiffness, side="left")
+        return below / len(self.samples)
+
+    def safe(self, risk: float) -> float | None:
+        """The stiffness that is unstable in some case with probability `risk`.
+
+        None where fewer than 20 effective draws lie below it.
+        """
+        stiffness = self.quantile(risk)
+        if self._effective_below(stiffness) < ENOUGH_BELOW:
+            return None
+        return float(stiffness)
+
+    def _effective_below(self, stiffness: float) -> float:
+        """Effective draws below `stiffness`, by the variances of the cases' shares F_c below.
+
+        With F = 1 - prod (1 - F_c) and var F_c = F_c (1 - F_c) / n_c, as many independent draws as
+        would give the same variance of F.
+        """
+        variance, above = 0.0, 1.0
+        for case in self.cases:
+            below = case.limit.samples < stiffness
+            share = float(below.mean())
+            draws = effective_draws(below.reshape(case.limit.chains, -1))
+            above *= 1 - share
+            variance += share / (1 - share) / draws if share < 1 else 0.0
+        if above in (0.0, 1.0):
+            return 0.0 if above == 1.0 else float(len(self.samples))
+        risk = 1 - above
+        # var F = above^2 sum F_c / ((1 - F_c) n_c), and n = F (1 - F) / var F.
+        return risk * risk / (above * variance)
+
+
+def device_limit(cases: Sequence[Case], seed: int = 0) -> DeviceLimit:
+    """The limit of a device over all its cases.
+
+    Each joint draw takes one draw of every case, in a random order of its own.  Cases that share
+    device parameters are so taken as independent.  They depend on each other positively (what
+    lowers one limit lowers the others), and then the smallest of independent draws is the lower
+    one: the error is on the safe side, and vanishes where one case binds.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    seed : int
+        Of the random orders.
+
+    Returns
+    -------
+    DeviceLimit
+
+    Raises
+    ------
+    InputError
+        Without cases, or where their stiffnesses have different units.
+    """
+    if not cases:
+        raise InputError("no case to take the limit over: none of the recordings could be used.")
+    units = sorted({case.limit.unit for case in cases})
+    if len(units) > 1:
+        raise InputError(
+            f"the cases have stiffnesses in {' and '.join(units)}: a study is of one device with "
+            "one unit of force and position."
+        )
+    rng = np.random.default_rng(seed)
+    count = min(max(len(case.limit.samples) for case in cases), MOST_DRAWS)
+    joint = np.stack([_shuffled(case.limit.samples, count, rng) for case in cases])
+    which = np.argmin(joint, axis=0)
+    samples = joint[which, np.arange(count)]
+    which = np.where(np.isinf(samples), -1, which)
+    return DeviceLimit(samples, which, tuple(cases), units[0])
+
+
+def _shuffled(samples: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """`count` of the samples in random order, all of them used equally often."""
+    rounds = -(-count // len(samples))
+    return np.concatenate([rng.permutation(samples) for _ in range(rounds)])[:count]
