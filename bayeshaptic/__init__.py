@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from bayeshaptic.devices import Device, device_names, load_device
     from bayeshaptic.diagnosis.analysis import Analysis, analyse
     from bayeshaptic.diagnosis.closed import Closed, close_loop
+    from bayeshaptic.diagnosis.study_analysis import StudyAnalysis, analyse_study
     from bayeshaptic.errors import BayeshapticWarning, InputError, Notice
     from bayeshaptic.inference.arviz_io import load_posterior
     from bayeshaptic.inference.choose import Choice, choose_model
@@ -65,6 +66,7 @@ _HOMES = {
     "bayeshaptic.devices": ("Device", "device_names", "load_device"),
     "bayeshaptic.diagnosis.analysis": ("Analysis", "analyse"),
     "bayeshaptic.diagnosis.closed": ("Closed", "close_loop"),
+    "bayeshaptic.diagnosis.study_analysis": ("StudyAnalysis", "analyse_study"),
     "bayeshaptic.errors": ("BayeshapticWarning", "InputError", "Notice"),
     "bayeshaptic.inference": ("Fit", "Posterior", "least_squares", "load_posterior", "sample"),
     "bayeshaptic.inference.choose": ("Choice", "choose_model"),
@@ -119,8 +121,10 @@ __all__ = [
     "Recording",
     "RelayMeasurement",
     "Study",
+    "StudyAnalysis",
     "Uniform",
     "analyse",
+    "analyse_study",
     "choose_model",
     "close_loop",
     "critical_stiffness",
