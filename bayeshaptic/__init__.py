@@ -53,9 +53,13 @@ if TYPE_CHECKING:
     from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
     from bayeshaptic.report import write_report
     from bayeshaptic.stability import (
+        Backward,
         CriticalStiffness,
+        KbRegion,
+        LowPass,
         RelayMeasurement,
         critical_stiffness,
+        kb_region,
         measure_relay,
     )
 
@@ -93,9 +97,13 @@ _HOMES = {
     "bayeshaptic.recordings.etfe": ("Etfe", "estimate_etfe"),
     "bayeshaptic.report": ("write_report",),
     "bayeshaptic.stability": (
+        "Backward",
         "CriticalStiffness",
+        "KbRegion",
+        "LowPass",
         "RelayMeasurement",
         "critical_stiffness",
+        "kb_region",
         "measure_relay",
     ),
 }
@@ -103,6 +111,7 @@ _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Analysis",
+    "Backward",
     "BayeshapticWarning",
     "Choice",
     "Closed",
@@ -112,8 +121,10 @@ __all__ = [
     "Fit",
     "HalfNormal",
     "InputError",
+    "KbRegion",
     "LogNormal",
     "LogUniform",
+    "LowPass",
     "Model",
     "Normal",
     "Notice",
@@ -132,6 +143,7 @@ __all__ = [
     "estimate_etfe",
     "free",
     "grasped",
+    "kb_region",
     "least_squares",
     "load_device",
     "load_posterior",

@@ -16,6 +16,7 @@ from bayeshaptic.rig.propagate import split_delay
 from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.rig.sensing import Encoder, Streams, actuate, hand_force, write_down
 from bayeshaptic.rig.stepper import SUBSTEPS, Stepper
+from bayeshaptic.rig.truth import smoothing_of
 
 Controller = Callable[[int, float], float]
 
@@ -201,11 +202,14 @@ def run_wall(
     push: float | None = None,
     seed: int = 0,
     substeps: int = SUBSTEPS,
+    cutoff_hz: float | None = None,
 ) -> WallRun:
     """Render a virtual wall on both sides of the present position, and see whether it shakes.
 
-    The force is -stiffness y[k] - damping (y[k] - y[k-1])/T. For a verdict on the linear loop use
-    `bench.quiet()`: an encoder's counts keep small oscillations alive, tremor goes on for ever.
+    The force is -stiffness y[k] - damping v[k], v[k] = (y[k] - y[k-1])/T, or with a cut-off
+    v[k] = a v[k-1] + (1 - a)(y[k] - y[k-1])/T, a = exp(-2 pi cutoff_hz T).
+    For a verdict on the linear loop use `bench.quiet()`: an encoder's counts keep small
+    oscillations alive, tremor goes on for ever.
 
     Parameters
     ----------
@@ -217,17 +221,21 @@ def run_wall(
         Velocity of the motor at the beginning; by default a tenth of its usual one.
     seed : int
     substeps : int
+    cutoff_hz : float, optional
+        Of a first-order low-pass on the velocity; by default none.
 
     Returns
     -------
     WallRun
     """
     push = 0.1 * bench.scales().velocity if push is None else push
-    before = 0.0
+    smoothing = smoothing_of(cutoff_hz, bench.period_s)
+    before = rate = 0.0
 
     def wall(k: int, position: float) -> float:
-        nonlocal before
-        rate = (position - before) / bench.period_s if k else 0.0
+        nonlocal before, rate
+        step = (position - before) / bench.period_s if k else 0.0
+        rate = smoothing * rate + (1 - smoothing) * step
         before = position
         return -stiffness * position - damping * rate
 

@@ -1,8 +1,9 @@
 """The stability limit of a bench from the eigenvalues of its closed sampled loop.
 
 Nothing here looks at a frequency response: the state matrix of one period, delays as states, is
-closed with u[k] = -K y[k] - B (y[k] - y[k-1])/T, and the limit is the smallest K at which an
-eigenvalue leaves the unit circle. It is slow and obvious on purpose.
+closed with u[k] = -K y[k] - B v[k], v the difference (y[k] - y[k-1])/T or that smoothed, and the
+limit is the smallest K at which an eigenvalue leaves the unit circle. It is slow and obvious on
+purpose.
 """
 
 from __future__ import annotations
@@ -55,11 +56,24 @@ class SampledLoop:
     previous: Array
     period_s: float
 
-    def closed(self, stiffness: Array, damping: float) -> Array:
-        """State matrices of the closed loop, shape (K, n, n), for stiffnesses of shape (K,)."""
-        rate = damping / self.period_s * (self.row - self.previous)
-        feedback = np.asarray(stiffness)[:, None] * self.row + rate
-        return self.matrix - self.column[:, None] * feedback[:, None, :]
+    def closed(self, stiffness: Array, damping: float, smoothing: float = 0.0) -> Array:
+        """State matrices of the closed loop, shape (K, n, n), for stiffnesses of shape (K,).
+
+        With a `smoothing` a, the velocity is v[k] = a v[k-1] + (1 - a)(y[k] - y[k-1])/T, and v[k-1]
+        one more state.
+        """
+        rate = (1 - smoothing) / self.period_s * (self.row - self.previous)
+        feedback = np.asarray(stiffness)[:, None] * self.row + damping * rate
+        loop = self.matrix - self.column[:, None] * feedback[:, None, :]
+        if smoothing == 0.0:
+            return loop
+        n = len(self.row)
+        whole = np.zeros((len(loop), n + 1, n + 1))
+        whole[:, :n, :n] = loop
+        whole[:, :n, n] = -damping * smoothing * self.column
+        whole[:, n, :n] = rate
+        whole[:, n, n] = smoothing
+        return whole
 
 
 def sampled_loop(plant: Plant, period_s: float, substeps: int = FINE) -> SampledLoop:
@@ -130,10 +144,21 @@ def _period_with_chains(plant: Plant, period_s: float, substeps: int) -> tuple[A
     return state[:, :size], state[:, size], state[:, size + 1]
 
 
-def spectral_radius(bench: Bench, stiffness: float, damping: float = 0.0) -> float:
-    """Largest modulus of the closed loop's eigenvalues, at the beginning of the recording."""
+def spectral_radius(
+    bench: Bench, stiffness: float, damping: float = 0.0, cutoff_hz: float | None = None
+) -> float:
+    """Largest modulus of the closed loop's eigenvalues, at the beginning of the recording.
+
+    With a `cutoff_hz` the velocity of the damping term is low-passed; see `run_wall`.
+    """
     loop = sampled_loop(bench.plant(), bench.period_s)
-    return float(_radii(loop, np.array([stiffness]), damping)[0])
+    a = smoothing_of(cutoff_hz, bench.period_s)
+    return float(_radii(loop, np.array([stiffness]), damping, a)[0])
+
+
+def smoothing_of(cutoff_hz: float | None, period_s: float) -> float:
+    """The factor a of a first-order low-pass whose pole is exp(-2 pi cutoff T); 0 without one."""
+    return 0.0 if cutoff_hz is None else float(np.exp(-2 * np.pi * cutoff_hz * period_s))
 
 
 def critical_limit(bench: Bench, damping: float = 0.0) -> TrueLimit:
@@ -159,8 +184,8 @@ def critical_limit(bench: Bench, damping: float = 0.0) -> TrueLimit:
     return min(limits, key=lambda limit: limit.stiffness)
 
 
-def _radii(loop: SampledLoop, stiffness: Array, damping: float) -> Array:
-    return np.abs(np.linalg.eigvals(loop.closed(stiffness, damping))).max(axis=1)
+def _radii(loop: SampledLoop, stiffness: Array, damping: float, smoothing: float = 0.0) -> Array:
+    return np.abs(np.linalg.eigvals(loop.closed(stiffness, damping, smoothing))).max(axis=1)
 
 
 def _limit(bench: Bench, plant: Plant, damping: float) -> TrueLimit:

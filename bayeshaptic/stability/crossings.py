@@ -70,15 +70,18 @@ def find_crossings(
     -------
     Crossings
     """
-    exact = approximation == "exact"
-    response: Response
+    return search(response_of(system, period_s, approximation == "exact"), period_s)
+
+
+def response_of(
+    system: LinearSystem | EvaluableSystem, period_s: float, exact: bool = True
+) -> Response:
+    """The response of a batch of loops in the form that its kind of system allows."""
     if isinstance(system, LinearSystem) and rational(system):
-        response = pole_response(system, period_s, exact)
-    elif isinstance(system, LinearSystem) and system.dynamic_links:
-        response = linked_response(system, period_s, exact)
-    else:
-        response = EvaluatedResponse(system, period_s, exact)
-    return search(response, period_s)
+        return pole_response(system, period_s, exact)
+    if isinstance(system, LinearSystem) and system.dynamic_links:
+        return linked_response(system, period_s, exact)
+    return EvaluatedResponse(system, period_s, exact)
 
 
 def rational(system: LinearSystem | EvaluableSystem) -> bool:

@@ -1,0 +1,52 @@
+"""What is told of a region of stable walls: its boundary at a risk, and how wide it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The stiffness that is unstable with a given probability, over damping.
+
+    Attributes
+    ----------
+    risk : float
+    damping : ndarray, shape (J,)
+        Ascending, in `KbRegion.damping_unit`.
+    stiffness : ndarray, shape (J,)
+        In `KbRegion.unit`; 0 where that probability is exceeded at any stiffness.
+    """
+
+    risk: float
+    damping: Floats
+    stiffness: Floats
+
+
+@dataclass(frozen=True)
+class ZWidth:
+    """How wide the range of walls is that may be rendered at a given risk.
+
+    Each wall of the range by itself is unstable with at most the probability `risk`.
+
+    Attributes
+    ----------
+    boundary : Boundary
+    stiffness, at_damping : float
+        The stiffest wall, and the damping that it needs.
+    damping : float
+        The largest damping, at a stiffness near zero.
+    area : float
+        Of the region below the boundary, stiffness times damping.
+    """
+
+    boundary: Boundary
+    stiffness: float
+    at_damping: float
+    damping: float
+    area: float
