@@ -12,6 +12,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.critical import ENOUGH_BELOW
 from bayeshaptic.stability.damping import Backward, Damping
+from bayeshaptic.stability.kb_count import beyond_start, unstable_at_start
 from bayeshaptic.stability.kb_curve import (
     InverseCurve,
     along_damping,
@@ -23,7 +24,6 @@ from bayeshaptic.stability.kb_width import Boundary, ZWidth
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
-Flags = NDArray[np.bool_]
 
 DRAWS = 4000
 LEVELS = 33  # dampings in a table
