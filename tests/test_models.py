@@ -18,6 +18,7 @@ from bayeshaptic.models import (
     grasped,
     rigid,
 )
+from bayeshaptic.models.motion import linear_motion
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.models.start import informed, scales, starting_points
 from bayeshaptic.models.structures import STRUCTURES
@@ -228,3 +229,15 @@ def test_a_device_file_with_an_impossible_value():
     values = dict(device.parameters["free"], kc=0.0)
     with pytest.raises(InputError, match="kc = 0.0; it must be positive"):
         free(replace(device, parameters={"free": values}))
+
+
+def test_motion_of_a_mass_without_damping_is_its_force_twice_integrated() -> None:
+    model = rigid(delay_s=0.0, period_s=1e-3, prior={"m": LogNormal(2.0, 0.1)})
+    force = np.random.default_rng(0).normal(size=5000)
+    position, velocity = linear_motion(model.system(np.array([[2.0, 0.0]])), force, 1e-3)
+    wanted_velocity = np.concatenate([[0.0], np.cumsum(force)[:-1]]) * 1e-3 / 2.0
+    steps = 1e-3 * wanted_velocity + 0.5e-6 * force / 2.0
+    wanted = np.concatenate([[0.0], np.cumsum(steps)[:-1]])
+    # Poles 1e-5 rad/s apart over 5 s.
+    assert np.abs(velocity - wanted_velocity).max() < 5e-5 * np.abs(wanted_velocity).max()
+    assert np.abs(position - wanted).max() < 5e-5 * np.abs(wanted).max()

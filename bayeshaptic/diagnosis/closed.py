@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis.analysis import (
     finish,
 )
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.feedback import ForceExplained, explain_force, has_feedback, trace_force
 from bayeshaptic.diagnosis.loop import Traced, trace
 from bayeshaptic.diagnosis.state import REPORT, Accepted, share
 from bayeshaptic.errors import Notice
@@ -42,6 +43,8 @@ class Closed:
     traced : Traced
     before, after : mapping
         Errors in the form of ``summary.json``.
+    force : ForceExplained or None
+        The force as the motion explains it, where feedback biases the response.
     """
 
     base: Analysis
@@ -49,6 +52,7 @@ class Closed:
     traced: Traced
     before: Mapping[str, Any]
     after: Mapping[str, Any]
+    force: ForceExplained | None = None
 
     @property
     def model(self) -> Model:
@@ -126,8 +130,12 @@ def close_loop(
         seed,
         lambda part, word: report(0.3 * part, word),
     )
-    traced = trace(begun.etfe, begun.fit, lambda word: report(0.15, f"trying {word}"))
-    changed = bool(traced.state.accepted)
+    force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None
+    if force is not None:  # the response is biased: whatever is traced in it may be the controller
+        traced = trace_force(begun.etfe, begun.fit, force)
+    else:
+        traced = trace(begun.etfe, begun.fit, lambda word: report(0.15, f"trying {word}"))
+    changed = force is None and bool(traced.state.accepted)
     state = traced.state
     base = finish(
         begun,
@@ -150,7 +158,7 @@ def close_loop(
     limit = with_discrepancy(analysis.limit, analysis.posterior, state.fit, traced, seed)
     notices = analysis.notices + _notices(traced)
     analysis = replace(analysis, limit=limit, notices=notices)
-    return Closed(base, analysis, traced, _error(base), _error(analysis))
+    return Closed(base, analysis, traced, _error(base), _error(analysis), force)
 
 
 def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

@@ -65,6 +65,8 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
         damped = np.array([n in GROUND_DAMPERS for n in fit.model.names])
         less = np.where(damped, _DAMPING_LEFT * fit.theta, fit.theta)
         others.append(critical_stiffness(fit.model, less).value)
+    if here == 0:  # never stable: it cannot go further down
+        return _LEAST[family]
     lowest = min([here, *others])
     return max(_LEAST[family], float(np.log(here / max(lowest, 1e-3 * here))))
 

@@ -134,7 +134,7 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
             break
         state = _with_ties(chosen, trials)
         tests = _remaining_tests(state, before)
-    verdict, residual_class = _verdict(state, tests)
+    verdict, residual_class = verdict_of(state, tests)
     return Traced(verdict, residual_class, state, before, tests, tuple(candidates), rejected)
 
 
@@ -241,7 +241,8 @@ def _with_ties(chosen: Trial, trials: list[Trial]) -> State:
     return replace(chosen.state, accepted=(*earlier, own))
 
 
-def _verdict(state: State, tests: tuple[Test, ...]) -> tuple[str, str | None]:
+def verdict_of(state: State, tests: tuple[Test, ...]) -> tuple[str, str | None]:
+    """The verdict on what is left, and its class."""
     left = [test for test in tests if test.flagged]
     if left:
         return UNEXPLAINED, max(left, key=lambda test: test.excess).family

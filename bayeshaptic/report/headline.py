@@ -6,11 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.diagnosis.feedback import has_feedback
 from bayeshaptic.inference.least_squares import MISFIT
 from bayeshaptic.report.limits import decibel, own_limit
 from bayeshaptic.report.loop_words import in_short
 from bayeshaptic.report.quantities import estimate, percent, pure, quantity
-from bayeshaptic.report.summary import analysis_of, closed_of, has_feedback, tip_limit
+from bayeshaptic.report.summary import analysis_of, closed_of, tip_limit
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -50,7 +51,7 @@ def headline(result: Any) -> Headline:
     analysis = analysis_of(result)
     objections = _objections(analysis, getattr(result, "diagnosis", None))
     if objections:
-        return _untrusted(analysis, objections)
+        return _untrusted(analysis, objections, closed_of(result))
     limit = analysis.limit
     if limit.quantile(0.05) == math.inf:
         unlimited = "Nothing limits the stiffness: the model is stable with any."
@@ -90,7 +91,8 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     """Why no stiffness can be recommended; empty where one can."""
     found = []
     verdict = (diagnosis or {}).get("verdict")
-    if verdict == "unexplained" and analysis.fit.reduced_chi_square > _TOO_FAR**2:
+    far_off = analysis.fit.reduced_chi_square > _TOO_FAR**2
+    if verdict == "unexplained" and far_off and not has_feedback(analysis.notices):
         found.append(
             f"what the model leaves over is {misfit_factor(analysis)} times the noise, and no "
             "effect that was tried explains it"
@@ -105,7 +107,7 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
         found.append(
             "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
         )
-    if has_feedback(analysis):
+    if has_feedback(analysis.notices):
         found.append(
             "the force was computed from the motion (feedback), which biases the response that "
             "everything here is read from"
@@ -122,7 +124,9 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _untrusted(analysis: Analysis, objections: tuple[str, ...]) -> Headline:
+def _untrusted(
+    analysis: Analysis, objections: tuple[str, ...], closed: Closed | None = None
+) -> Headline:
     limit = analysis.limit
     sentence = f"Do not ship a stiffness from this report: {_joined(objections)}."
     middle, low, high = (limit.quantile(p) for p in (0.5, 0.05, 0.95))
@@ -131,12 +135,14 @@ def _untrusted(analysis: Analysis, objections: tuple[str, ...]) -> Headline:
         "to be trusted; they stand below for comparison only."
     ]
     own = own_limit(analysis)
-    if own is not None and not has_feedback(analysis):
+    if own is not None and not has_feedback(analysis.notices):
         low, middle, high = own
         details.append(
             "The measured response itself, without a model, puts the limit at "
             f"{estimate(middle, low, high, limit.unit)}."
         )
+    if closed is not None and closed.force is not None:
+        details.append(in_short(closed))
     return Headline("untrusted", sentence, tuple(details))
 
 

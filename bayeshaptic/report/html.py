@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic import __version__
-from bayeshaptic.report import loop_tables, loop_words, tables, words
+from bayeshaptic.report import force_words, loop_tables, loop_words, tables, words
 from bayeshaptic.report.assumptions import assumptions, priors, versions
-from bayeshaptic.report.figures import LOOP_PICTURES, PICTURES
+from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.summary import analysis_of, closed_of, measured_of
 
@@ -68,6 +68,7 @@ def render(result: Any, pictures: Mapping[str, bytes]) -> str:
         words=words,
         tables=tables,
         loop_words=loop_words,
+        force_words=force_words,
         loop_tables=loop_tables,
         assumptions=assumptions(analysis, closed),
         priors=priors(analysis),
@@ -96,6 +97,9 @@ def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
 
 def _embedded(name: str, png: bytes) -> EmbeddedPicture:
     width, height = struct.unpack(">II", png[16:24])  # of the PNG's header
-    alternative = next((p.alternative for p in (*PICTURES, *LOOP_PICTURES) if p.name == name), name)
+    alternative = next(
+        (p.alternative for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES) if p.name == name),
+        name,
+    )
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
     return EmbeddedPicture(name, alternative, source, width, height)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.loop import CONSISTENT, UNEXPLAINED
+from bayeshaptic.report import force_words
 from bayeshaptic.report.limits import decibel
 from bayeshaptic.report.quantities import estimate, interval, pretty_unit, pure, quantity, scale
 
@@ -63,6 +64,8 @@ def lacked(closed: Closed) -> str:
 
 def in_short(closed: Closed) -> str:
     """One sentence for the top of the page."""
+    if closed.force is not None:
+        return force_words.in_short(closed.force, closed.base.etfe.force_unit)
     if closed.verdict == CONSISTENT:
         return "The model as declared explains the recording to within its noise."
     if not closed.effects:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic import __version__
+from bayeshaptic.diagnosis.feedback import has_feedback
 from bayeshaptic.report.limits import RISKS, finite
 
 if TYPE_CHECKING:
@@ -131,13 +132,8 @@ def _recording(analysis: Analysis) -> dict[str, Any]:
         "configuration": recording.configuration,
         "samples": recording.samples,
         "excitation_rms": np.sqrt(np.mean(np.square(recording.force))),
-        "feedback": has_feedback(analysis),
+        "feedback": has_feedback(analysis.notices),
     }
-
-
-def has_feedback(analysis: Analysis) -> bool:
-    """Whether a warning says that the force was computed from the motion."""
-    return any(n.topic == "feedback" and n.level == "warning" for n in analysis.notices)
 
 
 def _etfe(analysis: Analysis) -> dict[str, Any]:

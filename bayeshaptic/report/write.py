@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.report.figures import LOOP_PICTURES, draw_pictures
+from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, draw_pictures
 from bayeshaptic.report.html import render
 from bayeshaptic.report.summary import analysis_of, summary_json
 
@@ -68,7 +68,10 @@ def _move(draft: Path, out: Path) -> None:
     if not out.exists():
         draft.rename(out)
         return
-    for picture in LOOP_PICTURES:  # one of an older report would contradict this one
+    for picture in (
+        *LOOP_PICTURES,
+        *FORCE_PICTURES,
+    ):  # one of an older report would contradict this one
         if not (draft / f"{picture.name}.png").exists():
             (out / f"{picture.name}.png").unlink(missing_ok=True)
     for path in sorted(draft.iterdir(), key=lambda path: path.name == _LAST):

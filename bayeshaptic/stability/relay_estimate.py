@@ -79,7 +79,7 @@ def jackknife(spectra: Spectra, whole: Estimate) -> dict[str, float]:
 
 
 def oscillation_share(spectra: Spectra, frequency_hz: float) -> float:
-    """Share of the motion's variance, above half the oscillation's frequency, that is the oscillation's."""
+    """The oscillation's share of the motion's variance, above half its frequency."""
     power = (np.abs(spectra.position) ** 2).mean(axis=0)
     counted = spectra.frequency_hz > 0.5 * frequency_hz
     near = np.abs(spectra.frequency_hz - frequency_hz) < NEAR * frequency_hz

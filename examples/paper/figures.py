@@ -160,7 +160,9 @@ def _name(
     axes.annotate(
         text,
         (hertz, gain),
-        xytext=(-8, 34 if device == "phantom" else 12) if above else (-2 if hertz > 90 else 8, -14),
+        xytext=(-8, 34 if device == "phantom" else 12)
+        if above
+        else ((-2, -24) if hertz > 90 else (8, -14)),
         textcoords="offset points",
         fontsize=style.SMALL,
         color=COLOURS[name],

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from bayeshaptic.report.figures import (
     crossings,
     loop_force,
+    loop_inverse,
     loop_residual,
     loop_stiffness,
     loop_tests,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     from bayeshaptic.diagnosis.closed import Closed
 
-__all__ = ["LOOP_PICTURES", "PICTURES", "Picture", "draw_pictures", "png"]
+__all__ = ["FORCE_PICTURES", "LOOP_PICTURES", "PICTURES", "Picture", "draw_pictures", "png"]
 
 
 @dataclass(frozen=True)
@@ -77,12 +78,21 @@ LOOP_PICTURES = (
 )
 
 
+FORCE_PICTURES = (
+    Picture(
+        "loop_inverse",
+        loop_inverse.draw,
+        "Force that the motion does not explain, and the error term by term",
+    ),
+)
+
+
 def draw_pictures(result: Any) -> dict[str, bytes]:
     """Every figure of an analysis, or of a closed loop, as PNG, by name."""
     analysis = getattr(result, "analysis", result)
     found = {picture.name: png(picture.draw(analysis)) for picture in PICTURES}
     if hasattr(result, "traced"):
-        for picture in LOOP_PICTURES:
+        for picture in LOOP_PICTURES if result.force is None else FORCE_PICTURES:
             if picture.shown(result):
                 found[picture.name] = png(picture.draw(result))
     return found

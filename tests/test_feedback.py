@@ -1,0 +1,95 @@
+"""Closing the loop on recordings with feedback: by the force, not by the biased response."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+
+import pytest
+from fake_analysis import FEEDBACK, fake_closed
+from test_measured import PERIOD_S, servo
+
+import bayeshaptic as bh
+from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.feedback import explain_force, has_feedback
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.report import force_words
+
+FRICTION_N = 20.0
+
+
+@pytest.fixture(scope="module")
+def closed() -> Closed:
+    return bh.close_loop("rigid", servo(FRICTION_N), delay_s=0.0, ess=300)
+
+
+def text_of(page: Path) -> str:
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", page.read_text(encoding="utf-8"))).split())
+
+
+def test_the_friction_of_a_servo_is_found_in_its_force(closed: Closed) -> None:
+    assert has_feedback(closed.base.notices) and closed.force is not None
+    (friction,) = closed.effects
+    assert friction.name == "coulomb_friction" and friction.family == "nonlinear"
+    estimate = friction.estimates["friction_force"]
+    # Four of its own standard deviations, or one per cent (friction is not quite a step in time).
+    assert abs(estimate.mean - FRICTION_N) < max(4 * estimate.sd, 0.01 * FRICTION_N)
+    assert estimate.unit == "N"
+    linear, first, *_ = closed.force.further.steps
+    assert first.term == "coulomb" and first.held_out_rms < 0.3 * linear.held_out_rms
+
+
+def test_the_response_is_not_mended_with_what_the_controller_did(closed: Closed) -> None:
+    assert closed.analysis.fit is closed.base.fit
+    assert closed.traced.candidates == () and closed.before.keys() == closed.after.keys()
+
+
+def test_the_report_tells_of_the_force_and_recommends_nothing(
+    closed: Closed, tmp_path: Path
+) -> None:
+    page = text_of(bh.write_report(closed, tmp_path / "out"))
+    assert "Do not ship a stiffness" in page
+    assert "The force, explained by the motion" in page and "What the model lacked" not in page
+    assert "the model lacked dry (Coulomb) friction" in page
+    names = {path.name for path in (tmp_path / "out").glob("loop_*.png")}
+    assert names == {"loop_inverse.png"}
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["recording"]["feedback"] is True
+    (effect,) = summary["diagnosis"]["effects"]
+    assert effect["parameters"]["friction_force"]["q05"] < FRICTION_N * 1.01
+
+
+def test_an_older_report_does_not_leave_its_figure(closed: Closed, tmp_path: Path) -> None:
+    bh.write_report(closed, tmp_path)
+    bh.write_report(replace(closed, force=None), tmp_path)
+    assert not (tmp_path / "loop_inverse.png").exists()
+
+
+def test_a_servo_without_friction_gets_none() -> None:
+    force = explain_force(servo(0.0))
+    assert force is not None
+    assert "coulomb" not in [term.name for term in force.further.terms]
+    mass, sd = force.first["mass"]
+    assert abs(mass - 90.0) < max(4 * sd, 0.9)
+    words = force_words.in_short(force, "N") + force_words.found(force, "N")
+    assert "friction" not in words
+
+
+def test_what_does_not_move_as_one_mass_or_is_too_short_is_left_to_the_response() -> None:
+    recording = servo(FRICTION_N)
+    # The force of another instant says nothing of this motion.
+    other = recording_from_arrays(recording.force[::-1], recording.position, period_s=PERIOD_S)
+    assert explain_force(other) is None
+    short = recording_from_arrays(
+        recording.force[:900], recording.position[:900], period_s=PERIOD_S
+    )
+    assert explain_force(short) is None and explain_force(None) is None
+
+
+def test_feedback_without_a_force_leaves_the_loop_as_it_was(tmp_path: Path) -> None:
+    closed = fake_closed("explained", "nonlinear", notices=(FEEDBACK,))
+    page = text_of(bh.write_report(closed, tmp_path))
+    assert "What the model lacked" in page and "explained by the motion" not in page
