@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bayeshaptic.models import Model
 
 Floats = NDArray[np.float64]
-_SUMS = ("mass", "damping")  # quantities whose sums the data know best
+_SUMS = ("mass", "damping", "stiffness")  # quantities whose sums the data know best
 _KNOWN = 0.8  # log standard deviation, of prior and data together, below which one is known
 
 
