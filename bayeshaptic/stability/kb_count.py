@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.stability.damping import Damping
-from bayeshaptic.stability.kb_curve import Events, InverseCurve, along_damping
+from bayeshaptic.stability.kb_curve import Events, KbCurve, along_damping
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -14,12 +13,12 @@ Ints = NDArray[np.int_]
 _MANY = 1000  # poles outside, of a loop that is never stable
 
 
-def unstable_at_start(curve: InverseCurve, kind: Damping, start: Floats, levels: Floats) -> Ints:
+def unstable_at_start(curve: KbCurve, start: Floats, levels: Floats) -> Ints:
     """Poles outside the unit circle at the stiffness `start` (n,) and dampings (J,); (n, J).
 
     There are none at `start` without damping; many are said of a loop whose `start` is nan.
     """
-    events = along_damping(curve, kind, np.where(np.isnan(start), 1.0, start))
+    events = along_damping(curve, np.where(np.isnan(start), 1.0, start))
     poles = np.zeros((len(start), len(levels)), int)
     for number, level in enumerate(levels):
         between = (events.place > min(level, 0)) & (events.place < max(level, 0))

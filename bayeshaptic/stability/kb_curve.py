@@ -14,6 +14,7 @@ K where :math:`\mathrm{Im}(-1/G) - B \, \mathrm{Im} D` grows with :math:`\theta`
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,7 @@ Ints = NDArray[np.int_]
 Complexes = NDArray[np.complex128]
 
 _CHUNK = 64  # rows at a time: the arrays of one chunk stay in the cache
-_TOLERANCE = 1e-9  # of a bracket's angle
+_TOLERANCE = 1e-8  # of a bracket's angle
 _TOP = np.pi * (1 - 1e-4)  # beyond it both imaginary parts are too small to divide
 
 
@@ -77,11 +78,34 @@ class InverseCurve:
             self.nyquist * factor,
         )
 
-    def damping(self, kind: Damping) -> tuple[Floats, Floats]:
-        """B and K along the curve, each of shape (n, L)."""
-        rate = derivative(kind, self.theta, self.period_s)
-        damping = self.value.imag / rate.imag
-        return damping, self.value.real - damping * rate.real
+
+@dataclass(frozen=True)
+class KbCurve:
+    """The boundaries of a batch of loops with a given damping term.
+
+    Attributes
+    ----------
+    inverse : InverseCurve
+    kind : Damping
+    damping, stiffness : ndarray, shape (n, L)
+        B and K along the curve.
+    """
+
+    inverse: InverseCurve
+    kind: Damping
+    damping: Floats
+    stiffness: Floats
+
+    def rate(self, theta: Floats) -> Complexes:
+        """D at angles."""
+        return derivative(self.kind, theta, self.inverse.period_s)
+
+
+def kb_curve(inverse: InverseCurve, kind: Damping) -> KbCurve:
+    """The boundaries of loops whose -1/G is known."""
+    rate = derivative(kind, inverse.theta, inverse.period_s)
+    damping = inverse.value.imag / rate.imag
+    return KbCurve(inverse, kind, damping, inverse.value.real - damping * rate.real)
 
 
 @dataclass(frozen=True)
@@ -96,15 +120,12 @@ class Events:
         The coordinate along the line.
     poles : ndarray of int, shape (M,)
         How many more poles are outside the unit circle beyond it: 2, 1, -1 or -2.
-    theta : ndarray, shape (M,)
-        Angle of the pole on the circle.
     """
 
     row: Ints
     level: Ints
     place: Floats
     poles: Ints
-    theta: Floats
 
 
 @dataclass(frozen=True)
@@ -136,48 +157,53 @@ def inverse_curve(system: LinearSystem | EvaluableSystem, period_s: float) -> In
     )
 
 
-def along_stiffness(curve: InverseCurve, kind: Damping, levels: Floats) -> Events:
-    """Where the boundaries meet the lines B = `levels`, shape (J,), ascending; places are K."""
-    damping, _ = curve.damping(kind)
-    row, level, low, high, rising = _sign_changes(damping, levels, curve.theta)
+def along_stiffness(curve: KbCurve, levels: Floats, lowest_above: Floats | None = None) -> Events:
+    """Where the boundaries meet the lines B = `levels`, shape (J,), ascending; places are K.
+
+    With `lowest_above`, shape (n,), those are left out that cannot be the lowest above it.
+    """
+    inverse = curve.inverse
+    row, level, segment, rising = _passages(curve.damping, levels)
+    if lowest_above is not None:
+        k = curve.stiffness
+        ends = np.stack([k[row, segment], k[row, segment + 1]])
+        kept = _may_be_lowest(row, level, ends, lowest_above[row], k.shape[0], len(levels))
+        row, level, segment, rising = row[kept], level[kept], segment[kept], rising[kept]
 
     def off(index: Ints, theta: Floats) -> Floats:
-        rate = derivative(kind, theta, curve.period_s)
-        value = curve.at(row[index], theta)
-        wanted = levels[level[index]]
-        return (value.imag - wanted * rate.imag) / (np.abs(value) + np.abs(wanted * rate))
+        wanted = levels[level[index]] * curve.rate(theta)
+        value = inverse.at(row[index], theta)
+        return (value.imag - wanted.imag) / (np.abs(value) + np.abs(wanted))
 
-    theta = _roots(off, low, high)
-    rate = derivative(kind, theta, curve.period_s)
-    stiffness = curve.at(row, theta).real - levels[level] * rate.real
-    on_line = curve.nyquist[:, None] - levels * derivative_at_nyquist(kind, curve.period_s)
-    outwards = damping[:, -1:] < levels
-    return _with_line(row, level, stiffness, np.where(rising, 2, -2), theta, on_line, outwards)
+    theta = _roots(off, inverse.theta, row, segment)
+    stiffness = inverse.at(row, theta).real - levels[level] * curve.rate(theta).real
+    on_line = inverse.nyquist[:, None] - levels * _at_nyquist(curve)
+    outwards = curve.damping[:, -1:] < levels
+    return _with_line(row, level, stiffness, np.where(rising, 2, -2), on_line, outwards)
 
 
-def along_damping(curve: InverseCurve, kind: Damping, start: Floats) -> Events:
+def along_damping(curve: KbCurve, start: Floats) -> Events:
     """Where each boundary meets its own line K = `start`, shape (n,); places are B."""
-    _, stiffness = curve.damping(kind)
-    origin = np.zeros(1)
-    row, level, low, high, rising = _sign_changes(stiffness - start[:, None], origin, curve.theta)
+    inverse = curve.inverse
+    row, level, segment, rising = _passages(curve.stiffness - start[:, None], np.zeros(1))
 
     def off(index: Ints, theta: Floats) -> Floats:
-        rate = derivative(kind, theta, curve.period_s)
-        value = curve.at(row[index], theta) - start[row[index]]
-        return -(value / rate).imag / np.abs(value / rate)
+        value = (inverse.at(row[index], theta) - start[row[index]]) / curve.rate(theta)
+        return -value.imag / np.abs(value)
 
-    theta = _roots(off, low, high)
-    rate = derivative(kind, theta, curve.period_s)
-    place = ((curve.at(row, theta) - start[row]) / rate).real
-    on_line = (curve.nyquist - start)[:, None] / derivative_at_nyquist(kind, curve.period_s)
-    outwards = curve.damping(kind)[0][:, -1:] < on_line
-    return _with_line(row, level, place, np.where(rising, -2, 2), theta, on_line, outwards)
+    theta = _roots(off, inverse.theta, row, segment)
+    place = ((inverse.at(row, theta) - start[row]) / curve.rate(theta)).real
+    on_line = (inverse.nyquist - start)[:, None] / _at_nyquist(curve)
+    outwards = curve.damping[:, -1:] < on_line
+    return _with_line(row, level, place, np.where(rising, -2, 2), on_line, outwards)
 
 
-def _sign_changes(
-    values: Floats, levels: Floats, theta: Floats
-) -> tuple[Ints, Ints, Floats, Floats, NDArray[np.bool_]]:
-    """Every passage of `values` (n, L) through a level: row, level, bracket, whether upwards."""
+def _at_nyquist(curve: KbCurve) -> float:
+    return derivative_at_nyquist(curve.kind, curve.inverse.period_s)
+
+
+def _passages(values: Floats, levels: Floats) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
+    """Every passage of `values` (n, L) through a level: row, level, segment, whether upwards."""
     above = np.searchsorted(levels, values, side="left")
     step = np.diff(above, axis=1)
     row, segment = np.nonzero(step)
@@ -186,14 +212,32 @@ def _sign_changes(
     within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     level = np.repeat(first, count) + within
     rising = np.repeat(step[row, segment] > 0, count)
-    row, segment = np.repeat(row, count), np.repeat(segment, count)
-    return row, level, theta[row, segment], theta[row, segment + 1], rising
+    return np.repeat(row, count), level, np.repeat(segment, count), rising
 
 
-def _roots(off: object, low: Floats, high: Floats) -> Floats:
-    every = np.arange(len(low))
-    f_low, f_high = off(every, low), off(every, high)  # type: ignore[operator]
-    return bracketed_roots(off, low, high, f_low, f_high, _TOLERANCE)  # type: ignore[arg-type]
+def _may_be_lowest(
+    row: Ints, level: Ints, ends: Floats, above: Floats, rows: int, levels: int
+) -> NDArray[np.bool_]:
+    """Passages whose place may be the lowest above a value, by K at the `ends` of their segments.
+
+    A margin of the segment's own span is left on both sides.
+    """
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    span = high - low
+    possible = high + span > above
+    certain = low - span > above
+    bound = np.full((rows, levels), np.inf)
+    np.minimum.at(bound, (row[certain], level[certain]), (high + span)[certain])
+    return possible & (low - span <= bound[row, level])
+
+
+def _roots(
+    off: Callable[[Ints, Floats], Floats], theta: Floats, row: Ints, segment: Ints
+) -> Floats:
+    """The angle in each segment where a function changes its sign."""
+    every = np.arange(len(row))
+    low, high = theta[row, segment], theta[row, segment + 1]
+    return bracketed_roots(off, low, high, off(every, low), off(every, high), _TOLERANCE)
 
 
 def _with_line(
@@ -201,7 +245,6 @@ def _with_line(
     level: Ints,
     place: Floats,
     poles: Ints,
-    theta: Floats,
     on_line: Floats,
     outwards: NDArray[np.bool_],
 ) -> Events:
@@ -212,5 +255,4 @@ def _with_line(
         np.concatenate([level, levels.ravel()]),
         np.concatenate([place, on_line.ravel()]),
         np.concatenate([poles, np.where(outwards, 1, -1).ravel()]),
-        np.concatenate([theta, np.full(on_line.size, np.pi)]),
     )

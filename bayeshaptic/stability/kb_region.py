@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.models.model import Model
 from bayeshaptic.stability.critical import ENOUGH_BELOW
 from bayeshaptic.stability.damping import Backward, Damping
 from bayeshaptic.stability.kb_count import beyond_start, unstable_at_start
 from bayeshaptic.stability.kb_curve import (
     InverseCurve,
+    KbCurve,
     along_damping,
     along_stiffness,
     inverse_curve,
+    kb_curve,
 )
 from bayeshaptic.stability.kb_source import loops_of
 from bayeshaptic.stability.kb_width import Boundary, ZWidth
@@ -38,9 +39,7 @@ class KbRegion:
 
     Attributes
     ----------
-    kind : Damping
-        What D is.
-    curve : InverseCurve
+    curve : KbCurve
     start : ndarray, shape (n,)
         A stiffness at which each loop is stable without damping; nan where there is none.
     critical : ndarray, shape (n,)
@@ -50,12 +49,20 @@ class KbRegion:
     unit, damping_unit : str
     """
 
-    kind: Damping
-    curve: InverseCurve = field(repr=False)
+    curve: KbCurve = field(repr=False)
     start: Floats = field(repr=False)
     critical: Floats = field(repr=False)
     effective: float
     unit: str
+
+    @property
+    def kind(self) -> Damping:
+        """What D is."""
+        return self.curve.kind
+
+    @property
+    def period_s(self) -> float:
+        return self.curve.inverse.period_s
 
     @property
     def damping_unit(self) -> str:
@@ -72,8 +79,8 @@ class KbRegion:
         damping : array_like, shape (J,)
         """
         levels, back = _ascending(damping)
-        unstable = unstable_at_start(self.curve, self.kind, self.start, levels)
-        events = along_stiffness(self.curve, self.kind, levels)
+        unstable = unstable_at_start(self.curve, self.start, levels)
+        events = along_stiffness(self.curve, levels, self.start)
         above = events.place > self.start[events.row]
         limit = np.full(unstable.shape, np.inf)
         np.minimum.at(limit, (events.row[above], events.level[above]), events.place[above])
@@ -82,7 +89,7 @@ class KbRegion:
     def largest_damping(self) -> Floats:
         """The damping up to which each loop is stable with a stiffness near zero, shape (n,)."""
         start = np.where(np.isnan(self.start), 1.0, self.start)
-        events = along_damping(self.curve, self.kind, start)
+        events = along_damping(self.curve, start)
         largest = np.full(len(self.start), np.inf)
         above = events.place > 0
         np.minimum.at(largest, events.row[above], events.place[above])
@@ -129,8 +136,8 @@ class KbRegion:
             Of bool, shape (n, J, I); with `mean` the share of the loops, shape (J, I).
         """
         heights, levels = np.asarray(stiffness, float), np.asarray(damping, float)
-        unstable = unstable_at_start(self.curve, self.kind, self.start, levels)
-        events = along_stiffness(self.curve, self.kind, levels)
+        unstable = unstable_at_start(self.curve, self.start, levels)
+        events = along_stiffness(self.curve, levels)
         count = len(self.start)
         step = max(_CELLS // (len(heights) * len(levels)), 1)
         parts = []
@@ -240,41 +247,37 @@ def kb_region(
     one that touches the origin and all other pairs without a pole outside the unit circle.
     """
     loops = loops_of(source, theta, draws)
-    curve = inverse_curve(loops.model.system(loops.draws), loops.period_s)
-    return region_of(curve, damping or Backward(), loops.model, loops.target, loops.effective)
-
-
-def region_of(
-    curve: InverseCurve, kind: Damping, model: Model, target: Floats | None, effective: float
-) -> KbRegion:
-    """The region of loops whose curve is known; `target` are sorted K_CR that they are to have."""
-    critical = _critical(curve)
-    if target is not None:
-        usable = np.isfinite(critical) & (critical > 0)
-        rank = np.argsort(np.argsort(critical))
-        wanted = target[rank]
-        usable &= np.isfinite(wanted) & (wanted > 0)
-        factor = np.where(usable, wanted / np.where(usable, critical, 1.0), 1.0)
-        curve, critical = curve.scaled(factor), critical * factor
-    known = np.where(np.isfinite(critical), critical, np.abs(curve.nyquist))
+    inverse = inverse_curve(loops.model.system(loops.draws), loops.period_s)
+    critical = _critical(inverse)
+    if loops.target is not None:
+        factor = _stretch(critical, loops.target)
+        inverse, critical = inverse.scaled(factor), critical * factor
+    known = np.where(np.isfinite(critical), critical, np.abs(inverse.nyquist))
     start = np.where(critical > 0, _START * known, np.nan)
-    return KbRegion(kind, curve, start, critical, effective, model.stiffness_unit)
+    curve = kb_curve(inverse, damping or Backward())
+    return KbRegion(curve, start, critical, loops.effective, loops.model.stiffness_unit)
 
 
 def with_damping(region: KbRegion, kind: Damping) -> KbRegion:
-    """The same loops with another way to get the velocity; the curve is evaluated once only."""
-    return KbRegion(
-        kind, region.curve, region.start, region.critical, region.effective, region.unit
-    )
+    """The same loops with another way to get the velocity; the response is evaluated once only."""
+    return replace(region, curve=kb_curve(region.curve.inverse, kind))
 
 
-def _critical(curve: InverseCurve) -> Floats:
+def _stretch(critical: Floats, target: Floats) -> Floats:
+    """Factors that take K_CR (n,) to the stated one of the same rank; `target` is ascending."""
+    wanted = target[np.argsort(np.argsort(critical))]
+    usable = np.isfinite(critical) & (critical > 0) & np.isfinite(wanted) & (wanted > 0)
+    return np.where(usable, wanted / np.where(usable, critical, 1.0), 1.0)
+
+
+def _critical(inverse: InverseCurve) -> Floats:
     """K_CR without damping, shape (n,)."""
-    events = along_stiffness(curve, Backward(), np.zeros(1))
+    none = np.zeros(len(inverse.nyquist))
+    events = along_stiffness(kb_curve(inverse, Backward()), np.zeros(1), none)
     above = events.place > 0
-    critical = np.full(len(curve.nyquist), np.inf)
+    critical = np.full(len(none), np.inf)
     np.minimum.at(critical, events.row[above], events.place[above])
-    return np.where(curve.response.stable_at_rest(), critical, 0.0)
+    return np.where(inverse.response.stable_at_rest(), critical, 0.0)
 
 
 def _ascending(damping: ArrayLike) -> tuple[Floats, Ints]:

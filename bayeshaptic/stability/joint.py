@@ -1,0 +1,129 @@
+"""Stable walls over all cases of a device: whoever holds it, wherever it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayeshaptic.stability.critical import ENOUGH_BELOW
+from bayeshaptic.stability.damping import Backward, Damping, LowPass
+from bayeshaptic.stability.kb_region import DRAWS, KbRegion, kb_region, with_damping
+from bayeshaptic.stability.kb_width import Boundary
+
+Floats = NDArray[np.float64]
+
+CUTOFF = 0.1  # of the sampling rate: the usual low-pass of a velocity
+
+
+@dataclass(frozen=True)
+class JointRegion:
+    """The walls that are stable in every case, cases taken as independent of each other.
+
+    Attributes
+    ----------
+    regions : tuple of KbRegion
+        One a case, with the same damping term.
+    labels : tuple of str
+    seed : int
+        Of the order in which draws of different cases meet.
+    """
+
+    regions: tuple[KbRegion, ...] = field(repr=False)
+    labels: tuple[str, ...]
+    seed: int = 0
+
+    @property
+    def kind(self) -> Damping:
+        return self.regions[0].kind
+
+    @property
+    def period_s(self) -> float:
+        return self.regions[0].period_s
+
+    @property
+    def unit(self) -> str:
+        return self.regions[0].unit
+
+    @property
+    def damping_unit(self) -> str:
+        return self.regions[0].damping_unit
+
+    def says(self, risk: float) -> bool:
+        """Whether 20 effective draws lie below a stiffness of that risk."""
+        return min(region.effective for region in self.regions) * risk >= ENOUGH_BELOW
+
+    def limits(self, damping: ArrayLike) -> Floats:
+        """The lowest limit of each joint draw, shape (n, J); see `KbRegion.limits`."""
+        every = [region.limits(damping) for region in self.regions]
+        return _lowest(every, self.seed)
+
+    def largest_damping(self) -> Floats:
+        """Of each joint draw, shape (n,); see `KbRegion.largest_damping`."""
+        return _lowest([region.largest_damping()[:, None] for region in self.regions], self.seed)[
+            :, 0
+        ]
+
+    def probability_map(self, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
+        """P(stable in every case) on a grid (I,) and (J,), both ascending; shape (J, I)."""
+        maps = [region.probability_map(stiffness, damping) for region in self.regions]
+        return np.asarray(np.prod(maps, axis=0))
+
+    def dampings(self, risk: float, count: int) -> Floats:
+        """Dampings from zero to the largest that is stable at that risk, shape (count,)."""
+        top = float(np.quantile(self.largest_damping(), risk, method="inverted_cdf"))
+        return np.linspace(0.0, (1 - 1e-6) * top if np.isfinite(top) else 1.0, count)
+
+    def boundaries(self, risks: Sequence[float], damping: ArrayLike) -> tuple[Boundary, ...]:
+        """The boundary at each risk."""
+        levels = np.asarray(damping, float)
+        limits = np.sort(self.limits(levels), axis=0)
+        place = [max(int(np.ceil(risk * len(limits))) - 1, 0) for risk in risks]
+        return tuple(Boundary(r, levels, limits[p]) for r, p in zip(risks, place, strict=True))
+
+
+def joint_region(
+    cases: Sequence[Any], damping: Damping | None = None, draws: int = DRAWS, seed: int = 0
+) -> JointRegion:
+    """The region of one case or several.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    damping : Backward or LowPass, optional
+        By default the backward difference.
+    draws : int
+        Of each case.
+    seed : int
+    """
+    kind = damping or Backward()
+    regions = tuple(kb_region(case, kind, draws=draws) for case in cases)
+    return JointRegion(regions, tuple(case.label for case in cases), seed)
+
+
+def filtered(region: JointRegion, kind: Damping) -> JointRegion:
+    """The same with another way to get the velocity."""
+    parts = tuple(with_damping(part, kind) for part in region.regions)
+    return JointRegion(parts, region.labels, region.seed)
+
+
+def usual_dampings(period_s: float) -> tuple[Damping, ...]:
+    """The backward difference by itself, and behind a low-pass at a tenth of the rate."""
+    return Backward(), LowPass(CUTOFF / period_s)
+
+
+def _lowest(every: Sequence[Floats], seed: int) -> Floats:
+    """Smallest over the cases, rows of (n_c, J) in random order; shape (max n_c, J)."""
+    if len(every) == 1:
+        return every[0]
+    rng = np.random.default_rng(seed)
+    count = max(len(part) for part in every)
+    lowest = np.full((count, every[0].shape[1]), np.inf)
+    for part in every:
+        rounds = -(-count // len(part))
+        order = np.concatenate([rng.permutation(len(part)) for _ in range(rounds)])[:count]
+        np.minimum(lowest, part[order], out=lowest)
+    return lowest
