@@ -177,3 +177,46 @@ def test_no_study(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="cannot be read as text"):
         read_study(tmp_path / "binary.toml")
+
+
+REFERENCED = """
+[device]
+name = "phantom"
+[[reference]]
+label = "relay experiments"
+critical_stiffness_db = [40.0, 20.0]
+[[reference]]
+label = "without a hand"
+held = false
+critical_stiffness = 13.0
+[[recording]]
+file = "a.csv"
+"""
+
+
+def test_limits_known_from_elsewhere(tmp_path):
+    (tmp_path / "a.csv").write_text("")
+    (tmp_path / "study.toml").write_text(REFERENCED)
+    relay, free = read_study(tmp_path / "study.toml").references
+    assert relay.label == "relay experiments" and relay.held
+    assert relay.critical_stiffness == pytest.approx((100.0, 10.0))
+    assert not free.held and free.critical_stiffness == (13.0,)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ('label = "relay experiments"', "", "needs a label"),
+        ("critical_stiffness = 13.0", "", "needs critical_stiffness or"),
+        ("critical_stiffness = 13.0", "critical_stiffness = -1", "above zero"),
+        ("critical_stiffness = 13.0", "critical_stiffness = ['x']", "a list of numbers"),
+        ("critical_stiffness = 13.0", "critical_stifness = 13", "did you mean"),
+        ("held = false", "held = 'no'", "true or false"),
+        ("[[reference]]", "[[refrence]]", "unknown key 'refrence'"),
+    ],
+)
+def test_references_that_cannot_be(tmp_path, old, new, part):
+    (tmp_path / "a.csv").write_text("")
+    (tmp_path / "study.toml").write_text(REFERENCED.replace(old, new))
+    with pytest.raises(InputError, match=part):
+        read_study(tmp_path / "study.toml")

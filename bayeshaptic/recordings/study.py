@@ -14,8 +14,9 @@ from bayeshaptic.recordings.columns import parse_columns
 from bayeshaptic.recordings.etfe import Etfe
 from bayeshaptic.recordings.read import Columns, read_measurement
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.references import Reference, read_references
 
-STUDY_KEYS = ("device", "prior", "recording")
+STUDY_KEYS = ("device", "prior", "recording", "reference")
 ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns")
 PRIOR_KEYS = ("median", "log_sd", "scale", "mean", "sd", "low", "high", "log")
 
@@ -62,6 +63,8 @@ class Study:
         By parameter name, for example ``{"m1": {"median": 0.2, "log_sd": 0.3}}``; see `read_study`.
     entries : tuple of StudyEntry
     notices : tuple of Notice
+    references : tuple of Reference
+        Limits known from elsewhere, to compare with.
     """
 
     name: str
@@ -71,6 +74,7 @@ class Study:
     columns: Columns = None
     prior: Mapping[str, Mapping[str, float | bool]] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
+    references: tuple[Reference, ...] = ()
 
     @property
     def users(self) -> tuple[str, ...]:
@@ -121,7 +125,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     1e3 }``, ``m2 = { low = 1, high = 9 }`` (uniform; with ``log = true`` in the logarithm). Each
     ``[[recording]]`` table has a `file`, relative to the study, and where they apply `user`,
     `configuration` (a number or a name), `trial`, `level`, and `columns` of its own. Recordings are
-    looked for but not read; `Study.read` does that.
+    looked for but not read; `Study.read` does that. Optional ``[[reference]]`` tables hold limits
+    known from elsewhere: `label`, `held`, and `critical_stiffness` or `critical_stiffness_db`.
 
     Parameters
     ----------
@@ -160,6 +165,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         columns=columns,
         prior=_prior(table.content.get("prior", {}), f"{path}, [prior]"),
         notices=notices,
+        references=read_references(table.content.get("reference", []), path),
     )
 
 
