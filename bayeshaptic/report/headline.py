@@ -154,7 +154,7 @@ def _recommended(
     assert safe is not None
     sd = (limit.quantile(0.95) - limit.quantile(0.05)) / 3.29
     cap = _lower_witness(analysis, safe)
-    stiffness, shown = _cut(safe if cap is None else cap, limit.unit, sd)
+    stiffness, shown = rounded_down(safe if cap is None else cap, limit.unit, sd)
     if cap is None:
         sentence = (
             f"Render walls of at most {shown}: the risk that the loop is unstable there is "
@@ -170,7 +170,7 @@ def _recommended(
     tip = tip_limit(analysis)
     if tip is not None and analysis.lever_m is not None:
         lever = analysis.lever_m
-        _, at_tip = _cut(stiffness / lever**2, tip.unit, sd / lever**2)
+        _, at_tip = rounded_down(stiffness / lever**2, tip.unit, sd / lever**2)
         details.append(f"At the tip, {quantity(lever, 'm')} from the axis, that is {at_tip}.")
     details.append(_what_binds(analysis))
     warnings = [n.text for n in analysis.notices if n.level == "warning"]
@@ -190,7 +190,7 @@ def _recommended(
     return Headline("caution" if any(doubts) else "safe", sentence, tuple(details))
 
 
-def _cut(stiffness: float, unit: str, sd: float) -> tuple[float, str]:
+def rounded_down(stiffness: float, unit: str, sd: float) -> tuple[float, str]:
     """`stiffness` rounded down to three digits, or one digit of its sd, and how it is written."""
     exponent = math.floor(math.log10(stiffness))
     last = min(exponent - 2, math.floor(math.log10(sd)) if sd > 0 else exponent - 2)

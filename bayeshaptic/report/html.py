@@ -18,11 +18,13 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.summary import analysis_of, closed_of, measured_of
 
 if TYPE_CHECKING:
+    from jinja2 import Template
+
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.errors import Notice
 
 HERE = Path(__file__).parent
-_LABELS = {
+LABELS = {
     "safe": "Recommendation",
     "caution": "Recommendation, with caution",
     "untrusted": "No recommendation",
@@ -42,29 +44,20 @@ class EmbeddedPicture:
 
 def render(result: Any, pictures: Mapping[str, bytes]) -> str:
     """The page of an analysis (or of what closing the loop returns) with its PNG pictures."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     analysis, closed = analysis_of(result), closed_of(result)
-    environment = Environment(
-        loader=FileSystemLoader(HERE, encoding="utf-8"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     head = headline(result)
-    return environment.get_template("report.jinja").render(
+    return template("report.jinja").render(
         title=title(analysis),
-        style=(HERE / "report.css").read_text(encoding="utf-8"),
+        style=style(),
         version=__version__,
-        written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        written=written(),
         analysis=analysis,
         closed=closed,
         measured=measured_of(result),
         headline=head,
-        label=_LABELS[head.status],
+        label=LABELS[head.status],
         notices=unique(analysis.notices),
-        pictures={name: _embedded(name, png) for name, png in pictures.items()},
+        pictures={name: embedded(name, png) for name, png in pictures.items()},
         words=words,
         tables=tables,
         loop_words=loop_words,
@@ -95,11 +88,34 @@ def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
     return tuple(sorted(once, key=lambda notice: notice.level != "warning"))
 
 
-def _embedded(name: str, png: bytes) -> EmbeddedPicture:
+def embedded(name: str, png: bytes, alternative: str = "") -> EmbeddedPicture:
+    """A PNG as a part of the page, with the words that stand for it."""
     width, height = struct.unpack(">II", png[16:24])  # of the PNG's header
-    alternative = next(
-        (p.alternative for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES) if p.name == name),
-        name,
-    )
+    pictures = (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES)
+    words = alternative or next((p.alternative for p in pictures if p.name == name), name)
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
-    return EmbeddedPicture(name, alternative, source, width, height)
+    return EmbeddedPicture(name, words, source, width, height)
+
+
+def template(name: str) -> Template:
+    """A template of this folder."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(HERE, encoding="utf-8"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(name)
+
+
+def style() -> str:
+    """The style sheet of every page."""
+    return (HERE / "report.css").read_text(encoding="utf-8")
+
+
+def written() -> str:
+    """The moment, for a person."""
+    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
