@@ -176,3 +176,15 @@ def test_few_points_decide_few_terms():
     straightening = straighten(x)
     assert np.count_nonzero(straightening.quadratic[-1]) <= 100 / 30
     assert straightening.bent(straightening.straight(x)) == pytest.approx(x, abs=1e-9)
+
+
+def test_a_skewed_component_is_freed_from_its_square():
+    """Of v and v^2, correlated where v is skewed, the second follows the first exactly."""
+    rng = np.random.default_rng(15)
+    v = rng.gamma(3.0, size=4000)
+    x = np.column_stack([v, v**2 + 0.01 * rng.standard_normal(4000)])
+    y = straighten(x).straight(x)
+    second = np.column_stack([np.ones(4000), y[:, 0], y[:, 0] ** 2])
+    left = y[:, 1] - second @ np.linalg.lstsq(second, y[:, 1], rcond=None)[0]
+    # Nothing that a parabola in the first could still take away, but for the ridge of the fit.
+    assert np.std(left) > 0.9 * np.std(y[:, 1])

@@ -19,11 +19,13 @@ from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
+from bayeshaptic.stability.tail import TailWatch
 
 Progress = Callable[[float, str], None]
 
-# Effective draws that a report asks for: with them 20 lie below the stiffness of 0.1 % risk.
-REPORT_ESS = 8000
+# Effective draws of every parameter that a report asks for; sampling then goes on until 20 lie
+# below the critical stiffness of 0.1 % risk.
+REPORT_ESS = 4000
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
 _MISFIT_STEPS = 1500
 
@@ -227,6 +229,8 @@ def finish(
     report = progress or (lambda share, word: None)
     clock = _Clock(dict(begun.seconds))
     scale = fit.reduced_chi_square if fit.reduced_chi_square > MISFIT else 1.0
+    # A misfit's tail means nothing, and a short run for comparison needs none.
+    watch = TailWatch(fit.model) if scale == 1.0 and ess >= REPORT_ESS else None
     with clock.stage("sampling"):
         posterior = sample(
             fit.model,
@@ -235,11 +239,12 @@ def finish(
             ess=ess,
             seed=seed,
             progress=lambda share, word: report(0.1 + 0.7 * share, word),
+            until=watch.steps_wanted if watch else None,
             **({"most_steps": _MISFIT_STEPS} if scale > 1 else {}),
         )
     with clock.stage("critical stiffness"):
         report(0.8, "critical stiffness")
-        limit = critical_stiffness(posterior)
+        limit = watch.limit_of(posterior) if watch else critical_stiffness(posterior)
         etfe_limit = etfe_critical_stiffness(etfe, seed=seed)
     report(0.9, "writing the report")
     return Analysis(

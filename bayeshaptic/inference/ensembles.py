@@ -22,7 +22,9 @@ _ROUNDS = 12  # of warm-up, at most
 _GOOD = 0.4  # acceptance of independent proposals from which another round gains nothing
 _CLIMB = 0.1  # rise of the mean log density, in its standard deviations, that is no accident
 _MOST_POINTS = 20_000  # that a proposal is fitted to
-_POINTS_A_COMPONENT = 1000
+_POINTS_A_COMPONENT = 2000
+_MOST_COMPONENTS = 6  # more follow the accidents of the draws
+_MISSED = 2.0  # log of density over proposal, above the median, from which a place is missed
 _TRIED = 1000
 
 
@@ -121,7 +123,7 @@ def warmed_up(
         found = np.concatenate([chain[_WARM_UP // 2 :: 2].reshape(-1, size) for chain, _ in runs])
         values = np.concatenate([value[_WARM_UP // 2 :: 2].ravel() for _, value in runs])
         acceptance = _acceptance(density, proposal, found, values, rng)
-        proposal = _fitted(found, rng)
+        proposal = _fitted(found, values, rng)
         ensembles = [_with(e, proposal) for e in ensembles]
         climbing = values.mean() - level > _CLIMB * values.std()
         if acceptance > _GOOD or not (acceptance > 1.1 * before or climbing):
@@ -130,10 +132,16 @@ def warmed_up(
     return ensembles
 
 
-def refitted(ensembles: list[Ensemble], chains: Floats, rng: np.random.Generator) -> list[Ensemble]:
-    """The ensembles where they are, with a proposal fitted to their `chains` (E, S, W, P)."""
+def refitted(
+    ensembles: list[Ensemble], chains: Floats, values: Floats, rng: np.random.Generator
+) -> list[Ensemble]:
+    """The ensembles where they are, with a proposal fitted to their `chains` (E, S, W, P).
+
+    `values` are the log densities there, (E, S, W).
+    """
     found = chains.reshape(-1, chains.shape[-1])
-    proposal = _fitted(found[:: max(4, -(-len(found) // _MOST_POINTS))], rng)
+    every = max(4, -(-len(found) // _MOST_POINTS))
+    proposal = _fitted(found[::every], values.ravel()[::every], rng)
     return [_with(ensemble, proposal) for ensemble in ensembles]
 
 
@@ -141,14 +149,24 @@ def _with(ensemble: Ensemble, proposal: Proposal) -> Ensemble:
     return Ensemble(ensemble.density, proposal, 0.75, ensemble.positions, ensemble.state)
 
 
-def _fitted(found: Floats, rng: np.random.Generator) -> Proposal:
-    """A proposal for a density from which `found` are draws."""
+def _fitted(found: Floats, values: Floats, rng: np.random.Generator) -> Proposal:
+    """A proposal for a density from which `found` are draws, with log densities `values`.
+
+    A walker stays for long where the proposal misses the density: such places get a share of their
+    own.
+    """
     straightening = straighten(found)
     y = straightening.straight(found)
-    components = max(3, len(y) // _POINTS_A_COMPONENT)
+    components = int(np.clip(len(y) // _POINTS_A_COMPONENT, 3, _MOST_COMPONENTS))
     mixture = fit_student_mixture(y, np.ones(len(y)), components, 10.0, rng)
     wide = student(y.mean(axis=0), 1.5 * np.cov(y.T), 5.0)
-    return Proposal(straightening, mixture.with_component(wide, 0.1))
+    mixture = mixture.with_component(wide, 0.1)
+    excess = values - mixture.log_density(y)
+    missed = y[excess > np.median(excess) + _MISSED]
+    if len(missed) > 4 * y.shape[1]:
+        there = student(missed.mean(axis=0), 1.2 * np.cov(missed.T), 5.0)
+        mixture = mixture.with_component(there, 0.1)
+    return Proposal(straightening, mixture)
 
 
 def _acceptance(

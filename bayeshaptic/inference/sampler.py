@@ -24,10 +24,13 @@ from bayeshaptic.threads import single_threaded
 Floats = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 """Called with the share done (0 to 1) and a word about it."""
+Until = Callable[[Floats], int]
+"""Called with the chains (ensembles, S, walkers, P): how many steps they should have in all."""
 
 DEFAULT_ESS = 2000
 _FIRST_STEPS = 100
-_PATIENCE = 2.0  # a run that must still grow by this factor is better begun again
+_PATIENCE = 2.0  # a run that must still grow by this factor is better begun again,
+_MIXED = 0.06  # unless it has this many effective draws a draw: an autocorrelation of 16 steps
 _REFITS = 4
 _MOST_STEPS = 6000
 
@@ -41,6 +44,7 @@ def sample(
     seed: int = 0,
     progress: Progress | None = None,
     most_steps: int = _MOST_STEPS,
+    until: Until | None = None,
 ) -> Posterior:
     """Draw from the posterior of `model`'s parameters given `etfe`.
 
@@ -62,6 +66,9 @@ def sample(
         Called with the share done and a word about it.
     most_steps : int
         Steps of an ensemble after which to give up; the result then says it has not converged.
+    until : callable, optional
+        Called with the converged chains, shape (ensembles, S, walkers, P): how many steps they
+        should have in all.  For what needs more draws than the parameters do.
 
     Returns
     -------
@@ -92,7 +99,15 @@ def sample(
     adapted = adapt(density, proposal, np.random.default_rng(tune))
     report(0.2, "warming up")
     ensembles = warmed_up(density, adapted, run)
-    chains, found = _run(ensembles, ess, most_steps, report, np.random.default_rng(refit))
+    more = until or (lambda natural: natural.shape[1])
+    chains, found = _run(
+        ensembles,
+        ess,
+        most_steps,
+        lambda phi: more(here.natural(phi)),
+        report,
+        np.random.default_rng(refit),
+    )
     natural = here.natural(chains)
     log_likelihood = _log_likelihoods(density, chains, found)
     diagnostics = diagnose(natural)
@@ -115,6 +130,7 @@ def _run(
     ensembles: list[Ensemble],
     ess: float,
     most_steps: int,
+    until: Until,
     report: Progress,
     rng: np.random.Generator,
 ) -> tuple[Floats, Floats]:
@@ -137,13 +153,18 @@ def _run(
         gone, steps = gone + more, steps + more
         joined = np.concatenate(chains, axis=1)
         diagnostics = diagnose(joined)
-        if _is_done(diagnostics, ess) or gone >= most_steps:
+        done = _is_done(diagnostics, ess)
+        if done and gone < most_steps:
+            more = min(until(joined) - steps, most_steps - gone)
+            if more > 0:
+                continue
+        if done or gone >= most_steps:
             return joined, np.concatenate(densities, axis=1)
         # Effective draws grow with the steps: go as far as that promises, and a little further.
         wanted = 1.05 * steps * ess / max(diagnostics.ess, 1.0)
-        poor = wanted > _PATIENCE * steps or diagnostics.rhat.max() > RHAT_LIMIT
-        if poor and refits < _REFITS:
-            ensembles = refitted(ensembles, joined, rng)
+        slow = diagnostics.ess < _MIXED * joined[..., 0].size and wanted > _PATIENCE * steps
+        if (slow or diagnostics.rhat.max() > RHAT_LIMIT) and refits < _REFITS:
+            ensembles = refitted(ensembles, joined, np.concatenate(densities, axis=1), rng)
             more, steps, refits = 2 * more, 0, refits + 1
             chains.clear()
             densities.clear()

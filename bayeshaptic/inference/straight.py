@@ -2,8 +2,8 @@
 
 Along a ridge that the data hardly decide (the hand's mass against its spring, say) the other
 parameters follow along a curve, often a hundred times longer than it is thick.  In principal
-components v, the wide ones first, each component is freed from a quadratic function of those before
-it,
+components v, the wide ones first, each component is freed from a polynomial of the second degree in
+those before it,
 
     y_k = v_k - q_k(v_1 .. v_{k-1}),
 
@@ -32,20 +32,22 @@ class Straightening:
     whiten, colour : ndarray, shape (P, P)
         v = (x - mean) @ whiten, and back.
     constant : ndarray, shape (P,)
+    linear : ndarray, shape (P, P)
     quadratic : ndarray, shape (P, P, P)
-        q_k = constant_k + v quadratic_k v, where only entries below k differ from zero.
+        q_k = constant_k + linear_k v + v quadratic_k v; only entries below k differ from zero.
     """
 
     mean: Floats
     whiten: Floats
     colour: Floats
     constant: Floats
+    linear: Floats
     quadratic: Floats
 
     def straight(self, x: Floats) -> Floats:
         """Straight coordinates of `x`."""
         v = (x - self.mean) @ self.whiten
-        y = v - self.constant
+        y = v - self.constant - v @ self.linear.T
         for k, matrix in enumerate(self.quadratic):
             below = v[:, :k]
             y[:, k] -= np.sum((below @ matrix[:k, :k]) * below, axis=1)
@@ -57,6 +59,7 @@ class Straightening:
         with np.errstate(over="ignore", invalid="ignore"):  # far out there is nothing to find
             for k, matrix in enumerate(self.quadratic):
                 below = v[:, :k]
+                v[:, k] += below @ self.linear[k, :k]
                 v[:, k] += np.sum((below @ matrix[:k, :k]) * below, axis=1)
             return v @ self.colour + self.mean
 
@@ -64,7 +67,8 @@ class Straightening:
 def nothing_to_straighten(size: int) -> Straightening:
     """The identity for `size` parameters."""
     eye = np.eye(size)
-    return Straightening(np.zeros(size), eye, eye, np.zeros(size), np.zeros((size, size, size)))
+    none = np.zeros((size, size, size))
+    return Straightening(np.zeros(size), eye, eye, none[0, 0], none[0], none)
 
 
 def straighten(x: Floats) -> Straightening:
@@ -77,15 +81,17 @@ def straighten(x: Floats) -> Straightening:
     colour = (vectors[:, order] * width).T * sd
     v = (x - mean) @ whiten
     size = x.shape[1]
-    constant, quadratic = np.zeros(size), np.zeros((size, size, size))
+    constant, linear = np.zeros(size), np.zeros((size, size))
+    quadratic = np.zeros((size, size, size))
     for k in range(1, size):
+        # Principal components are uncorrelated, but not with each other's squares where skewed.
         first, second = np.triu_indices(_how_many(k, len(x)))
-        terms = np.column_stack([np.ones(len(v)), v[:, first] * v[:, second]])
+        terms = np.column_stack([np.ones(len(v)), v[:, :k], v[:, first] * v[:, second]])
         normal = terms.T @ terms + _RIDGE * len(v) * np.eye(terms.shape[1])
         found = np.linalg.solve(normal, terms.T @ v[:, k])
-        constant[k] = found[0]
-        quadratic[k, first, second] = found[1:]
-    return Straightening(mean, whiten, colour, constant, quadratic)
+        constant[k], linear[k, :k] = found[0], found[1 : k + 1]
+        quadratic[k, first, second] = found[k + 1 :]
+    return Straightening(mean, whiten, colour, constant, linear, quadratic)
 
 
 def _how_many(before: int, points: int) -> int:

@@ -16,7 +16,7 @@ from bayeshaptic.models.sampled import from_poles, from_polynomials
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-_CHUNK = 48  # vectors at a time: the arrays of one chunk stay in the cache
+_CHUNK = 128  # vectors at a time: the arrays of one chunk stay in the cache
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
 ENOUGH_BELOW = 20  # effective draws below a stiffness that is called safe
-MOST_DRAWS = 60_000  # 0.1 % risk needs 20,000 effective draws
+MOST_DRAWS = 150_000  # 0.1 % risk needs 20,000 effective draws
 _CHUNK = 4096
 _CHECKED = 64
 
@@ -95,11 +95,14 @@ class CriticalStiffness:
         None where fewer than 20 effective draws lie below it (or where there is one model only):
         the number would be an accident of the draws.
         """
-        stiffness = self.quantile(risk)
-        below = (self.samples < stiffness).reshape(self.chains, -1)
-        if effective_draws(below) * risk < ENOUGH_BELOW:
+        if self.effective_below(risk) < ENOUGH_BELOW:
             return None
-        return float(stiffness)
+        return float(self.quantile(risk))
+
+    def effective_below(self, risk: float) -> float:
+        """Effective number of draws below the stiffness of probability `risk`."""
+        below = (self.samples < self.quantile(risk)).reshape(self.chains, -1)
+        return effective_draws(below) * risk
 
     def tip(self, lever_m: float) -> CriticalStiffness:
         """The same at the tip of a rotational device's lever arm `lever_m`: K / lever^2, in N/m.
@@ -124,6 +127,7 @@ def critical_stiffness(
     theta: ArrayLike | None = None,
     approximation: str = "exact",
     max_draws: int = MOST_DRAWS,
+    before: CriticalStiffness | None = None,
 ) -> CriticalStiffness:
     """Critical stiffness of a model at its own values, of a fit, or of every draw of a posterior.
 
@@ -136,6 +140,8 @@ def critical_stiffness(
         "continuous" is the paper's P(s) e^{-s (td + T/2)}; it is not the truth of a sampled loop.
     max_draws : int
         A longer posterior is thinned, every so many steps of each chain.
+    before : CriticalStiffness, optional
+        Of this posterior while its chains were shorter: what has been found is not searched again.
 
     Returns
     -------
@@ -158,8 +164,7 @@ def critical_stiffness(
     vectors, chains = _vectors(source, theta, max_draws)
     if model.period_s is None:
         raise InputError("the model has no sampling period: give period_s, or a device.")
-    limit = _limits(model, vectors, model.period_s, approximation)
-    limit = replace(limit, chains=chains)
+    limit = _limits(model, vectors, chains, approximation, before)
     checkable = approximation == "exact" and rational(model.system(vectors[:1]))
     return _checked(limit, model, vectors) if checkable else limit
 
@@ -179,17 +184,41 @@ def _vectors(source: Any, theta: ArrayLike | None, max_draws: int) -> tuple[Floa
 
 
 def _limits(
-    model: Model, vectors: Floats, period_s: float, approximation: str
+    model: Model,
+    vectors: Floats,
+    chains: int,
+    approximation: str,
+    before: CriticalStiffness | None,
 ) -> CriticalStiffness:
-    parts = []
-    for start in range(0, len(vectors), _CHUNK):
-        system = model.system(vectors[start : start + _CHUNK])
-        found = find_crossings(system, period_s, approximation)
-        kinds = binding_kinds(system, found.binding_hz, period_s)
-        parts.append((found.critical, found.binding_hz, kinds))
-    samples, frequency, kinds = (np.concatenate(part) for part in zip(*parts, strict=True))
+    assert model.period_s is not None
+    by_chain = vectors.reshape(chains, -1, vectors.shape[1])
+    samples, frequency = np.empty((2, *by_chain.shape[:2]))
+    known = 0
+    if before is not None and before.chains == chains:
+        known = min(len(before.samples) // chains, by_chain.shape[1])
+        samples[:, :known] = before.samples.reshape(chains, -1)[:, :known]
+        frequency[:, :known] = before.frequency_hz.reshape(chains, -1)[:, :known]
+    fresh = by_chain[:, known:].reshape(-1, vectors.shape[1])
+    parts = [np.empty((2, 0))]
+    for start in range(0, len(fresh), _CHUNK):
+        system = model.system(fresh[start : start + _CHUNK])
+        found = find_crossings(system, model.period_s, approximation)
+        parts.append(np.stack([found.critical, found.binding_hz]))
+    new = np.concatenate(parts, axis=1).reshape(2, chains, -1)
+    samples[:, known:], frequency[:, known:] = new
+    samples, frequency = samples.ravel(), frequency.ravel()
+    kinds = np.concatenate(
+        [
+            binding_kinds(
+                model.system(vectors[start : start + _CHUNK]),
+                frequency[start : start + _CHUNK],
+                model.period_s,
+            )
+            for start in range(0, len(vectors), _CHUNK)
+        ]
+    )
     crossings, group = group_crossings(kinds, frequency)
-    return CriticalStiffness(samples, frequency, model.stiffness_unit, crossings, group)
+    return CriticalStiffness(samples, frequency, model.stiffness_unit, crossings, group, chains)
 
 
 def _checked(limit: CriticalStiffness, model: Model, vectors: Floats) -> CriticalStiffness:
