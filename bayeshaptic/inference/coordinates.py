@@ -80,8 +80,8 @@ def sampling_coordinates(model: Model, theta: Floats, sd: Floats) -> Coordinates
         prior = model.prior(name)
         if prior.coordinate == "log" and model.parameter(name).dimension in _SUMS:
             believed = 0.5 * float(np.log(prior.quantile(0.84) / prior.quantile(0.16)))
-            measured = error / value if error > 0 else np.inf  # nan at a bound
-            if np.hypot(1 / believed, 1 / measured) > 1 / _KNOWN:
+            # A fit at a bound, where the error is nan, says nothing of where the peak is.
+            if error > 0 and np.hypot(1 / believed, value / error) > 1 / _KNOWN:
                 known.add(name)
     return coordinates(model, known)
 

@@ -63,7 +63,7 @@ def fast_filters(system: LinearSystem, period_s: float) -> NDArray[np.bool_]:
     """Where a filter is faster than the series over aliases bears, shape (B,)."""
     found = np.zeros(system.batch, bool)
     for factor in system.filters:
-        found |= np.abs(roots(factor.denominator)).max(axis=1) * period_s > _FAST
+        found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > _FAST
     return found
 
 
