@@ -31,7 +31,10 @@ from bayeshaptic.report.quantities import estimate, interval, percent, quantity,
 from bayeshaptic.report.tables import parameters, safe
 from bayeshaptic.report.words import agreement, hump, misfit
 
-FILES = {"report.html", "summary.json", "posterior.nc", *(f"{p.name}.png" for p in PICTURES)}
+WALLS = ("limits_curve", "limits_kb")
+NAMES = (*(picture.name for picture in PICTURES), *WALLS)
+TABLES = {"summary.json", "limits.json", "limits.csv"}
+FILES = {"report.html", "posterior.nc", *TABLES, *(f"{name}.png" for name in NAMES)}
 
 
 # ---- quantities
@@ -466,7 +469,7 @@ def test_the_page_in_a_browser(case: str, tmp_path: Path) -> None:
         assert found["overlaps"] == []
         assert found["width"] <= found["window"], "the page scrolls sideways"
         assert all(name.startswith("data:") for name in found["requests"])
-        assert len(found["images"]) == len(PICTURES)
+        assert len(found["images"]) == len(NAMES)
         assert all(natural > 300 and 0 < shown <= width for _, natural, shown in found["images"])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -42,8 +42,11 @@ class EmbeddedPicture:
     height: int
 
 
-def render(result: Any, pictures: Mapping[str, bytes]) -> str:
-    """The page of an analysis (or of what closing the loop returns) with its PNG pictures."""
+def render(result: Any, pictures: Mapping[str, bytes], sections: Sequence[str] = ()) -> str:
+    """The page of an analysis (or of what closing the loop returns) with its PNG pictures.
+
+    `sections` are further ones, ready as HTML, that follow the critical stiffness.
+    """
     analysis, closed = analysis_of(result), closed_of(result)
     head = headline(result)
     return template("report.jinja").render(
@@ -66,6 +69,7 @@ def render(result: Any, pictures: Mapping[str, bytes]) -> str:
         assumptions=assumptions(analysis, closed),
         priors=priors(analysis),
         versions=versions(),
+        sections=sections,
     )
 
 

@@ -10,7 +10,16 @@ from typing import Any
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, draw_pictures
+from bayeshaptic.report.headline import headline
 from bayeshaptic.report.html import render
+from bayeshaptic.report.limits_section import (
+    case_of,
+    friction_of,
+    limits_section,
+    resolution_of,
+    table_of,
+)
+from bayeshaptic.report.section import Section
 from bayeshaptic.report.summary import analysis_of, summary_json
 
 # Whoever waits for a report looks for its summary: it arrives when the rest is there.
@@ -18,7 +27,7 @@ _LAST = "summary.json"
 
 
 def write_report(result: Any, out_dir: str | Path) -> Path:
-    """Write report.html, summary.json, posterior.nc and the figures into a folder.
+    """Write report.html, summary.json, limits.json and .csv, posterior.nc and the figures.
 
     The files are made in a hidden folder and moved when all of them are there: an interrupted run
     leaves what was there before. Other files in `out_dir` stay.
@@ -57,11 +66,26 @@ def write_report(result: Any, out_dir: str | Path) -> Path:
 def _write_all(result: Any, folder: Path) -> None:
     analysis = analysis_of(result)
     pictures = draw_pictures(result)
-    for name, png in pictures.items():
-        (folder / f"{name}.png").write_bytes(png)
+    sections = _sections(result, folder)
+    for part in (pictures, *(section.pictures for section in sections)):
+        for name, png in part.items():
+            (folder / f"{name}.png").write_bytes(png)
     analysis.posterior.save(folder / "posterior.nc")
-    (folder / "report.html").write_text(render(result, pictures), encoding="utf-8", newline="\n")
+    page = render(result, pictures, [section.html for section in sections])
+    (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
     (folder / _LAST).write_text(summary_json(result), encoding="utf-8", newline="\n")
+
+
+def _sections(result: Any, folder: Path) -> tuple[Section, ...]:
+    """The sections about stable walls, with their table in `folder`."""
+    analysis = analysis_of(result)
+    status = headline(result).status
+    table = table_of([case_of(result)])
+    table.write(folder, None if analysis.device is None else analysis.device.name, status)
+    walls = limits_section(
+        table, friction_of(result), resolution_of(analysis), status == "untrusted"
+    )
+    return (walls,)
 
 
 def _move(draft: Path, out: Path) -> None:

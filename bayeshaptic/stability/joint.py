@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from bayeshaptic.stability.critical import ENOUGH_BELOW
 from bayeshaptic.stability.damping import Backward, Damping, LowPass
 from bayeshaptic.stability.kb_region import DRAWS, KbRegion, kb_region, with_damping
-from bayeshaptic.stability.kb_width import Boundary
 
 Floats = NDArray[np.float64]
 
+_INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
+_BEYOND = 0.95
+_CLOSER = 1.5
 CUTOFF = 0.1  # of the sampling rate: the usual low-pass of a velocity
 
 
@@ -72,17 +74,17 @@ class JointRegion:
         maps = [region.probability_map(stiffness, damping) for region in self.regions]
         return np.asarray(np.prod(maps, axis=0))
 
-    def dampings(self, risk: float, count: int) -> Floats:
-        """Dampings from zero to the largest that is stable at that risk, shape (count,)."""
-        top = float(np.quantile(self.largest_damping(), risk, method="inverted_cdf"))
-        return np.linspace(0.0, (1 - 1e-6) * top if np.isfinite(top) else 1.0, count)
+    def dampings(self, risks: Sequence[float], count: int) -> Floats:
+        """Ascending dampings from zero on: `count` steps, and where each boundary ends.
 
-    def boundaries(self, risks: Sequence[float], damping: ArrayLike) -> tuple[Boundary, ...]:
-        """The boundary at each risk."""
-        levels = np.asarray(damping, float)
-        limits = np.sort(self.limits(levels), axis=0)
-        place = [max(int(np.ceil(risk * len(limits))) - 1, 0) for risk in risks]
-        return tuple(Boundary(r, levels, limits[p]) for r, p in zip(risks, place, strict=True))
+        The steps are closest at zero, where limits rise most steeply, and reach the damping that
+        is unstable in 95 % of the draws.
+        """
+        largest = self.largest_damping()
+        wanted = np.quantile(largest, [*risks, _BEYOND], method="inverted_cdf")
+        ends = _INSIDE * wanted[np.isfinite(wanted)]
+        steps = np.linspace(0.0, 1.0, count) ** _CLOSER * (ends.max() if len(ends) else 1.0)
+        return np.unique(np.concatenate([steps, ends]))
 
 
 def joint_region(

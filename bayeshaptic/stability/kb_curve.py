@@ -143,7 +143,8 @@ def inverse_curve(system: LinearSystem | EvaluableSystem, period_s: float) -> In
     features = response.features
     if isinstance(system, LinearSystem) and features.shape[1]:
         zeros = roots(system.rational_part.transfer()[0]) * period_s
-        features = np.concatenate([features, zeros], axis=1)
+        if zeros.shape[1]:
+            features = np.concatenate([features, zeros], axis=1)
     look = _Features(response.delay, features, response.log_points)
     every = np.arange(len(response.delay))
     theta = search_grid(look, slice(0, len(every)))  # type: ignore[arg-type]

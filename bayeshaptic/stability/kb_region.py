@@ -21,7 +21,7 @@ from bayeshaptic.stability.kb_curve import (
     kb_curve,
 )
 from bayeshaptic.stability.kb_source import loops_of
-from bayeshaptic.stability.kb_width import Boundary, ZWidth
+from bayeshaptic.stability.kb_width import Boundary, ZWidth, width_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -189,26 +189,12 @@ class KbRegion:
         risk : float
         count : int
             Dampings to look at.
-
-        References
-        ----------
-        J. E. Colgate and J. M. Brown, "Factors affecting the Z-Width of a haptic display", IEEE
-        International Conference on Robotics and Automation, 1994, who ask for passivity; here it
-        is stability of the coupled loop.
         """
         largest = float(np.quantile(self.largest_damping(), risk, method="inverted_cdf"))
         if not np.isfinite(largest):
             raise InputError("nothing limits the damping of this loop; it has no Z-width.")
         (boundary,) = self.boundaries((risk,), np.linspace(0.0, _INSIDE * largest, count))
-        best = int(np.argmax(boundary.stiffness))
-        area = float(np.trapezoid(boundary.stiffness, boundary.damping))
-        return ZWidth(
-            boundary,
-            float(boundary.stiffness[best]),
-            float(boundary.damping[best]),
-            largest,
-            area,
-        )
+        return width_of(boundary)
 
 
 def kb_region(

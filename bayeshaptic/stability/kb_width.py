@@ -50,3 +50,20 @@ class ZWidth:
     at_damping: float
     damping: float
     area: float
+
+
+def width_of(boundary: Boundary) -> ZWidth:
+    """The Z-width that a boundary tells; its last stiffness above zero is at the largest damping.
+
+    References
+    ----------
+    J. E. Colgate and J. M. Brown, "Factors affecting the Z-Width of a haptic display", IEEE
+    International Conference on Robotics and Automation, 1994, who ask for passivity; here it is
+    stability of the coupled loop.
+    """
+    stiffness, damping = boundary.stiffness, boundary.damping
+    best = int(np.argmax(stiffness))
+    some = np.flatnonzero(stiffness > 0)
+    largest = float(damping[some[-1]]) if len(some) else 0.0
+    area = float(np.trapezoid(stiffness, damping))
+    return ZWidth(boundary, float(stiffness[best]), float(damping[best]), largest, area)

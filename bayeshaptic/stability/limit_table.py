@@ -11,12 +11,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bayeshaptic import __version__
-from bayeshaptic.stability.cases import Case, device_limit
+from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
+from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.damping import Damping
 from bayeshaptic.stability.joint import JointRegion, filtered, joint_region, usual_dampings
 from bayeshaptic.stability.kb_region import DRAWS
-from bayeshaptic.stability.kb_width import Boundary
+from bayeshaptic.stability.kb_width import Boundary, ZWidth, width_of
+
+Floats = NDArray[np.float64]
 
 RISKS = (0.05, 0.01, 0.001)
 ROWS = 25  # dampings a filter
@@ -26,21 +32,38 @@ _DIGITS = 6
 
 @dataclass(frozen=True)
 class FilterLimits:
-    """What damping a wall may have with one way to get the velocity, and the stiffness with it.
+    """The stiffness that a wall may have over its damping, with one way to get the velocity.
 
     Attributes
     ----------
     region : JointRegion
-    boundaries : tuple of Boundary or None
-        At each risk; None where the draws are too few to state it.
+    damping : ndarray, shape (J,)
+        Ascending from zero; the end of the boundary at each risk is among them.
+    limits : ndarray, shape (n, J)
+        Limits of the joint draws, each column in ascending order.
     """
 
     region: JointRegion = field(repr=False)
-    boundaries: tuple[Boundary | None, ...]
+    damping: Floats = field(repr=False)
+    limits: Floats = field(repr=False)
 
     @property
     def kind(self) -> Damping:
         return self.region.kind
+
+    def quantile(self, risk: float) -> Floats:
+        """The stiffness at that risk whether or not the draws are enough for it, shape (J,)."""
+        return self.limits[max(int(np.ceil(risk * len(self.limits))) - 1, 0)]
+
+    def boundary(self, risk: float) -> Boundary | None:
+        """The stiffness at that risk; None where the draws are too few to state it."""
+        known = self.region.says(risk)
+        return Boundary(risk, self.damping, self.quantile(risk)) if known else None
+
+    def width(self, risk: float) -> ZWidth | None:
+        """How wide the range of walls is at that risk; None where the draws are too few."""
+        boundary = self.boundary(risk)
+        return None if boundary is None else width_of(boundary)
 
 
 @dataclass(frozen=True)
@@ -51,6 +74,8 @@ class LimitTable:
     ----------
     cases : tuple of Case
     risks : tuple of float
+    samples : ndarray, shape (n,)
+        K_CR of the joint draws over all cases, without damping.
     stiffness : tuple of float or None
         The stiffness without damping at each risk, over all cases.
     by_case : tuple of tuple of float or None
@@ -60,6 +85,7 @@ class LimitTable:
 
     cases: tuple[Case, ...] = field(repr=False)
     risks: tuple[float, ...]
+    samples: Floats = field(repr=False)
     stiffness: tuple[float | None, ...]
     by_case: tuple[tuple[float | None, ...], ...]
     filters: tuple[FilterLimits, ...]
@@ -139,17 +165,16 @@ class LimitTable:
         return {f"{r:g}": _plain(v) for r, v in zip(self.risks, values, strict=True)}
 
     def _boundary(self, part: FilterLimits) -> dict[str, Any]:
-        known = [b for b in part.boundaries if b is not None]
-        stiffness: dict[str, list[float | None] | None] = {
-            f"{risk:g}": None if b is None else [_plain(value) for value in b.stiffness]
-            for risk, b in zip(self.risks, part.boundaries, strict=True)
-        }
+        found = {f"{risk:g}": part.boundary(risk) for risk in self.risks}
         return {
             "damping_filter": "backward" if part.kind.cutoff_hz is None else "low_pass",
             "cutoff_hz": part.kind.cutoff_hz,
             "smoothing": part.kind.smoothing(part.region.period_s),
-            "damping": [_plain(level) for level in known[0].damping] if known else [],
-            "stiffness": stiffness,
+            "damping": [_plain(level) for level in part.damping],
+            "stiffness": {
+                risk: None if b is None else [_plain(value) for value in b.stiffness]
+                for risk, b in found.items()
+            },
         }
 
 
@@ -183,12 +208,14 @@ def limit_table(
         Without cases, or where they have different units.
     """
     cases = tuple(cases)
+    over_all: DeviceLimit | CriticalStiffness
     over_all = device_limit(cases, seed=seed) if len(cases) != 1 else cases[0].limit
     region = joint_region(cases, draws=draws, seed=seed)
     kinds = usual_dampings(region.period_s) if dampings is None else tuple(dampings)
     return LimitTable(
         cases,
         risks,
+        over_all.samples,
         tuple(over_all.safe(risk) for risk in risks),
         tuple(tuple(case.limit.safe(risk) for risk in risks) for case in cases),
         tuple(_filter_limits(filtered(region, kind), risks) for kind in kinds),
@@ -196,8 +223,8 @@ def limit_table(
 
 
 def _filter_limits(region: JointRegion, risks: tuple[float, ...]) -> FilterLimits:
-    found = region.boundaries(risks, region.dampings(max(risks), ROWS))
-    return FilterLimits(region, tuple(b if region.says(b.risk) else None for b in found))
+    levels = region.dampings(risks, ROWS)
+    return FilterLimits(region, levels, np.sort(region.limits(levels), axis=0))
 
 
 def _plain(value: float | None) -> float | None:

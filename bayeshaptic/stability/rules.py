@@ -10,8 +10,10 @@ from bayeshaptic.models.system import LinearSystem
 Floats = NDArray[np.float64]
 
 
-def rigid_limit(damping: ArrayLike, delay_s: ArrayLike, period_s: float) -> Floats:
-    """Stability of a rigid device: K = b / (T/2 + td).
+def rigid_limit(
+    damping: ArrayLike, delay_s: ArrayLike, period_s: float, virtual_damping: ArrayLike = 0.0
+) -> Floats:
+    """Stability of a rigid device: K = b / (T/2 + td), and (b + B) / (T/2 + td) with damping B.
 
     Parameters
     ----------
@@ -19,6 +21,8 @@ def rigid_limit(damping: ArrayLike, delay_s: ArrayLike, period_s: float) -> Floa
         Viscous damping b of the device to the ground.
     delay_s : array_like
     period_s : float
+    virtual_damping : array_like
+        B of the wall; the rule is linear, and true for small B only.
 
     Returns
     -------
@@ -28,9 +32,13 @@ def rigid_limit(damping: ArrayLike, delay_s: ArrayLike, period_s: float) -> Floa
     References
     ----------
     Equation (19) of I. Diaz and J. J. Gil, "Influence of Vibration Modes and Human Operator on the
-    Stability of Haptic Rendering", IEEE Transactions on Robotics 26(1), 2010.
+    Stability of Haptic Rendering", IEEE Transactions on Robotics 26(1), 2010.  With B: J. J. Gil,
+    E. Sanchez, T. Hulin, C. Preusche and G. Hirzinger, "Stability Boundary for Haptic Rendering:
+    Influence of Damping and Delay", Journal of Computing and Information Science in Engineering
+    9(1), 2009.
     """
-    return np.asarray(damping, float) / (period_s / 2 + np.asarray(delay_s, float))
+    total = np.asarray(damping, float) + np.asarray(virtual_damping, float)
+    return total / (period_s / 2 + np.asarray(delay_s, float))
 
 
 def passivity_limit(
