@@ -1,0 +1,165 @@
+"""What encoder, clock and logger do to a recording: found in the samples, and mended."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.measurement import Inspection, inspect, repair_measurement
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.stability import critical_stiffness
+
+SECONDS, SEED = 8.0, 4
+PHANTOM = Bench.from_device("phantom")
+LHIFAM = Bench.from_device("lhifam", held=True)  # fine counts, and a hand that keeps it in place
+COUNT = PHANTOM.encoder_resolution
+
+
+def recorded(bench: Bench, seed: int = SEED) -> Recording:
+    """Eight seconds; the declared count is that of the device."""
+    made = simulate(bench, WhiteNoise(0.5 * bench.force_rms, 200.0, 0.7, SECONDS), seed=seed)
+    return recording_from_arrays(
+        made.force,
+        made.position,
+        period_s=bench.period_s,
+        force_unit=bench.force_unit,
+        position_unit=bench.position_unit,
+        encoder_resolution=bench.encoder_resolution,
+    )
+
+
+def fitted(recording: Recording, bench: Bench) -> tuple[Etfe, Fit]:
+    etfe = estimate_etfe(recording, (0.7, 200.0))
+    assert bench.device is not None
+    return etfe, least_squares(build_model(bench.mechanism, bench.device), etfe)
+
+
+@cache
+def looked_at(
+    name: str, lhifam: bool = False, **fields: Any
+) -> tuple[Recording, Etfe, Fit, Inspection]:
+    """A recording with one effect (or none), and what its samples show."""
+    plain = LHIFAM if lhifam else PHANTOM
+    bench = plain.with_effect(name, **fields) if name else plain
+    recording = recorded(bench)
+    etfe, fit = fitted(recording, bench)
+    return recording, etfe, fit, inspect(recording, fit, etfe)
+
+
+def flagged(look: Inspection) -> dict[str, Any]:
+    return {finding.effect.name: finding for finding in look.findings if finding.flagged}
+
+
+@cache
+def clean_position(lhifam: bool = False) -> np.ndarray:
+    return recorded(LHIFAM if lhifam else PHANTOM).position
+
+
+def test_a_clean_recording_is_left_as_it_is() -> None:
+    recording, etfe, fit, look = looked_at("")
+    assert flagged(look) == {}
+    assert np.array_equal(look.mended.position, recording.position) and look.measured == 1.0
+    state = State(etfe, fit)
+    assert repair_measurement(state) is state
+
+
+def test_coarse_counts_are_measured_and_nothing_is_changed() -> None:
+    recording, etfe, fit, look = looked_at("quantisation", count=8 * COUNT)
+    (name, finding), *others = flagged(look).items()
+    assert (name, others) == ("quantisation", [])
+    # Positions are written as multiples of the count: it comes out to rounding.
+    assert finding.estimates["resolution"].mean == pytest.approx(8 * COUNT, rel=1e-6)
+    assert look.mended.encoder_resolution == pytest.approx(8 * COUNT, rel=1e-6)
+    assert np.array_equal(look.mended.position, recording.position)
+
+
+def test_a_mains_tone_is_sized_and_subtracted() -> None:
+    amplitude = 2e-3
+    recording, etfe, fit, look = looked_at("mains_tone", amplitude=amplitude, frequency_hz=50.0)
+    finding = flagged(look)["mains_tone"]
+    frequency, size = (finding.estimates[key] for key in ("frequency_1_hz", "amplitude_1"))
+    # Within four of its own standard deviations, and of the right size for eight seconds.
+    assert abs(frequency.mean - 50.0) < max(4 * frequency.sd, 0.01) and frequency.sd < 0.05
+    assert abs(size.mean - amplitude) < max(4 * size.sd, 0.02 * amplitude)
+    # What is left of the tone: the line at 50 Hz, before and after, without the device's motion.
+    clean = clean_position()
+    wave = np.exp(-2j * np.pi * 50.0 * np.arange(len(clean)) * recording.period_s)
+    left = [
+        2 * abs(np.mean((p - clean) * wave)) for p in (recording.position, look.mended.position)
+    ]
+    assert left[0] == pytest.approx(amplitude, rel=0.05) and left[1] < 0.1 * amplitude
+
+
+@pytest.mark.parametrize("probability", [0.002, 0.02])
+def test_held_samples_are_counted_and_filled_in(probability: float) -> None:
+    recording, etfe, fit, look = looked_at(
+        "held_samples", lhifam=True, probability=probability, longest=3
+    )
+    finding = flagged(look)["held_samples"]
+    clean = clean_position(lhifam=True)
+    wrong = recording.position != clean
+    assert wrong.any()
+    # A held sample that the next one equals by chance cannot be seen, and does no harm.
+    assert finding.estimates["share"].mean == pytest.approx(wrong.mean(), rel=0.25)
+    error = [
+        np.sqrt(np.mean((p - clean)[wrong] ** 2))
+        for p in (recording.position, look.mended.position)
+    ]
+    assert error[1] < 0.3 * error[0]
+    # And next to nothing of what was right is touched.
+    assert np.mean(look.mended.position[~wrong] != clean[~wrong]) < 0.01
+
+
+def test_clipping_is_found_at_its_limits_and_filled_in() -> None:
+    limit = float(np.quantile(np.abs(clean_position(lhifam=True)), 0.93))
+    recording, etfe, fit, look = looked_at("position_clipping", lhifam=True, limit=limit)
+    finding = flagged(look)["position_clipping"]
+    cut = np.abs(clean_position(lhifam=True)) > limit
+    assert finding.estimates["share"].mean == pytest.approx(cut.mean(), rel=0.1)
+    ends = sorted(abs(e.mean) for key, e in finding.estimates.items() if key.startswith("limit"))
+    assert ends == pytest.approx([limit] * len(ends), abs=LHIFAM.encoder_resolution)
+    assert look.measured == pytest.approx(1 - cut.mean(), abs=0.02)
+
+
+def test_jitter_is_sized_but_stays_a_finding() -> None:
+    recording, etfe, fit, look = looked_at("sample_jitter", sd_s=1e-4)
+    finding = flagged(look)["sample_jitter"]
+    estimate = finding.estimates["sd_s"]
+    assert abs(estimate.mean - 1e-4) < max(4 * estimate.sd, 2e-5)
+    assert not finding.mended
+
+
+@pytest.mark.parametrize(
+    ("name", "fields"),
+    [
+        ("mains_tone", {"amplitude": 5e-5, "frequency_hz": 50.0}),
+        ("held_samples", {"probability": 0.02, "longest": 3}),
+    ],
+)
+def test_mending_brings_the_fit_back_to_the_noise(name: str, fields: dict[str, Any]) -> None:
+    _, etfe, fit, _ = looked_at(name, lhifam=True, **fields)
+    mended = repair_measurement(State(etfe, fit))
+    assert [effect.name for effect in mended.accepted] == [name]
+    truth = LHIFAM.true_critical_stiffness()
+    limit = critical_stiffness(mended.fit.model, mended.fit.theta).value
+    # The clean recording's own estimate is within 1 % (eight seconds): two to be sure.
+    assert limit == pytest.approx(truth, rel=0.02)
+    # The reduced chi-square of some 60 windows of three complex numbers scatters by 0.1.
+    assert mended.fit.reduced_chi_square < 1.5
+
+
+def test_what_is_known_is_not_found_twice() -> None:
+    _, etfe, fit, _ = looked_at("held_samples", lhifam=True, probability=0.02, longest=3)
+    once = repair_measurement(State(etfe, fit))
+    twice = repair_measurement(replace(once, etfe=replace(once.etfe)))
+    assert [effect.name for effect in twice.accepted] == ["held_samples"]
