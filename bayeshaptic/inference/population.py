@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.below import Below, draw_below
+from bayeshaptic.inference.coordinates import Coordinates, coordinates
+from bayeshaptic.inference.gaussian_likelihood import gaussian_likelihood
+from bayeshaptic.inference.hierarchy import Hierarchy
+from bayeshaptic.inference.population_sampler import LevelChains, first_guess, sample_level
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.reweighting import Reweighted, inside, reweight
+from bayeshaptic.inference.settling import settled
+from bayeshaptic.models import Model
+from bayeshaptic.models.structures import HAND
+from bayeshaptic.threads import single_threaded
+
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+Progress = Callable[[float, str], None]
+
+DRAWS = 2000
+_FIRST_STEPS = 60
+_POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
 
 
 @dataclass(frozen=True)
 class Population:
-    """Posterior of a population of hands.
+    """Posterior of a population of hands, and of the device that they held.
 
     Attributes
     ----------
@@ -21,7 +42,15 @@ class Population:
     log_mean, log_sd : ndarray, shape (n, H)
         Of the logarithms over people.
     correlation : ndarray, shape (n, H, H)
+        Of the logarithms over people.
     users : tuple of str
+    places : tuple
+        Configurations that people were measured in; (None,) without.
+    model : Model
+    recordings : tuple of Reweighted
+        Every recording's parameters given all recordings, in the order that they came.
+    notices : tuple of Notice
+    seconds : float
     """
 
     parameters: tuple[str, ...]
@@ -29,3 +58,221 @@ class Population:
     log_sd: Floats = field(repr=False)
     correlation: Floats = field(repr=False)
     users: tuple[str, ...]
+    places: tuple[float | str | None, ...]
+    model: Model = field(repr=False)
+    recordings: tuple[Reweighted, ...] = field(repr=False)
+    notices: tuple[Notice, ...] = ()
+    seconds: float = 0.0
+    chains: LevelChains | None = field(default=None, repr=False)
+    _here: Coordinates | None = field(default=None, repr=False)
+    _hierarchy: Hierarchy | None = field(default=None, repr=False)
+    _below: Below | None = field(default=None, repr=False)
+
+    @property
+    def device_parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that all recordings share up to a small spread."""
+        return tuple(name for name in self.model.names if name not in self.parameters)
+
+    @property
+    def device_spread(self) -> Floats:
+        """Spread between recordings: of logarithms, or in prior widths; shape (n, D - H)."""
+        assert self._below is not None
+        return self._below.level.device_sd
+
+    def of_user(self, user: str) -> tuple[Reweighted, ...]:
+        """The recordings of one user."""
+        return tuple(one for one in self.recordings if one.user == user)
+
+    def new_person(self, rng: np.random.Generator, each: int = 1, place: int = 0) -> Floats:
+        """Parameters of people not yet seen: `each` from every draw of the population.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+        each : int
+            People a draw of the population; draw after draw.
+        place : int
+            Index into `places`.
+
+        Returns
+        -------
+        ndarray, shape (n * each, P)
+            Natural values in the order of `model.names`.
+        """
+        assert self._here is not None and self._hierarchy is not None and self._below is not None
+        hierarchy, level = self._hierarchy, self._below.level
+        count, hand = self.log_mean.shape
+        x = np.empty((count, each, self.model.size))
+        normal = rng.standard_normal((count, each, self.model.size))
+        root = level.hand_sd[:, :, None] * level.correlation_root
+        people = np.einsum("nij,nej->nei", root, normal[..., :hand])
+        trial = level.trial_sd[:, None, None] * rng.standard_normal(people.shape)
+        x[:, :, hierarchy.hand] = self.log_mean[:, None] + people + trial
+        device = len(hierarchy.device)
+        start = hand + place * device
+        middle = self._below.beta[:, None, start : start + device]
+        x[:, :, hierarchy.device] = middle + level.device_sd[:, None] * normal[..., hand:]
+        return self._here.natural(inside(x.reshape(-1, self.model.size), self._here))
+
+
+@single_threaded
+def infer_population(
+    posteriors: Sequence[Posterior],
+    users: Sequence[str],
+    places: Sequence[float | str | None] | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Population:
+    """Infer a population of hands from one posterior a recording.
+
+    The logarithms of a hand's parameters are normal over people, with any mean and covariance; the
+    device is the same in all recordings of a configuration, up to a small spread that is inferred;
+    a person recorded twice has the same hand, up to a spread between trials.
+
+    Parameters
+    ----------
+    posteriors : sequence of Posterior
+        Of grasped models with the same parameters.
+    users : sequence of str
+        Who held the device in each.
+    places : sequence, optional
+        In which configuration each was recorded.
+    seed : int
+    progress : callable, optional
+        Called with the share done and a word about it.
+
+    Returns
+    -------
+    Population
+
+    Raises
+    ------
+    InputError
+        Without recordings, or where their models have different parameters or no hand.
+
+    Notes
+    -----
+    Each recording's likelihood is described by a Gaussian function (`gaussian_likelihood`) where all
+    recordings together say that its parameters are, in two rounds (`settled`).  emcee samples the spreads and correlations, all else is integrated out (`hierarchy`); in the end each
+    recording's draws are weighted by its exact likelihood.
+    """
+    began = time.perf_counter()
+    report = progress or (lambda share, word: None)
+    model = _common_model(posteriors)
+    here = study_coordinates(model)
+    hierarchy, names, spots = _hierarchy(posteriors, users, places or [None] * len(users), here)
+    tune, run, rest = np.random.SeedSequence(seed).spawn(3)
+    rng = np.random.default_rng(rest)
+    report(0.0, "population: first look")
+    hierarchy = settled(hierarchy, posteriors, here, first_guess(hierarchy)[0])
+    chains = sample_level(hierarchy, tune, steps=_FIRST_STEPS)
+    report(0.5, "population: sampling")
+    hierarchy = settled(hierarchy, posteriors, here, np.median(chains.thinned(DRAWS, rng), axis=0))
+    chains = sample_level(hierarchy, run, chains)
+    report(0.8, "population: users")
+    draws = draw_below(hierarchy, chains.thinned(DRAWS, rng), here.low, rng)
+    own = reweight(posteriors, users, hierarchy, draws, here, rng)
+    root = draws.level.correlation_root
+    return Population(
+        tuple(name for name in model.names if name in HAND),
+        draws.beta[:, : len(hierarchy.hand)],
+        draws.level.hand_sd,
+        root @ root.transpose(0, 2, 1),
+        names,
+        spots,
+        model,
+        own,
+        (*chains.notices, *_notices(own, names)),
+        time.perf_counter() - began,
+        chains,
+        here,
+        hierarchy,
+        draws,
+    )
+
+
+def study_coordinates(model: Model) -> Coordinates:
+    """Coordinates that recordings share: hands always as logarithms, the others by their priors."""
+    here = coordinates(model)
+    hand = np.isin(model.names, HAND)
+    low = np.where(hand, -np.inf, here.low)
+    return replace(here, log=here.log | hand, scale=np.where(hand, 1.0, here.scale), low=low)
+
+
+def prior_moments(model: Model, here: Coordinates) -> tuple[Floats, Floats]:
+    """Middle and width of the priors in the coordinates `here`; shape (D,) each.
+
+    Of a damper that may be zero the wall is the middle: its half-normal is one half of a normal.
+    """
+    priors = [model.prior(name) for name in model.names]
+    low, middle, high = (
+        here.coordinate(np.array([float(prior.quantile(p)) for prior in priors])[None])[0]
+        for p in (0.16, 0.5, 0.84)
+    )
+    mean = np.where(here.walls, here.low, middle)
+    sd = np.where(here.walls, (high - here.low) / 1.405, 0.5 * (high - low))
+    return mean, np.where(here.log, np.minimum(sd, high - middle), sd)
+
+
+def _common_model(posteriors: Sequence[Posterior]) -> Model:
+    if not posteriors:
+        raise InputError("no recording of a user: a population needs at least one.")
+    model = posteriors[0].model
+    for number, posterior in enumerate(posteriors):
+        if posterior.names != model.names:
+            raise InputError(
+                f"posterior {number + 1} has the parameters {', '.join(posterior.names)}, but the "
+                f"first has {', '.join(model.names)}: a population needs the same model, with the "
+                "same effects, in all recordings."
+            )
+    if not any(name in HAND for name in model.names):
+        raise InputError(f"the {model.name} model has no hand: give posteriors of grasped models.")
+    return model
+
+
+def _hierarchy(
+    posteriors: Sequence[Posterior],
+    users: Sequence[str],
+    places: Sequence[float | str | None],
+    here: Coordinates,
+) -> tuple[Hierarchy, tuple[str, ...], tuple[float | str | None, ...]]:
+    """The levels with their first description; users and configurations as they first come."""
+    if not len(users) == len(places) == len(posteriors):
+        raise InputError(
+            f"{len(posteriors)} posteriors, but {len(users)} users and {len(places)} "
+            "configurations: give one of each for every posterior."
+        )
+    names, spots = tuple(dict.fromkeys(users)), tuple(dict.fromkeys(places))
+    model = posteriors[0].model
+    is_hand = np.isin(model.names, HAND)
+    mean, sd = prior_moments(model, here)
+    hierarchy = Hierarchy(
+        tuple(gaussian_likelihood(one, here) for one in posteriors),
+        np.array([names.index(user) for user in users]),
+        np.array([spots.index(place) for place in places]),
+        np.flatnonzero(is_hand),
+        np.flatnonzero(~is_hand),
+        mean,
+        sd,
+    )
+    return hierarchy, names, spots
+
+
+def _notices(recordings: Sequence[Reweighted], users: tuple[str, ...]) -> tuple[Notice, ...]:
+    notices = []
+    poor = [one for one in recordings if one.pareto_k > _POOR_K]
+    if poor:
+        worst = max(poor, key=lambda one: one.pareto_k)
+        text = (
+            f"The weights of {len(poor)} of {len(recordings)} recordings are poor (Pareto k up to "
+            f"{worst.pareto_k:.2f}, user {worst.user}): their likelihoods are far from Gaussian, "
+            "and what the population says of them is rough."
+        )
+        notices.append(Notice("warning", "population", text))
+    if len(users) < 4:
+        text = (
+            f"{len(users)} user(s) say little about how much people differ: the prior decides, and "
+            "the interval of a new person is wide; record at least six people."
+        )
+        notices.append(Notice("warning", "population", text))
+    return tuple(notices)
