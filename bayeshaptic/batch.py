@@ -6,20 +6,20 @@ carry to another process: it is called with plain picklable things, and hands ba
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.errors import InputError, describe
+from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.read import recording_name
-from bayeshaptic.report.index import Reported, write_index
+from bayeshaptic.report.reported import Reported
 
 if TYPE_CHECKING:
     from bayeshaptic.devices import Device
-    from bayeshaptic.models import Prior
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.closed import Closed
     from bayeshaptic.recordings.etfe import Etfe
     from bayeshaptic.recordings.recording import Recording
 
@@ -68,21 +68,26 @@ class Job:
     settings: Settings
 
 
-def report_source(job: Job, progress: Progress | None = None) -> tuple[Reported, ...]:
+def report_source(
+    job: Job, progress: Progress | None = None, workers: int = 1
+) -> tuple[Reported, ...]:
     """Report on a recording, a table of a frequency response, or a study.
 
-    Of a study, every recording has a report in a folder of its own and ``index.html`` lists them; a
-    recording that fails is listed with its error and does not stop the others.
+    Of a study, every recording has a report in a folder of its own, and ``report.html`` is that of
+    the device; a recording that fails is listed with its error and does not stop the others.
 
     Parameters
     ----------
     job : Job
     progress : callable, optional
         Called with the share done and a word about it.
+    workers : int
+        Processes for the recordings of a study.
 
     Returns
     -------
     tuple of Reported
+        Of a study the device's report is the last.
 
     Raises
     ------
@@ -91,7 +96,9 @@ def report_source(job: Job, progress: Progress | None = None) -> tuple[Reported,
     """
     refuse_file(job.folder)
     if job.source.suffix.lower() == ".toml":
-        return _report_study(job, progress)
+        from bayeshaptic.study_batch import report_study
+
+        return report_study(job, progress, workers)
     return (_report_recording(job, progress),)
 
 
@@ -156,35 +163,7 @@ def _report_recording(job: Job, progress: Progress | None) -> Reported:
     )
     if device is not None and isinstance(measurement, Recording):
         measurement = replace(measurement, device=device.name)
-    return _report(
-        measurement, recording_name(job.source), job.folder, settings, device, {}, None, progress
-    )
-
-
-def _report_study(job: Job, progress: Progress | None) -> tuple[Reported, ...]:
-    from bayeshaptic.devices import load_device
-    from bayeshaptic.models import prior_from_table
-    from bayeshaptic.recordings.study import read_study
-
-    settings = job.settings
-    _refuse_reading_options(job)
-    study = read_study(job.source)
-    device = study.device if settings.device is None else load_device(settings.device)
-    prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
-    names = _distinct([recording_name(entry.path) for entry in study.entries])
-    done: list[Reported] = []
-    for index, (name, entry) in enumerate(zip(names, study.entries, strict=True)):
-        part = _part(progress, index, len(names), name)
-        try:
-            folder = job.folder / name
-            measurement = study.read(entry)
-            held = entry.user is not None
-            done.append(_report(measurement, name, folder, settings, device, prior, held, part))
-        except Exception as error:
-            done.append(Reported(name, error=describe(error)))
-    if any(reported.page for reported in done):
-        write_index(study.name, done, job.folder)
-    return tuple(done)
+    return _report(measurement, recording_name(job.source), job.folder, settings, device, progress)
 
 
 def _report(
@@ -193,17 +172,11 @@ def _report(
     folder: Path,
     settings: Settings,
     device: Device | None,
-    prior: Mapping[str, Prior],
-    held: bool | None,
     progress: Progress | None,
 ) -> Reported:
     """Analyse one measurement and write its report."""
     from bayeshaptic.diagnosis.analysis import analyse
-    from bayeshaptic.diagnosis.closed import Closed, close_loop
-    from bayeshaptic.report import write_report
-    from bayeshaptic.report.headline import headline
-    from bayeshaptic.report.loop_words import in_short
-    from bayeshaptic.report.summary import analysis_of
+    from bayeshaptic.diagnosis.closed import close_loop
 
     options: dict[str, Any] = {
         "model": settings.model,
@@ -211,42 +184,32 @@ def _report(
         "delay_s": settings.delay_s,
         "delay_sd_s": settings.delay_sd_s,
         "band_hz": settings.band_hz,
-        "prior": prior,
-        "held": held,
+        "held": None,
         "seed": settings.seed,
         "progress": progress,
     }
     run = close_loop if settings.close_loop else analyse
-    result = run(measurement=measurement, **options)
+    return reported(name, run(measurement=measurement, **options), folder)
+
+
+def reported(name: str, result: Analysis | Closed, folder: Path) -> Reported:
+    """Write the report of one analysed measurement, and say what is in it.
+
+    Parameters
+    ----------
+    name : str
+    result : Analysis or Closed
+    folder : Path
+    """
+    from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.report import write_report
+    from bayeshaptic.report.headline import headline
+    from bayeshaptic.report.loop_words import in_short
+    from bayeshaptic.report.summary import analysis_of
+
     page = write_report(result, folder)
-    summary = json.loads((page.parent / "summary.json").read_text(encoding="utf-8"))
     warnings = tuple(
         notice.text for notice in analysis_of(result).notices if notice.level == "warning"
     )
     remark = in_short(result) if isinstance(result, Closed) else ""
-    return Reported(name, page, headline(result), remark, summary, warnings)
-
-
-def _refuse_reading_options(job: Job) -> None:
-    for option in ("columns", "period_s", "encoder_resolution"):
-        if getattr(job.settings, option) is not None:
-            raise InputError(
-                f"--{option.replace('_', '-')} is for a single recording; for a study write it in "
-                f"{job.source}, in the table [device]"
-            )
-
-
-def _distinct(names: list[str]) -> list[str]:
-    """The names, numbered where one comes more than once."""
-    return [
-        name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}"
-        for index, name in enumerate(names)
-    ]
-
-
-def _part(progress: Progress | None, index: int, count: int, name: str) -> Progress | None:
-    """The progress of one recording as that of the whole study."""
-    if progress is None:
-        return None
-    whole = progress
-    return lambda share, word: whole((index + share) / count, f"{name}: {word}")
+    return Reported(name, page, headline(result), remark, warnings)

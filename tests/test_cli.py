@@ -24,11 +24,12 @@ from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.simulate import parse_effect
 from bayeshaptic.commands.talk import Talk
 from bayeshaptic.devices import device_names
-from bayeshaptic.diagnosis import analysis, closed
+from bayeshaptic.diagnosis import analysis, closed, study_analysis
 from bayeshaptic.errors import InputError
 from bayeshaptic.report import summary_json
 from bayeshaptic.report.headline import Headline
-from bayeshaptic.report.index import Reported
+from bayeshaptic.report.limits_section import table_of
+from bayeshaptic.report.reported import Reported
 
 Run = Callable[..., tuple[int, str, str]]
 # The quickest analysis: two parameters, below the first mode.
@@ -71,6 +72,12 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         return folder / "report.html"
 
     monkeypatch.setattr(analysis, "analyse", partial(analysis.analyse, ess=50))
+    monkeypatch.setattr(
+        study_analysis, "analyse", lambda *a, **b: analysis.analyse(*a, **b | {"ess": 50})
+    )
+    monkeypatch.setattr(
+        "bayeshaptic.report.study_report.table_of", lambda cases: table_of(cases, draws=60)
+    )
     monkeypatch.setattr("bayeshaptic.report.write_report", write)
 
 
@@ -447,7 +454,9 @@ class TestReport:
         assert seen["measurement"].encoder_resolution == 1e-3
         assert seen["measurement"].device == "phantom" and seen["held"] is None
 
-    def test_study(self, run: Run, phantom: Path, tmp_path: Path) -> None:
+    @pytest.fixture
+    def three(self, phantom: Path, tmp_path: Path) -> Path:
+        """A study of which one recording is bad and two have the same name."""
         (tmp_path / "bad.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
         (tmp_path / "study.toml").write_text(
             f"""
@@ -464,18 +473,51 @@ class TestReport:
             file = "{phantom.as_posix()}"
             """
         )
-        status, out, err = run("report", "study.toml", "--no-loop")
+        return tmp_path / "study.toml"
+
+    def test_study(self, run: Run, three: Path, tmp_path: Path) -> None:
+        status, out, err = run("report", three, "--no-loop", "--workers", "1")
         folder = tmp_path / "study-report"
         assert status == 1
         assert "error: bad: " in only_line(err)
-        assert out.count("report: ") == 2 and f"all: {Path('study-report', 'index.html')}" in out
-        assert sorted(os.listdir(folder)) == ["index.html", "phantom-1", "phantom-2"]
+        assert out.count("report: ") == 3
+        assert out.splitlines()[-1] == f"  report: {Path('study-report', 'report.html').resolve()}"
+        assert {path.name for path in folder.iterdir() if path.is_dir()} == {
+            "phantom-1",
+            "phantom-2",
+        }
         summary = json.loads((folder / "phantom-1" / "summary.json").read_text())
         assert summary["recording"]["configuration"] == 0.25
         assert summary["model"]["name"] == "free"  # nobody is named: nobody held it
-        index = (folder / "index.html").read_text()
-        assert 'href="phantom-1/report.html"' in index and 'href="phantom-2/report.html"' in index
-        assert "bad failed" in index and "oops" in index
+        page = (folder / "report.html").read_text()
+        assert 'href="phantom-1/report.html"' in page and 'href="phantom-2/report.html"' in page
+        assert "bad failed" in page and "oops" in page
+        limits = json.loads((folder / "limits.json").read_text())
+        assert limits["device"] == "phantom" and limits["status"] == "caution"
+
+    def test_population_alone(self, run: Run, three: Path, tmp_path: Path) -> None:
+        status, out, err = run("population", three, "--no-loop", "--workers", "1", "-o", "out")
+        assert status == 1 and "error: bad: " in only_line(err)
+        assert out.splitlines()[-1] == f"  report: {tmp_path / 'out' / 'report.html'}"
+        names = {path.name for path in (tmp_path / "out").iterdir()}
+        assert {"report.html", "population.json"} <= names and "limits.json" not in names
+        assert not [path for path in (tmp_path / "out").iterdir() if path.is_dir()]
+        found = json.loads((tmp_path / "out" / "population.json").read_text())
+        assert found["population"] is None and found["device_limit"]["safe"]["0.05"] > 0
+
+    def test_a_study_of_nothing_usable_writes_nothing(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "bad.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
+        (tmp_path / "study.toml").write_text(
+            '[device]\nname = "phantom"\n[[recording]]\nfile = "bad.csv"\n'
+        )
+        for command in ("report", "population"):
+            status, out, err = run(command, "study.toml", "--workers", "1")
+            assert status == 1 and not out and "error: bad: " in only_line(err)
+        assert sorted(os.listdir(tmp_path)) == ["bad.csv", "study.toml"]
+
+    def test_a_population_needs_a_study(self, run: Run, phantom: Path) -> None:
+        status, _, err = run("population", phantom)
+        assert status == 2 and "a population needs a study (.toml)" in only_line(err)
 
     def test_reading_options_are_refused_for_a_study(self, run: Run, tmp_path: Path) -> None:
         (tmp_path / "study.toml").write_text("")
@@ -516,7 +558,7 @@ def test_what_is_said_of_each_recording(capsys: pytest.CaptureFixture[str]) -> N
     head = Headline("safe", "Render walls of at most 1 N/m.", ())
     warnings = ("one", "two", "three", "four", "five")
     done = [
-        Reported("a", Path("a.html"), head, "The model lacked a spring.", {}, warnings),
+        Reported("a", Path("a.html"), head, "The model lacked a spring.", warnings),
         Reported("b", error="b.csv: empty"),
         Reported("c", error="what is wrong"),
     ]

@@ -22,7 +22,7 @@ LAYERS = (
     ("inference", "stability"),
     ("diagnosis",),
     ("report",),
-    ("batch", "executors", "cli", "commands", "__main__"),
+    ("batch", "study_batch", "executors", "cli", "commands", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 TOP = LAYERS[-1]

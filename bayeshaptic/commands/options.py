@@ -124,6 +124,23 @@ def add_analysis_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """--workers, for the recordings of a study."""
+    parser.add_argument(
+        "--workers",
+        type=count,
+        metavar="N",
+        help="processes for the recordings of a study (default: one for each usable core)",
+    )
+
+
+def workers_from(arguments: argparse.Namespace) -> int:
+    """How many processes to use."""
+    from bayeshaptic.executors import usable_cores
+
+    return arguments.workers or usable_cores()
+
+
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """What `add_analysis_options` understood, as one thing."""
     from bayeshaptic.batch import Settings

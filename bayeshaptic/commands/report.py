@@ -5,7 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bayeshaptic.commands.options import add_analysis_options, add_quiet, settings_from
+from bayeshaptic.commands.options import (
+    add_analysis_options,
+    add_quiet,
+    add_workers,
+    settings_from,
+    workers_from,
+)
 
 NAME = "report"
 SUMMARY = "report how stiff a wall may be, from a recording or a study"
@@ -15,7 +21,10 @@ uncertainty of every parameter, and report the critical stiffness: how stiff a v
 before it goes unstable, and what is safe at 5, 1 and 0.1 per cent risk.
 
 The folder gets report.html (one page, works offline), summary.json, posterior.nc (ArviZ) and the
-figures as PNG. Of a study, every recording has a folder of its own, and index.html lists them."""
+figures as PNG. Of a study it gets one report of the device: its users side by side, a person not
+yet seen, configurations, the stiffness that is safe over all of them, population.json and
+limits.json; every recording has a report in a folder of its own, which the page links. A recording
+that fails is listed with its error; the exit status is then 1."""
 EXAMPLES = """\
   bayeshaptic report lhifam-user.csv.gz --device lhifam -o out/
   bayeshaptic report bench.mat --columns "time=t*1e-6,force=iq[A],position=theta[rad]" --model free
@@ -41,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder for the report, made if need be; an older report in it is replaced "
         "(default: ./NAME-report, NAME being the source's name without its endings)",
     )
+    add_workers(parser)
     add_analysis_options(parser)
     add_quiet(parser)
 
@@ -54,8 +64,5 @@ def run(arguments: argparse.Namespace) -> int:
     folder = arguments.output or Path(f"{recording_name(arguments.source)}-report")
     job = Job(arguments.source, folder, settings_from(arguments))
     with Talk(arguments.quiet) as talk:
-        done = report_source(job, talk.progress)
-        failed = talk.tell(done)
-        if len(done) > 1:
-            talk.say(f"all: {folder / 'index.html'}")
+        failed = talk.tell(report_source(job, talk.progress, workers_from(arguments)))
     return 1 if failed else 0

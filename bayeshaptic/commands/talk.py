@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bayeshaptic.report.index import Reported
+    from bayeshaptic.report.reported import Reported
 
 MOST_WARNINGS = 3
 

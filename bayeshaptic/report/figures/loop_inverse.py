@@ -31,12 +31,8 @@ def draw(closed: Closed) -> Figure:
 def _residual(axes: Axes, force: ForceExplained, force_unit: str, position_unit: str) -> None:
     first, further = force.first, force.further
     path = first.path
-    linear = sum(
-        first[term.name][0] * column
-        for term, column in zip(
-            first.terms[:3], (path.acceleration, path.velocity, 1.0), strict=True
-        )
-    )
+    mass, damping, constant = (first[term.name][0] for term in first.terms[:3])
+    linear = mass * path.acceleration + damping * path.velocity + constant
     row = scale(max(step.held_out_rms for step in further.steps), force_unit)
     every = max(len(path.velocity) // _MOST_DOTS, 1)
     for left, colour, marker, label in (

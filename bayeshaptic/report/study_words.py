@@ -1,0 +1,154 @@
+"""What a study says, in sentences."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bayeshaptic.report.limits import decibel
+from bayeshaptic.report.quantities import estimate, percent, pure
+from bayeshaptic.report.study_bands import band_of
+from bayeshaptic.stability.cases import FREE, HELD, NEW_PERSON
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.study_analysis import StudyAnalysis
+    from bayeshaptic.report.study_bands import band_of
+from bayeshaptic.stability.cases import Case
+
+_HARDLY_DB = 0.15  # a spread of K_CR between people that nobody needs to care about
+_LITTLE_DB = 0.5
+_AS_BAD_DB = 1.0
+Z90 = 3.29  # width of a normal 90 % interval in standard deviations
+
+
+def hands(study: StudyAnalysis) -> str:
+    """Free or held: which is worse, and by how much."""
+    free = [case for case in study.cases if case.group == FREE]
+    held = [case for case in study.cases if case.group in (HELD, NEW_PERSON)]
+    if not free or not held:
+        return ""
+    alone, in_hand = (_median_db(cases) for cases in (free, held))
+    step = in_hand - alone
+    if abs(step) < _AS_BAD_DB:
+        return (
+            f"A hand makes little difference: the median limit is {alone:.1f} dB without one and "
+            f"{in_hand:.1f} dB held."
+        )
+    if step > 0:
+        return (
+            f"A hand helps: the median limit is {alone:.1f} dB without one and {in_hand:.1f} dB "
+            f"held. A wall that is to be safe when the user lets go must be {step:.1f} dB softer."
+        )
+    return (
+        f"A hand makes it worse: the median limit is {alone:.1f} dB without one and "
+        f"{in_hand:.1f} dB held."
+    )
+
+
+def people(study: StudyAnalysis) -> tuple[str, ...]:
+    """How much people move the limit."""
+    if not study.new_person:
+        return ()
+    case = study.new_person[0]
+    spread = spread_db(case)
+    middle, low, high = case.limit.quantile([0.5, 0.05, 0.95])
+    seen = estimate(middle, low, high, case.limit.unit)
+    if spread < _HARDLY_DB:
+        first = (
+            "People hardly move the critical stiffness of this device: for a person not yet seen "
+            f"it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does not "
+            "matter for the limit, and more people would not narrow it."
+        )
+    else:
+        size = "a little, " if spread < _LITTLE_DB else ""
+        first = (
+            f"People move the critical stiffness of this device {size}by {pure(spread, 2)} dB "
+            f"(sd): for a person not yet seen it is {seen}."
+        )
+    branches = [c for c in case.limit.crossings if c.probability >= 0.01]
+    found = [first]
+    if len(branches) > 1:
+        named = listed([f"{c.label} ({percent(c.probability)})" for c in branches])
+        found.append(f"What limits it differs from person to person: {named}.")
+    apart = _between(study)
+    if apart:
+        found.append(apart)
+    return tuple(found)
+
+
+def _between(study: StudyAnalysis) -> str:
+    """The lowest and the highest of the people that were seen."""
+    if len(study.users) < 2:
+        return ""
+    order = sorted(study.users, key=lambda case: case.limit.quantile(0.5))
+    low, high = (decibel(case.limit.quantile(0.5)) for case in (order[0], order[-1]))
+    blur = float(np.median([spread_db(case) for case in study.users]))
+    same = (
+        " That is no more than what one recording leaves open, so that these people cannot be "
+        "told apart by it."
+        if high - low < 2 * blur
+        else ""
+    )
+    return (
+        f"Of those who were recorded, {order[0].label.removeprefix('user ')} has the lowest limit "
+        f"({low:.2f} dB) and {order[-1].label.removeprefix('user ')} the highest ({high:.2f} dB)."
+        f"{same}"
+    )
+
+
+def spread_db(case: Case) -> float:
+    """Standard deviation of a limit in dB, from its 90 % interval."""
+    low, high = (decibel(case.limit.quantile(p)) for p in (0.05, 0.95))
+    return (high - low) / Z90 if math.isfinite(low) and math.isfinite(high) else math.inf
+
+
+def missing(study: StudyAnalysis) -> tuple[str, ...]:
+    """What cannot be said of this device, because it was not recorded."""
+    entries = [one.entry for one in study.recordings if one.result is not None]
+    users = {entry.user for entry in entries if entry.user is not None}
+    places = {entry.configuration for entry in entries if entry.configuration is not None}
+    found = []
+    if not users:
+        found.append(
+            "Nobody holds the device in any recording: how people change the limit, for better or "
+            "worse, is unknown."
+        )
+    elif len(users) == 1:
+        found.append(
+            "One user only: how much people differ is the prior's guess, not this study's finding."
+        )
+    if entries and all(entry.user is not None for entry in entries):
+        found.append(
+            "No recording without a user: when the user lets go the limit may be far lower."
+        )
+    if len(places) < 2:
+        found.append("One configuration only: in others the limit may be different.")
+    return tuple(found)
+
+
+def _median_db(cases: list[Case]) -> float:
+    return min(decibel(case.limit.quantile(0.5)) for case in cases)
+
+
+def listed(parts: list[str]) -> str:
+    """ "a, b and c"."""
+    if len(parts) < 2:
+        return "".join(parts)
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def configurations(study: StudyAnalysis) -> tuple[str, ...]:
+    """Where along the coordinate the limit is lowest, free and held."""
+    found = []
+    for one in study.configurations:
+        band = band_of(one)
+        place = int(np.argmin(band.middle))
+        who = "Held" if one.held else "Free"
+        low, high = decibel(band.middle.min()), decibel(band.middle.max())
+        found.append(
+            f"{who}, the median limit goes from {low:.1f} to {high:.1f} dB; the worst "
+            f"configuration is near {pure(float(band.coordinates[place]))}."
+        )
+    return tuple(found)

@@ -1,0 +1,222 @@
+"""The report of a study: what it says of people, of configurations, and of what is missing."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import needs_browser, probe
+from fake_study import NAMES, SIX_DB, fake_study
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.report import study_report
+from bayeshaptic.report.figures.study import STUDY_PICTURES
+from bayeshaptic.report.limits_section import limits_section, table_of
+from bayeshaptic.report.population_json import population_summary
+from bayeshaptic.report.study_headline import study_headline
+from bayeshaptic.report.study_report import write_study_report
+from bayeshaptic.report.study_words import missing, people
+
+SHAPES: dict[str, dict[str, Any]] = {
+    "whole": {"people": 3, "free": 2, "places": (0.0, 1.0), "references": True, "failed": 1},
+    "nobody": {"people": 0, "free": 1},
+    "one user": {"people": 1, "free": 0},
+    "people alone": {"people": 2, "free": 0},
+    "nothing": {"people": 0, "free": 0, "failed": 1},
+    "alike": {"people": 2, "free": 1, "device": "lhifam", "spread": 0.002},
+}
+
+
+@cache
+def study(shape: str) -> Any:
+    return fake_study(**SHAPES[shape])
+
+
+@pytest.fixture(autouse=True)
+def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The walls of few draws: their own tests are elsewhere."""
+    monkeypatch.setattr(study_report, "table_of", lambda cases: table_of(cases, draws=60))
+
+
+def text_of(page: Path) -> str:
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", page.read_text(encoding="utf-8"))).split())
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a report with everything in it."""
+    folder = tmp_path_factory.mktemp("study")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study_report, "table_of", lambda cases: table_of(cases, draws=60))
+        page = folder / "anna" / "report.html"
+        write_study_report(study("whole"), folder, pages={"anna": page})
+    return folder
+
+
+def test_everything_is_written_and_the_page_needs_nothing_else(whole: Path) -> None:
+    names = {path.name for path in whole.iterdir()}
+    pictures = {f"{picture.name}.png" for picture in STUDY_PICTURES}
+    assert names == pictures | {
+        "report.html", "population.json", "limits.json", "limits.csv", "limits_curve.png",
+        "limits_kb.png",
+    }  # fmt: skip
+    page = (whole / "report.html").read_text(encoding="utf-8")
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert [s for s in sources if not s.startswith("data:")] == ["anna/report.html"]
+    assert "http" not in "".join(sources) and "<script" not in page
+    assert len(page) < 1_500_000
+
+
+def test_the_page_names_everybody_and_what_failed(whole: Path) -> None:
+    text = text_of(whole / "report.html")
+    for name in (*NAMES[:3], "free-0", "free-1", "a person not yet seen", "nobody holds it"):
+        assert name in text
+    assert "bad-0 failed." in text and "row 3 is 'oops'" in text
+    assert "Triangles: limits known from elsewhere" in text
+    for title in ("The limit of the device", "People", "Configurations", "Which walls are stable",
+                  "The population of hands", "What all of this assumes"):  # fmt: skip
+        assert title in text
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1100, 420])
+def test_the_page_is_laid_out_without_overlaps(whole: Path, tmp_path: Path, width: int) -> None:
+    found = probe(whole / "report.html", tmp_path, width)
+    assert found["overlaps"] == [] and found["width"] <= found["window"]
+    assert len(found["images"]) == 5 and all(natural > 0 for _, natural, _ in found["images"])
+    assert found["requests"] == []
+
+
+def test_population_json_is_the_contract(whole: Path) -> None:
+    found = json.loads((whole / "population.json").read_text(encoding="utf-8"))
+    assert found.keys() >= {
+        "device", "recordings", "users", "population", "correlation", "new_person",
+        "configurations", "device_limit",
+    }  # fmt: skip
+    assert [user["user"] for user in found["users"]] == list(NAMES[:3])
+    limit = found["new_person"]["critical_stiffness"]
+    assert limit.keys() >= {"unit", "q05", "q50", "q95", "db", "safe", "crossings"}
+    assert limit["q05"] < limit["q50"] < limit["q95"] and limit["unit"] == "N m/rad"
+    assert limit["db"]["q50"] == pytest.approx(40.8, abs=0.5)  # Table I
+    assert set(found["population"]) == {"mh", "bh", "kh", "bs", "ks"}
+    assert found["population"]["kh"]["log_sd"].keys() == {"q05", "q50", "q95"}
+    assert len(found["correlation"]) == 5 and found["correlation"][0][0] == pytest.approx(1.0)
+    assert {row["held"] for row in found["configurations"]} == {True, False}
+    assert found["device_limit"]["safe"].keys() == {"0.05", "0.01", "0.001"}
+    shares = [row["probability"] for row in found["device_limit"]["binding"]]
+    assert sum(shares) == pytest.approx(1.0)
+
+
+def test_what_a_study_lacks_is_null_and_not_absent() -> None:
+    found = population_summary(study("nobody"))
+    assert found["users"] == []
+    for key in ("population", "correlation", "new_person", "configurations"):
+        assert found[key] is None
+    assert found["device_limit"]["binding"][0]["case"] == "nobody holds it"
+
+
+def test_the_worst_case_decides_and_is_named() -> None:
+    head = study_headline(study("whole"))
+    safe = study("whole").limit.safe(0.05)
+    number = float(re.search(r"at most ([\d.]+) N m/rad", head.sentence)[1])  # type: ignore[index]
+    # Rounded down, by less than one part in a hundred.
+    assert 0.99 * safe < number <= safe
+    assert "these 3 people, a person not yet seen and every configuration" in head.sentence
+    assert head.details[0].startswith("What sets the limit: nobody holds it")
+    assert head.status == "caution"  # a recording failed
+
+
+def test_people_who_hardly_move_the_limit_are_said_to() -> None:
+    words = " ".join(people(study("alike")))
+    assert "People hardly move the critical stiffness of this device" in words
+    assert "cannot be told apart" in words
+    moved = " ".join(people(study("whole")))
+    assert "hardly" not in moved and "People move the critical stiffness" in moved
+
+
+@pytest.mark.parametrize(
+    ("shape", "parts"),
+    [
+        ("nobody", ["Nobody holds the device", "One configuration only"]),
+        ("one user", ["One user only", "No recording without a user", "One configuration only"]),
+        ("people alone", ["No recording without a user", "One configuration only"]),
+        ("whole", []),
+    ],
+)
+def test_what_is_missing_is_said(shape: str, parts: list[str], tmp_path: Path) -> None:
+    found = missing(study(shape))
+    assert len(found) == len(parts)
+    for sentence, part in zip(found, parts, strict=True):
+        assert sentence.startswith(part)
+    if parts:
+        text = text_of(write_study_report(study(shape), tmp_path, walls=False))
+        assert "What this study does not say" in text and parts[0] in text
+        assert not (tmp_path / "limits.json").exists()
+
+
+def test_a_study_without_a_usable_recording_has_no_limit(tmp_path: Path) -> None:
+    text = text_of(write_study_report(study("nothing"), tmp_path))
+    assert "There is no limit: no recording could be used." in text
+    assert json.loads((tmp_path / "population.json").read_text())["device_limit"] is None
+
+
+def test_an_untrusted_recording_makes_the_study_untrusted() -> None:
+    doubtful = fake_study(people=0, free=1, converged=False)
+    head = study_headline(doubtful)
+    assert head.status == "untrusted" and "1 of its 1 recordings supports" in head.sentence
+
+
+def test_warnings_stand_at_the_top() -> None:
+    warned = replace(study("nobody"), notices=(Notice("warning", "population", "Beware of it"),))
+    head = study_headline(warned)
+    assert head.status == "caution" and "Beware: Beware of it." in head.details
+
+
+def test_an_older_report_leaves_nothing_that_contradicts(whole: Path, tmp_path: Path) -> None:
+    for name in ("study_people.png", "limits.json", "index.html", "notes.txt"):
+        (tmp_path / name).write_text("old")
+    write_study_report(study("nobody"), tmp_path, walls=False)
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {"report.html", "population.json", "study_limit.png", "notes.txt"}
+
+
+def test_an_interrupted_run_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "report.html").write_text("old")
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study_report, "population_json", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write_study_report(study("nobody"), tmp_path, walls=False)
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+    assert (tmp_path / "report.html").read_text() == "old"
+
+
+def test_a_file_in_the_way_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(InputError, match="is a file"):
+        write_study_report(study("nobody"), tmp_path / "out")
+
+
+def test_references_are_drawn_where_they_are() -> None:
+    from bayeshaptic.report.figures import study_people
+
+    figure = study_people.draw(study("whole"))
+    (line,) = [line for line in figure.axes[0].lines if line.get_marker() == "v"]
+    assert sorted(line.get_xdata()) == pytest.approx(sorted(SIX_DB))
+    low, high = figure.axes[0].get_xlim()
+    assert low < min(SIX_DB) and high > max(SIX_DB)
+
+
+def test_the_section_of_walls_takes_all_cases() -> None:
+    table = table_of(study("nobody").cases, draws=60)
+    assert "Which walls are stable" in limits_section(table).html
