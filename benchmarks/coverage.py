@@ -73,12 +73,9 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--keep", help="file for the outcomes (pickle), to look at them closer")
     asked = parser.parse_args()
-    outcomes = calibrate(asked.recordings, asked.ess, asked.processes, asked.first, progress=True)
-    if asked.keep:
-        import pickle
-
-        with open(asked.keep, "wb") as file:
-            pickle.dump(outcomes, file)
+    outcomes = calibrate(
+        asked.recordings, asked.ess, asked.processes, asked.first, progress=True, keep=asked.keep
+    )
     print(
         "\ncase              rec  par.  covered    K_CR  ranks p  K_CR p   pull  width/bound"
         "        chi-square   effective/s"
@@ -90,7 +87,8 @@ def main() -> None:
     print("\n".join(by_parameter(outcomes)))
     dominated = np.mean(np.concatenate([o.dominated for o in outcomes]))
     print(f"\n{dominated:.1%} of the parameters have more prior than data and are left out.")
-    print(f"largest R-hat {max(o.rhat for o in outcomes):.4f}")
+    failed = [f"{o.case} {o.seed}" for o in outcomes if not o.converged]
+    print(f"not converged: {len(failed)} of {len(outcomes)} ({', '.join(failed) or 'none'})")
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bayeshaptic.models import Model
 
 Floats = NDArray[np.float64]
-_SUMS = ("mass", "damping", "stiffness")  # quantities whose sums the data know best
+_SUMS = ("mass", "damping")  # quantities whose sums the data know best
 _KNOWN = 0.8  # log standard deviation, of prior and data together, below which one is known
 
 
@@ -75,10 +75,14 @@ def coordinates(model: Model, linear: Collection[str] = ()) -> Coordinates:
 
 def sampling_coordinates(model: Model, theta: Floats, sd: Floats) -> Coordinates:
     """The coordinates to sample `model` in, after a fit with `theta` and `sd` of shape (P,)."""
+    sums: tuple[str, ...] = _SUMS
+    # The springs of a chain are in series; only one that an effect adds may stand beside another.
+    if any(p.dimension == "stiffness" for effect in model.effects for p in effect.parameters):
+        sums = (*_SUMS, "stiffness")
     known = set()
     for name, value, error in zip(model.names, theta, sd, strict=True):
         prior = model.prior(name)
-        if prior.coordinate == "log" and model.parameter(name).dimension in _SUMS:
+        if prior.coordinate == "log" and model.parameter(name).dimension in sums:
             believed = 0.5 * float(np.log(prior.quantile(0.84) / prior.quantile(0.16)))
             # A fit at a bound, where the error is nan, says nothing of where the peak is.
             if error > 0 and np.hypot(1 / believed, value / error) > 1 / _KNOWN:

@@ -25,6 +25,7 @@ _MOST_POINTS = 20_000  # that a proposal is fitted to
 _POINTS_A_COMPONENT = 2000
 _MOST_COMPONENTS = 6  # more follow the accidents of the draws
 _MISSED = 2.0  # log of density over proposal, above the median, from which a place is missed
+_TAILS = 3
 _TRIED = 1000
 
 
@@ -100,11 +101,12 @@ class Ensemble:
 
 
 def warmed_up(
-    density: LogDensity, adapted: Adapted, seed: np.random.SeedSequence
+    density: LogDensity, adapted: Adapted, seed: np.random.SeedSequence, peak: Floats | None = None
 ) -> list[Ensemble]:
     """Ensembles that have forgotten their starts, with one proposal, refitted and frozen.
 
-    Each begins at its own widened draws, so that R-hat between them can see a second mode.  After
+    Each begins at its own widened draws, so that R-hat between them can see a second mode; where
+    these miss the support, near `peak` (by default the heaviest point).  After
     each round of warm-up the proposal is fitted to where the walkers have been.  Rounds follow
     while the walkers, out of the sample that the proposal was fitted to, accept it too rarely,
     and that or their density still improves.
@@ -112,10 +114,12 @@ def warmed_up(
     seeds = seed.spawn(ENSEMBLES + 1)
     rng = np.random.default_rng(seeds[-1])
     size = adapted.points.shape[1]
+    if peak is None:
+        peak = adapted.points[int(np.argmax(adapted.weights))]
     proposal = Proposal(nothing_to_straighten(size), adapted.proposal)
     ensembles = []
     for own in seeds[:ENSEMBLES]:
-        start = _spread_start(density, adapted, np.random.default_rng(own))
+        start = _spread_start(density, adapted, peak, np.random.default_rng(own))
         ensembles.append(Ensemble(density, proposal, 0.6, start, _state(own)))
     before, level = 0.0, -np.inf
     for _ in range(_ROUNDS):
@@ -161,11 +165,14 @@ def _fitted(found: Floats, values: Floats, rng: np.random.Generator) -> Proposal
     mixture = fit_student_mixture(y, np.ones(len(y)), components, 10.0, rng)
     wide = student(y.mean(axis=0), 1.5 * np.cov(y.T), 5.0)
     mixture = mixture.with_component(wide, 0.1)
-    excess = values - mixture.log_density(y)
-    missed = y[excess > np.median(excess) + _MISSED]
-    if len(missed) > 4 * y.shape[1]:
+    _, once = np.unique(values, return_index=True)  # a walker that stays is found many times
+    for _ in range(_TAILS):
+        excess = values[once] - mixture.log_density(y[once])
+        missed = y[once][excess > np.median(excess) + _MISSED]
+        if len(missed) <= 4 * y.shape[1]:
+            break
         there = student(missed.mean(axis=0), 1.2 * np.cov(missed.T), 5.0)
-        mixture = mixture.with_component(there, 0.1)
+        mixture = mixture.with_component(there, 0.08)
     return Proposal(straightening, mixture)
 
 
@@ -185,17 +192,21 @@ def _acceptance(
     return float(np.mean(np.exp(np.minimum(gain, 0.0))))
 
 
-def _spread_start(density: LogDensity, adapted: Adapted, rng: np.random.Generator) -> Floats:
-    """Walkers where the density is positive: from the proposal, which is wider than the target."""
-    start = np.empty((0, adapted.points.shape[1]))
-    for _ in range(50):
-        drawn = adapted.proposal.sample(rng, 4 * WALKERS)
+def _spread_start(
+    density: LogDensity, adapted: Adapted, peak: Floats, rng: np.random.Generator
+) -> Floats:
+    """Walkers where the density is positive: from the proposal, which is wider than the target.
+
+    Where the proposal all but misses the support, nearer and nearer to the peak.
+    """
+    start = np.empty((0, len(peak)))
+    for attempt in range(200):
+        shrink = 0.8 ** max(attempt - 20, 0)
+        drawn = peak + shrink * (adapted.proposal.sample(rng, 4 * WALKERS) - peak)
         start = np.concatenate([start, drawn[np.isfinite(density(drawn))]])
         if len(start) >= WALKERS:
-            return start[:WALKERS]
-    # The proposal all but misses the support: fall back on the best points that are known.
-    best = np.argsort(-adapted.weights)[: WALKERS - len(start)]
-    return np.concatenate([start, adapted.points[best]])
+            break
+    return start[:WALKERS]
 
 
 def _state(seed: np.random.SeedSequence) -> Any:

@@ -46,7 +46,10 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
 
     block = covariance[np.ix_(leaning, leaning)]
     mean, spread = _truncated_moments(peak[leaning], block, here.low[leaning])
-    inside = peak.copy()
+    # Along the ridge: across it, the others would not find their way back.
+    along = np.linalg.solve(block, mean - peak[leaning])
+    inside = peak + covariance[:, leaning] @ along
+    inside = np.where(here.walls, np.maximum(inside, here.low), inside)
     inside[leaning] = mean
     inside = _climb(density, inside, ~leaning, widths)
     curvature = -_hessian(density, inside, widths)

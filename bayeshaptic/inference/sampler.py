@@ -94,11 +94,11 @@ def sample(
     density = Density(fit.likelihood, here)
     seeds = np.random.SeedSequence(seed)
     tune, run, refit = seeds.spawn(3)
-    _, proposal = laplace(density, here.coordinate(fit.theta))
+    peak, proposal = laplace(density, here.coordinate(fit.theta))
     report(0.1, "adapting the proposal")
     adapted = adapt(density, proposal, np.random.default_rng(tune))
     report(0.2, "warming up")
-    ensembles = warmed_up(density, adapted, run)
+    ensembles = warmed_up(density, adapted, run, peak)
     more = until or (lambda natural: natural.shape[1])
     chains, found = _run(
         ensembles,
@@ -163,7 +163,8 @@ def _run(
         # Effective draws grow with the steps: go as far as that promises, and a little further.
         wanted = 1.05 * steps * ess / max(diagnostics.ess, 1.0)
         slow = diagnostics.ess < _MIXED * joined[..., 0].size and wanted > _PATIENCE * steps
-        if (slow or diagnostics.rhat.max() > RHAT_LIMIT) and refits < _REFITS:
+        again = refits < _REFITS and 4 * more <= most_steps - gone
+        if (slow or diagnostics.rhat.max() > RHAT_LIMIT) and again:
             ensembles = refitted(ensembles, joined, np.concatenate(densities, axis=1), rng)
             more, steps, refits = 2 * more, 0, refits + 1
             chains.clear()
