@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     )
     from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
     from bayeshaptic.report import write_report
+    from bayeshaptic.report.study_report import write_study_report
     from bayeshaptic.stability import (
         Backward,
         CriticalStiffness,
@@ -96,6 +97,7 @@ _HOMES = {
     ),
     "bayeshaptic.recordings.etfe": ("Etfe", "estimate_etfe"),
     "bayeshaptic.report": ("write_report",),
+    "bayeshaptic.report.study_report": ("write_study_report",),
     "bayeshaptic.stability": (
         "Backward",
         "CriticalStiffness",
@@ -156,6 +158,7 @@ __all__ = [
     "rigid",
     "sample",
     "write_report",
+    "write_study_report",
 ]
 
 

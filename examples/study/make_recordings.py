@@ -1,7 +1,8 @@
 """Make the recordings of the example study: python examples/study/make_recordings.py
 
-They come from the virtual bench: a PHANToM as in Table I of Diaz and Gil (2010), alone and in the hands of six people, with its arm
-more or less stretched out. `--table` prints the truth, which README.md holds.
+They come from the virtual bench: a PHANToM as in Table I of Diaz and Gil (2010), alone and in the
+hands of six people, with its arm more or less stretched out. `--table` prints the truth, which
+README.md holds.
 """
 
 from __future__ import annotations
