@@ -192,7 +192,7 @@ def _fit(model: Model, etfe: Etfe, posterior: Any, misfit: float) -> Fit:
         outcome,
         float(misfit**2 if misfit > 1 else 1.02),
         4006.0,
-        None,
+        etfe.spectra.windows(),
         etfe.frequency_hz,
         (etfe.value - fitted) / np.sqrt(etfe.variance),
     )

@@ -31,7 +31,7 @@ from bayeshaptic.report.quantities import estimate, interval, percent, quantity,
 from bayeshaptic.report.tables import parameters, safe
 from bayeshaptic.report.words import agreement, hump, misfit
 
-WALLS = ("limits_curve", "limits_kb")
+WALLS = ("limits_curve", "limits_kb", "guidance_shares", "guidance_sweeps")
 NAMES = (*(picture.name for picture in PICTURES), *WALLS)
 TABLES = {"summary.json", "limits.json", "limits.csv"}
 FILES = {"report.html", "posterior.nc", *TABLES, *(f"{name}.png" for name in NAMES)}

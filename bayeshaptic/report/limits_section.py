@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bayeshaptic.report.figures import limits_curve, limits_kb
 from bayeshaptic.report.limit_rules import rules_of
 from bayeshaptic.report.limits_words import rule_rows, width_rows, words
@@ -17,7 +19,7 @@ from bayeshaptic.stability.limit_table import LimitTable, limit_table
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
-DRAWS = 3000
+DRAWS = 2400
 _SLOW_DRAWS = 600  # of a model without a finite set of poles
 _FRICTION = "friction_force"
 
@@ -68,9 +70,9 @@ def case_of(result: Any) -> Case:
     held = analysis.model.name == "grasped"
     user = None if analysis.recording is None else analysis.recording.user
     label = f"held by {user}" if user else "held" if held else "nobody holds it"
-    return Case(
-        label, HELD if held else FREE, analysis.model, analysis.posterior.draws, analysis.limit
-    )
+    chains = np.swapaxes(analysis.posterior.chains, 1, 2)  # the order of the limit's samples
+    draws = chains.reshape(-1, chains.shape[-1])
+    return Case(label, HELD if held else FREE, analysis.model, draws, analysis.limit)
 
 
 def friction_of(result: Any) -> float | None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, draw_pictures
+from bayeshaptic.report.guidance_section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.html import render
 from bayeshaptic.report.limits_section import (
@@ -21,11 +22,13 @@ from bayeshaptic.report.limits_section import (
 )
 from bayeshaptic.report.section import Section
 from bayeshaptic.report.summary import analysis_of, summary_json
+from bayeshaptic.threads import single_threaded
 
 # Whoever waits for a report looks for its summary: it arrives when the rest is there.
 _LAST = "summary.json"
 
 
+@single_threaded
 def write_report(result: Any, out_dir: str | Path) -> Path:
     """Write report.html, summary.json, limits.json and .csv, posterior.nc and the figures.
 
@@ -80,12 +83,14 @@ def _sections(result: Any, folder: Path) -> tuple[Section, ...]:
     """The sections about stable walls, with their table in `folder`."""
     analysis = analysis_of(result)
     status = headline(result).status
-    table = table_of([case_of(result)])
+    case = case_of(result)
+    table = table_of([case])
     table.write(folder, None if analysis.device is None else analysis.device.name, status)
     walls = limits_section(
         table, friction_of(result), resolution_of(analysis), status == "untrusted"
     )
-    return (walls,)
+    advice = guidance_section(case, analysis)
+    return (walls,) if advice is None else (walls, advice)
 
 
 def _move(draft: Path, out: Path) -> None:

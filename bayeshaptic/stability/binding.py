@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
 RIGID, AGAINST_HAND, MODE, NYQUIST, NEVER, NONE = range(6)
-_TITLES = {
+TITLES = {
     RIGID: "rigid body",
     AGAINST_HAND: "device against the hand",
     MODE: "vibration mode",
@@ -101,7 +101,7 @@ def group_crossings(kinds: Ints, frequency_hz: Floats) -> tuple[tuple[BindingCro
             has_frequency = kind not in (NEVER, NONE)
             place = f" at {median:.3g} Hz" if has_frequency else ""
             crossing = BindingCrossing(
-                _TITLES[int(kind)] + place,
+                TITLES[int(kind)] + place,
                 median if has_frequency else None,
                 len(part) / len(kinds),
             )

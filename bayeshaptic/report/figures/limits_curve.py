@@ -83,10 +83,12 @@ def _steps(samples: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 
 def _reach(left: Axes, right: Axes, curves: list[NDArray[Any]], factor: float) -> None:
     """From where the first curve leaves the risk of 0.05 % to where the last one has ended."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
     ends = np.array([np.quantile(_finite(samples), (0.0005, 0.5, 0.9995)) for samples in curves])
     low, high = ends[:, 0].min() * factor, ends[0, 2] * factor
+    for axes in (left, right):
+        axes.xaxis.set_major_locator(MaxNLocator(5))
     margin = 0.06 * (high - low) or 0.01 * high or 1.0
     right.set_xlim(max(low - margin, 0.0), max(ends[0, 1] * factor, low) + margin)
     high = ends[:, 2].max() * factor
