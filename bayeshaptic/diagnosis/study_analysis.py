@@ -10,9 +10,9 @@ from typing import Any
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analysis import REPORT_ESS, Analysis, analyse
 from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits
 from bayeshaptic.diagnosis.study_cases import StudyCases, study_cases
 from bayeshaptic.errors import Notice, describe
-from bayeshaptic.inference.configurations import Configurations
 from bayeshaptic.inference.population import Population
 from bayeshaptic.models import Prior, prior_from_table
 from bayeshaptic.recordings.read import recording_name
@@ -78,7 +78,7 @@ class StudyAnalysis:
         single one without configurations; empty without a population.
     users : tuple of Case
         K_CR of each user, shrunken towards the population.
-    configurations : tuple of Configurations
+    configurations : tuple of ConfigurationLimits
         Over a numeric coordinate, free and held; empty without one.
     cases : tuple of Case
         Everything that the device must stay stable in, the above included.
@@ -95,7 +95,7 @@ class StudyAnalysis:
     population: Population | None
     new_person: tuple[Case, ...]
     users: tuple[Case, ...]
-    configurations: tuple[Configurations, ...]
+    configurations: tuple[ConfigurationLimits, ...]
     cases: tuple[Case, ...]
     limit: DeviceLimit | None
     notices: tuple[Notice, ...]

@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from bayeshaptic.errors import Notice
-from bayeshaptic.inference.configurations import Configurations
-from bayeshaptic.inference.population import Population
-from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
+import numpy as np
+
+from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits, configuration_limits
+from bayeshaptic.diagnosis.recorded_cases import (
+    Widening,
+    place_of,
+    posterior,
+    recorded,
+    signature,
+    widening,
+)
+from bayeshaptic.errors import Notice, describe
+from bayeshaptic.inference.configurations import FEWEST
+from bayeshaptic.inference.population import Population, infer_population
+from bayeshaptic.stability.cases import FREE, HELD, NEW_PERSON, Case, DeviceLimit, device_limit
+from bayeshaptic.stability.critical import critical_stiffness
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.study_analysis import Analysed
 
 Progress = Callable[[float, str], None]
+
+_PEOPLE = 20  # that are drawn from each draw of the population
 
 
 @dataclass(frozen=True)
@@ -21,30 +41,165 @@ class StudyCases:
     population: Population | None
     new_person: tuple[Case, ...]
     users: tuple[Case, ...]
-    configurations: tuple[Configurations, ...]
+    configurations: tuple[ConfigurationLimits, ...]
     cases: tuple[Case, ...]
     limit: DeviceLimit | None
     notices: tuple[Notice, ...]
     seconds: Mapping[str, float]
 
 
-def study_cases(recordings: Sequence[Any], seed: int, report: Progress) -> StudyCases:
-    """Population, configurations, cases and limit from the analysed recordings of a study."""
-    cases = []
-    for one in recordings:
-        analysis = one.analysis
-        if analysis is None:
-            continue
-        held = one.entry.user is not None
-        label = f"user {one.entry.user}" if held else "nobody holds it"
-        cases.append(
-            Case(
-                label,
-                "held" if held else "free",
-                analysis.model,
-                analysis.posterior.draws,
-                analysis.limit,
+@dataclass
+class _Notes:
+    """What is to be said, and how long each stage took."""
+
+    notices: list[Notice] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """A stage that may fail without stopping the study."""
+        began = time.perf_counter()
+        try:
+            yield
+        except Exception as error:
+            self.notices.append(Notice("warning", name, f"No {name}: {describe(error)}"))
+        self.seconds[name] = time.perf_counter() - began
+
+
+def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> StudyCases:
+    """Population, configurations, cases and limit from the analysed recordings of a study.
+
+    Parameters
+    ----------
+    recordings : sequence of Analysed
+        Those that failed are left aside.
+    seed : int
+    report : callable
+        Called with the share done and a word about it.
+    """
+    good = [one for one in recordings if one.analysis is not None]
+    held = [one for one in good if one.entry.user is not None]
+    notes = _Notes()
+    population: Population | None = None
+    new_person: tuple[Case, ...] = ()
+    users: tuple[Case, ...] = ()
+    like, odd = _alike(held)
+    notes.notices += _odd_notice(odd, like)
+    if like:
+        with notes.stage("population"):
+            population = infer_population(
+                [posterior(one) for one in like],
+                [str(one.entry.user) for one in like],
+                [one.entry.configuration for one in like],
+                seed,
+                lambda share, word: report(0.5 * share, word),
             )
-        )
+            notes.notices += population.notices
+            report(0.5, "critical stiffness of people")
+            wider = widening(like)
+            new_person = _new_person(population, wider, seed)
+            users = _users(population, like, seed)
+    ways = []
+    for number, (some, is_held) in enumerate(((_free(good), False), (like, True))):
+        with notes.stage(f"configurations ({'held' if is_held else 'free'})"):
+            way = _along(some, is_held, seed, report, 0.6 + 0.2 * number)
+            ways += [way] if way else []
+            notes.notices += way.inferred.notices if way else ()
+    own = [one for one in held if population is None or one in odd]
+    free = [one for one in _free(good) if not (ways and not ways[0].held and _numbered(one))]
+    cases = (
+        *recorded(free, FREE),
+        *users,
+        *recorded(own, HELD),
+        *new_person,
+        *(case for way in ways for case in way.cases),
+    )
     limit = device_limit(cases, seed) if cases else None
-    return StudyCases(None, (), (), (), tuple(cases), limit, (), {})
+    return StudyCases(
+        population,
+        new_person,
+        users,
+        tuple(ways),
+        cases,
+        limit,
+        tuple(notes.notices),
+        notes.seconds,
+    )
+
+
+def _free(good: Sequence[Analysed]) -> list[Analysed]:
+    return [one for one in good if one.entry.user is None]
+
+
+def _numbered(one: Analysed) -> bool:
+    """Is its configuration a coordinate?"""
+    return isinstance(one.entry.configuration, int | float)
+
+
+def _alike(some: Sequence[Analysed]) -> tuple[list[Analysed], list[Analysed]]:
+    """The recordings with the most common model and effects, and the others."""
+    counts = Counter(signature(one) for one in some)
+    if not counts:
+        return [], []
+    common = counts.most_common(1)[0][0]
+    like = [one for one in some if signature(one) == common]
+    return like, [one for one in some if signature(one) != common]
+
+
+def _odd_notice(odd: Sequence[Analysed], like: Sequence[Analysed]) -> list[Notice]:
+    if not odd:
+        return []
+    common = ", ".join(like[0].effects) or "no effect"
+    others = "; ".join(f"{one.name} ({', '.join(one.effects) or 'no effect'})" for one in odd)
+    text = (
+        f"The population is that of the {len(like)} recordings with the same model and {common}. "
+        f"Left out, and cases of their own: {others}."
+    )
+    return [Notice("warning", "population", text)]
+
+
+def _new_person(population: Population, wider: Widening, seed: int) -> tuple[Case, ...]:
+    """People not yet seen, in every configuration that people were measured in."""
+    cases = []
+    for number, place in enumerate(population.places):
+        rng = np.random.default_rng(np.random.SeedSequence([seed, number, 1]))
+        draws = population.new_person(rng, _PEOPLE, number)
+        # People from one draw of the population are not independent: each draw is a chain.
+        limit = critical_stiffness(population.model, draws)
+        limit = wider.apply(replace(limit, chains=len(population.log_mean)), rng)
+        label = "a new person" + place_of(place)
+        cases.append(Case(label, NEW_PERSON, population.model, draws, limit))
+    return tuple(cases)
+
+
+def _users(population: Population, like: Sequence[Analysed], seed: int) -> tuple[Case, ...]:
+    """Every user's limit given all recordings, one case a configuration."""
+    found: dict[str, list[int]] = {}
+    for number, one in enumerate(like):
+        label = f"user {one.entry.user}" + place_of(one.entry.configuration)
+        found.setdefault(label, []).append(number)
+    cases = []
+    for label, own in found.items():
+        rng = np.random.default_rng(np.random.SeedSequence([seed, own[0], 2]))
+        draws = np.concatenate([population.recordings[number].draws for number in own])
+        wider = widening([like[number] for number in own])
+        limit = wider.apply(critical_stiffness(population.model, draws), rng)
+        cases.append(Case(label, HELD, population.model, draws, limit))
+    return tuple(cases)
+
+
+def _along(
+    some: Sequence[Analysed], held: bool, seed: int, report: Progress, begin: float
+) -> ConfigurationLimits | None:
+    """K_CR over a numeric coordinate; None where there are too few of them."""
+    like, _ = _alike([one for one in some if _numbered(one)])
+    where = [float(one.entry.configuration or 0.0) for one in like]
+    if len(set(where)) < FEWEST:
+        return None
+    return configuration_limits(
+        [posterior(one) for one in like],
+        where,
+        held,
+        seed,
+        lambda share, word: report(begin + 0.2 * share, word),
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.hierarchy import Hierarchy
+from bayeshaptic.inference.hierarchy import Hierarchy, inverse
 from bayeshaptic.inference.hyperparameters import Hyperparameters
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ def _draw(
     given = hierarchy.given(phi)
     order = np.concatenate([hierarchy.hand, *[hierarchy.device] * (int(hierarchy.place.max()) + 1)])
     low = (walls - hierarchy.prior_mean)[order]
-    beta = _walled(given.beta, np.linalg.inv(given.precision), low, rng)
+    beta = _walled(given.beta, inverse(given.precision), low, rng)
     people = given.draw_people(beta, rng)
     x = np.einsum("rip,bp->bri", hierarchy.design, beta)
     x[:, :, hierarchy.hand] += people[:, hierarchy.user]
@@ -85,7 +85,7 @@ def _walled(mean: Floats, covariance: Floats, low: Floats, rng: np.random.Genera
     if walled.size == 0 or np.all(draw[:, walled] >= low[walled]):
         return draw
     own = covariance[:, walled][:, :, walled]
-    precision = np.linalg.inv(own)
+    precision = inverse(own)
     inside = np.maximum(draw[:, walled], low[walled])
     for _ in range(_SWEEPS):
         for i in range(len(walled)):

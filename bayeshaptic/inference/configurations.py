@@ -1,27 +1,145 @@
-"""Configurations of a device: its parameters along a coordinate."""
+"""A device along a configuration coordinate: the carriage's position, an arm's angle."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.coordinates import Coordinates
+from bayeshaptic.inference.gaussian_likelihood import gaussian_likelihood
+from bayeshaptic.inference.path import Path
+from bayeshaptic.inference.population import common_model, prior_moments, study_coordinates
+from bayeshaptic.inference.population_sampler import LevelChains, sample_level
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.reweighting import inside
+from bayeshaptic.inference.settling import settled
+from bayeshaptic.models import Model
+from bayeshaptic.models.structures import HAND
+from bayeshaptic.threads import single_threaded
+
 Floats = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+FEWEST = 3  # configurations from which one is predicted between them
+_FIRST_STEPS = 60
+_BATCH, _ATTEMPTS = 500, 60
 
 
 @dataclass(frozen=True)
 class Configurations:
-    """K_CR along a configuration coordinate.
+    """Posterior of a device's parameters along a coordinate.
 
     Attributes
     ----------
-    held : bool
-    coordinates : ndarray, shape (C,)
-        Where K_CR is predicted, the measured ones among them.
-    measured : tuple of float
+    measured : ndarray, shape (C,)
+        Coordinates that were measured, in order, each once.
+    model : Model
+    chains : LevelChains
+        Of the amplitudes, the scatters and the length.
+    notices : tuple of Notice
     """
 
-    held: bool
-    coordinates: Floats = field(repr=False)
-    measured: tuple[float, ...]
+    measured: Floats
+    model: Model = field(repr=False)
+    chains: LevelChains = field(repr=False)
+    notices: tuple[Notice, ...] = ()
+    _path: Path | None = field(default=None, repr=False)
+    _here: Coordinates | None = field(default=None, repr=False)
+
+    def grid(self, points: int) -> Floats:
+        """At least `points` coordinates between the outermost measured ones, these among them."""
+        even = np.linspace(self.measured[0], self.measured[-1], points)
+        gap = np.ptp(self.measured) / (points - 1)
+        near = np.abs(even[:, None] - self.measured).min(axis=1) < 0.4 * gap
+        return np.sort(np.concatenate([even[~near], self.measured]))
+
+    def predict(self, coordinate: Floats, rng: np.random.Generator, count: int) -> Floats:
+        """Parameters along `coordinate` (G,), `count` joint draws of them: (count, G, P).
+
+        Natural values in the order of `model.names`.
+        """
+        assert self._path is not None and self._here is not None
+        low = np.where(self._here.log, -np.inf, self._here.low)
+        found = np.empty((0, len(coordinate), self.model.size))
+        for attempt in range(_ATTEMPTS):
+            phi = self.chains.thinned(_BATCH, rng)
+            x = self._path.draw(phi, coordinate, rng)
+            # Paths on which no damper is negative; if there are hardly any, those mirrored at zero.
+            good = x[np.all(x >= low, axis=(1, 2))]
+            last = attempt == _ATTEMPTS - 1
+            found = np.concatenate([found, np.resize(x, (count, *x.shape[1:])) if last else good])
+            if len(found) >= count:
+                break
+        flat = inside(found[:count].reshape(-1, self.model.size), self._here)
+        return self._here.natural(flat).reshape(count, len(coordinate), -1)
+
+
+@single_threaded
+def infer_configurations(
+    posteriors: Sequence[Posterior],
+    coordinate: Sequence[float],
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Configurations:
+    """Infer how the parameters change along a configuration coordinate.
+
+    Parameters
+    ----------
+    posteriors : sequence of Posterior
+        One a recording, of models with the same parameters.
+    coordinate : sequence of float
+        Of each recording.
+    seed : int
+    progress : callable, optional
+        Called with the share done and a word about it.
+
+    Returns
+    -------
+    Configurations
+
+    Raises
+    ------
+    InputError
+        With fewer than three different configurations, or different models.
+    """
+    report = progress or (lambda share, word: None)
+    measured = np.unique(np.asarray(coordinate, float))
+    if len(coordinate) != len(posteriors):
+        raise InputError(
+            f"{len(posteriors)} posteriors, but {len(coordinate)} configurations: give one each."
+        )
+    if len(measured) < FEWEST:
+        raise InputError(
+            f"{len(measured)} different configurations cannot say how the device changes between "
+            f"them; record at least {FEWEST}."
+        )
+    model = common_model(posteriors)
+    here = study_coordinates(model)
+    mean, sd = prior_moments(model, here)
+    path = Path(
+        tuple(gaussian_likelihood(one, here) for one in posteriors),
+        np.asarray(coordinate, float),
+        np.isin(model.names, HAND),
+        mean,
+        sd,
+    )
+    tune, run, rest = np.random.SeedSequence(seed).spawn(3)
+    report(0.0, "configurations: first look")
+    path = settled(path, posteriors, here, path.guess()[0])
+    chains = sample_level(path, tune, steps=_FIRST_STEPS)
+    report(0.5, "configurations: sampling")
+    middle = np.median(chains.thinned(1000, np.random.default_rng(rest)), axis=0)
+    path = settled(path, posteriors, here, middle)
+    chains = sample_level(path, run, chains)
+    notices = chains.notices
+    if len(measured) < 5:
+        text = (
+            f"{len(measured)} configurations say little about what is between them: how fast the "
+            "device changes is half belief."
+        )
+        notices = (*notices, Notice("note", "configurations", text))
+    return Configurations(measured, model, chains.resting(), notices, path, here)

@@ -26,6 +26,7 @@ from bayeshaptic.inference.hyperparameters import Hyperparameters, Layout
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
+_SCATTER = (0.05, 1.0)  # of hands, that a first guess stays within
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,11 @@ class Hierarchy:
         """Which recordings are whose, shape (U, R)."""
         return np.equal.outer(np.arange(int(self.user.max()) + 1), self.user).astype(float)
 
+    def guess(self) -> tuple[Floats, Floats]:
+        """Middle and width of phi by the scatter of the recordings' own estimates."""
+        seen = self.mean[:, self.hand].std(axis=0)
+        return self.layout.guess(np.clip(seen, *_SCATTER))
+
     def spread(self, level: Hyperparameters) -> Floats:
         """Diagonal of T, shape (B, D)."""
         spread = np.empty((len(level.trial_sd), len(self.prior_mean)))
@@ -111,7 +117,7 @@ class Hierarchy:
         return value
 
     def expected(self, phi: Floats) -> Floats:
-        """Mean of every recording's coordinates given one vector phi of shape (Q,); shape (R, D)."""
+        """Mean of every recording's coordinates given one vector phi, shape (R, D)."""
         given = self.given(phi[None])
         own = (given.own_covariance @ given.own_score[..., None])[..., 0]
         people = own[0] - given.gain[0] @ given.beta[0]
@@ -126,7 +132,7 @@ class Hierarchy:
         spread = self.spread(level)
         marginal = self.covariance + spread[:, None, :, None] * np.eye(spread.shape[1])
         root = np.linalg.cholesky(marginal)
-        weight = np.linalg.inv(marginal)  # (B, R, D, D)
+        weight = inverse(marginal)  # (B, R, D, D)
         log_det = 2 * np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=(1, 2))
         pull = (weight @ self.mean[:, :, None])[..., 0]
         seen = weight @ self.design  # (B, R, D, q)
@@ -139,14 +145,14 @@ class Hierarchy:
         own = self._by_user(weight[:, :, self.hand][..., self.hand]) + level.precision[:, None]
         own_score = self._by_user(pull[..., self.hand])
         own_seen = self._by_user(seen[:, :, self.hand])
-        own_covariance = np.linalg.inv(own)
+        own_covariance = inverse(own)
         gain = own_covariance @ own_seen
         gains = gain.reshape(count, people * hand, -1).transpose(0, 2, 1)
         precision -= gains @ own_seen.reshape(count, people * hand, -1)
         score -= (gains @ own_score.reshape(count, -1, 1))[..., 0]
         chi -= np.sum(own_score * (own_covariance @ own_score[..., None])[..., 0], axis=(1, 2))
         precision += np.diag(1 / self.beta_sd**2)
-        beta = np.linalg.solve(precision, score[..., None])[..., 0]
+        beta = np.asarray(np.linalg.solve(precision, score[..., None])[..., 0], np.float64)
         root_diagonal = np.diagonal(level.correlation_root, axis1=1, axis2=2) * level.hand_sd
         log_det += 2 * people * np.log(root_diagonal).sum(axis=1)
         log_det += np.linalg.slogdet(own)[1].sum(axis=1) + np.linalg.slogdet(precision)[1]
@@ -188,3 +194,8 @@ class Given:
         mean -= np.einsum("buiq,bq->bui", self.gain, beta)
         root = np.linalg.cholesky(self.own_covariance)
         return mean + np.einsum("buij,buj->bui", root, rng.standard_normal(mean.shape))
+
+
+def inverse(matrices: Floats) -> Floats:
+    """Inverses of matrices of shape (..., n, n)."""
+    return np.asarray(np.linalg.inv(matrices), np.float64)

@@ -101,7 +101,8 @@ class Layout:
     def guess(self, hand_sd: Floats) -> tuple[Floats, Floats]:
         """A middle and a width of every entry of phi to begin with, where people differ so."""
         ends = [self.hand, self.pairs, self.device, int(self.trials)]
-        middle = [np.log(hand_sd), np.zeros(self.pairs), np.full(self.device, -6.5), [-3.5]]
+        ones = [np.zeros(self.pairs), np.full(self.device, -6.5), np.full(1, -3.5)]
+        middle: list[Floats] = [np.log(hand_sd), *ones]
         width = [0.3, 0.35, 1.2, 0.8]
         return (
             np.concatenate([m[:count] for m, count in zip(middle, ends, strict=True)]),

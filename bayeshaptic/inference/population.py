@@ -14,7 +14,7 @@ from bayeshaptic.inference.below import Below, draw_below
 from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.hierarchy import Hierarchy
-from bayeshaptic.inference.population_sampler import LevelChains, first_guess, sample_level
+from bayeshaptic.inference.population_sampler import LevelChains, sample_level
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.reweighting import Reweighted, inside, reweight
 from bayeshaptic.inference.settling import settled
@@ -152,19 +152,22 @@ def infer_population(
 
     Notes
     -----
-    Each recording's likelihood is described by a Gaussian function (`gaussian_likelihood`) where all
-    recordings together say that its parameters are, in two rounds (`settled`).  emcee samples the spreads and correlations, all else is integrated out (`hierarchy`); in the end each
+    Each recording's likelihood is described by a Gaussian function (`gaussian_likelihood`) where
+    all recordings together say that its parameters are, in two rounds (`settled`).  emcee samples
+    the spreads and correlations, all else is integrated out (`hierarchy`); in the end each
     recording's draws are weighted by its exact likelihood.
     """
     began = time.perf_counter()
     report = progress or (lambda share, word: None)
-    model = _common_model(posteriors)
+    model = common_model(posteriors)
+    if not any(name in HAND for name in model.names):
+        raise InputError(f"the {model.name} model has no hand: give posteriors of held devices.")
     here = study_coordinates(model)
     hierarchy, names, spots = _hierarchy(posteriors, users, places or [None] * len(users), here)
     tune, run, rest = np.random.SeedSequence(seed).spawn(3)
     rng = np.random.default_rng(rest)
     report(0.0, "population: first look")
-    hierarchy = settled(hierarchy, posteriors, here, first_guess(hierarchy)[0])
+    hierarchy = settled(hierarchy, posteriors, here, hierarchy.guess()[0])
     chains = sample_level(hierarchy, tune, steps=_FIRST_STEPS)
     report(0.5, "population: sampling")
     hierarchy = settled(hierarchy, posteriors, here, np.median(chains.thinned(DRAWS, rng), axis=0))
@@ -184,7 +187,7 @@ def infer_population(
         own,
         (*chains.notices, *_notices(own, names)),
         time.perf_counter() - began,
-        chains,
+        chains.resting(),
         here,
         hierarchy,
         draws,
@@ -214,19 +217,18 @@ def prior_moments(model: Model, here: Coordinates) -> tuple[Floats, Floats]:
     return mean, np.where(here.log, np.minimum(sd, high - middle), sd)
 
 
-def _common_model(posteriors: Sequence[Posterior]) -> Model:
+def common_model(posteriors: Sequence[Posterior]) -> Model:
+    """The model that all recordings were fitted with; an InputError where there are several."""
     if not posteriors:
-        raise InputError("no recording of a user: a population needs at least one.")
+        raise InputError("no recording: a study's levels need at least one.")
     model = posteriors[0].model
     for number, posterior in enumerate(posteriors):
         if posterior.names != model.names:
             raise InputError(
                 f"posterior {number + 1} has the parameters {', '.join(posterior.names)}, but the "
-                f"first has {', '.join(model.names)}: a population needs the same model, with the "
-                "same effects, in all recordings."
+                f"first has {', '.join(model.names)}: the same model, with the same effects, is "
+                "needed in all recordings."
             )
-    if not any(name in HAND for name in model.names):
-        raise InputError(f"the {model.name} model has no hand: give posteriors of grasped models.")
     return model
 
 

@@ -1,8 +1,9 @@
-"""Sampling spreads and correlations of a population with emcee."""
+"""Sampling what the recordings of a study share, spreads and correlations, with emcee."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.diagnostics import Diagnostics, diagnose
 from bayeshaptic.inference.ensembles import Ensemble, refitted, warmed_up
-from bayeshaptic.inference.hierarchy import Hierarchy
 from bayeshaptic.inference.importance import Adapted
 from bayeshaptic.inference.mixture import student
 
@@ -18,11 +18,20 @@ Floats = NDArray[np.float64]
 
 ESS = 500.0
 _RHAT = 1.03
-_LEAST_SPREAD = 0.05
 _AGAIN = 40  # steps to forget a description that has changed a little
 _FIRST_STEPS = 100
 _MOST_STEPS = 1000
 _TOLERABLE = 1.05  # R-hat up to which it is worth no warning
+
+
+class Level(Protocol):
+    """Hyperparameters with a density, and where to begin with them."""
+
+    def log_density(self, phi: Floats) -> Floats:
+        """Log density of vectors of shape (B, Q); shape (B,)."""
+
+    def guess(self) -> tuple[Floats, Floats]:
+        """A middle and a width of each, shape (Q,)."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +55,10 @@ class LevelChains:
         flat = self.chains.reshape(-1, self.chains.shape[-1])
         return flat[rng.choice(len(flat), count, replace=len(flat) < count)]
 
+    def resting(self) -> LevelChains:
+        """Without the ensembles: what can be sent to another process."""
+        return replace(self, ensembles=())
+
     @property
     def notices(self) -> tuple[Notice, ...]:
         worst = float(self.diagnostics.rhat.max())
@@ -59,25 +72,25 @@ class LevelChains:
 
 
 def sample_level(
-    hierarchy: Hierarchy,
+    level: Level,
     seed: np.random.SeedSequence,
     before: LevelChains | None = None,
     steps: int | None = None,
 ) -> LevelChains:
-    """Draw hyperparameters from the posterior of a hierarchy.
+    """Draw hyperparameters from the posterior of what a study's recordings share.
 
     Parameters
     ----------
-    hierarchy : Hierarchy
+    level : Level
     seed : numpy.random.SeedSequence
     before : LevelChains, optional
-        Chains of nearly the same hierarchy, to go on from.
+        Chains of nearly the same, to go on from.
     steps : int, optional
         So many and no more; by default until R-hat is below 1.03 with 500 effective draws.
     """
-    density = hierarchy.log_density
+    density = level.log_density
     if before is None:
-        ensembles = warmed_up(density, _begin(hierarchy, seed), seed)
+        ensembles = warmed_up(density, _begin(level, seed), seed)
     else:
         ensembles = [replace(one, density=density) for one in before.ensembles]
         for ensemble in ensembles:
@@ -106,15 +119,9 @@ def _advance(ensembles: list[Ensemble], steps: int) -> tuple[Floats, Floats]:
     return np.stack([chain for chain, _ in runs]), np.stack([values for _, values in runs])
 
 
-def first_guess(hierarchy: Hierarchy) -> tuple[Floats, Floats]:
-    """Middle and width of the hyperparameters by the scatter of the recordings' own estimates."""
-    seen = hierarchy.mean[:, hierarchy.hand].std(axis=0)
-    return hierarchy.layout.guess(np.clip(seen, _LEAST_SPREAD, 1.0))
-
-
-def _begin(hierarchy: Hierarchy, seed: np.random.SeedSequence) -> Adapted:
+def _begin(level: Level, seed: np.random.SeedSequence) -> Adapted:
     """A wide proposal around the first guess."""
-    middle, width = first_guess(hierarchy)
+    middle, width = level.guess()
     proposal = student(middle, np.diag(width**2), 8.0)
     points = proposal.sample(np.random.default_rng(seed.spawn(1)[0]), 64)
     return Adapted(proposal, points, np.full(64, 1 / 64), 0.0)

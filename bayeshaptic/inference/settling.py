@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +12,18 @@ from numpy.typing import NDArray
 from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.gaussian_likelihood import STEP, linearised
 from bayeshaptic.inference.hierarchy import Hierarchy
+from bayeshaptic.inference.path import Path
 from bayeshaptic.inference.posterior import Posterior
 
 Floats = NDArray[np.float64]
+L = TypeVar("L", Hierarchy, Path)
 _ROUNDS = 8
 _BEYOND = 2.0  # posterior standard deviations that an expectation may lie outside its own draws
 _SETTLED = 0.02  # move, in posterior standard deviations, that is none
 
 
-def settled(
-    hierarchy: Hierarchy, posteriors: Sequence[Posterior], here: Coordinates, phi: Floats
-) -> Hierarchy:
-    """The hierarchy with its likelihoods linearised at their expected parameters given `phi`.
+def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: Floats) -> L:
+    """A study's levels with likelihoods linearised at the expected parameters given `phi`.
 
     Ridges of one recording are bent and far longer than what the study leaves of them: each
     expectation is found with the model linear there, in turns (Newton's method, as in an iterated
@@ -31,7 +32,7 @@ def settled(
 
     Parameters
     ----------
-    hierarchy : Hierarchy
+    level : Hierarchy or Path
     posteriors : sequence of Posterior
         Those without their measurement keep the description that they have.
     here : Coordinates
@@ -41,16 +42,16 @@ def settled(
     own = [here.coordinate(one.draws) for one in posteriors]
     sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
     low, high = low - _BEYOND * sd, high + _BEYOND * sd
-    x = np.clip(hierarchy.expected(phi), low, high)
+    x = np.clip(level.expected(phi), low, high)
     for number in range(_ROUNDS):
         found = [
-            linearised(one, here, x[r], STEP * sd[r]) or hierarchy.likelihoods[r]
+            linearised(one, here, x[r], STEP * sd[r]) or level.likelihoods[r]
             for r, one in enumerate(posteriors)
         ]
-        hierarchy = replace(hierarchy, likelihoods=tuple(found))
-        move = np.clip(hierarchy.expected(phi), low, high) - x
+        level = replace(level, likelihoods=tuple(found))
+        move = np.clip(level.expected(phi), low, high) - x
         far = np.max(np.abs(move) / sd, axis=1, keepdims=True)
         if np.all(far < _SETTLED):
             break
         x = x + (0.5 if number % 2 else 1.0) * move / np.maximum(far, 1.0)
-    return hierarchy
+    return level

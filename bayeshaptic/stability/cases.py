@@ -34,6 +34,9 @@ class Case:
         Equally weighted, in the order of `model.names`.
     limit : CriticalStiffness
         Of these draws, in the same order.
+    joint : str or None
+        Cases with the same word here are drawn together: their draws of one number belong to one
+        another, as those of several configurations of one device.
     """
 
     label: str
@@ -41,6 +44,7 @@ class Case:
     model: Model
     draws: Floats = field(repr=False)
     limit: CriticalStiffness = field(repr=False)
+    joint: str | None = None
 
 
 @dataclass(frozen=True)
@@ -122,16 +126,16 @@ class DeviceLimit:
         return float(stiffness)
 
     def _effective_below(self, stiffness: float) -> float:
-        """Effective draws below `stiffness`, by the variances of the cases' shares F_c below.
+        """Effective draws below `stiffness`, by the variances of the cases' shares F_c below it.
 
         With F = 1 - prod (1 - F_c) and var F_c = F_c (1 - F_c) / n_c, as many independent draws as
         would give the same variance of F.
         """
         variance, above = 0.0, 1.0
-        for case in self.cases:
-            below = case.limit.samples < stiffness
+        for samples, chains in _independent(self.cases):
+            below = samples < stiffness
             share = float(below.mean())
-            draws = effective_draws(below.reshape(case.limit.chains, -1))
+            draws = effective_draws(below.reshape(chains, -1))
             above *= 1 - share
             variance += share / (1 - share) / draws if share < 1 else 0.0
         if above in (0.0, 1.0):
@@ -145,9 +149,10 @@ def device_limit(cases: Sequence[Case], seed: int = 0) -> DeviceLimit:
     """The limit of a device over all its cases.
 
     Each joint draw takes one draw of every case, in a random order of its own.  Cases that share
-    device parameters are so taken as independent.  They depend on each other positively (what
-    lowers one limit lowers the others), and then the smallest of independent draws is the lower
-    one: the error is on the safe side, and vanishes where one case binds.
+    device parameters are so taken as independent, unless they are drawn together.  They depend on
+    each other positively (what lowers one limit lowers the others), and then the smallest of
+    independent draws is the lower one: the error is on the safe side, and vanishes where one case
+    binds.
 
     Parameters
     ----------
@@ -174,14 +179,31 @@ def device_limit(cases: Sequence[Case], seed: int = 0) -> DeviceLimit:
         )
     rng = np.random.default_rng(seed)
     count = min(max(len(case.limit.samples) for case in cases), MOST_DRAWS)
-    joint = np.stack([_shuffled(case.limit.samples, count, rng) for case in cases])
+    orders: dict[str, Ints] = {}
+    joint = np.empty((len(cases), count))
+    for number, case in enumerate(cases):
+        order = orders.setdefault(
+            case.joint or f"case {number}", _random_order(len(case.limit.samples), count, rng)
+        )
+        joint[number] = case.limit.samples[order]
     which = np.argmin(joint, axis=0)
     samples = joint[which, np.arange(count)]
     which = np.where(np.isinf(samples), -1, which)
     return DeviceLimit(samples, which, tuple(cases), units[0])
 
 
-def _shuffled(samples: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """`count` of the samples in random order, all of them used equally often."""
-    rounds = -(-count // len(samples))
-    return np.concatenate([rng.permutation(samples) for _ in range(rounds)])[:count]
+def _random_order(draws: int, count: int, rng: np.random.Generator) -> Ints:
+    """`count` numbers of draws in random order, all of them used equally often."""
+    rounds = -(-count // draws)
+    return np.concatenate([rng.permutation(draws) for _ in range(rounds)])[:count]
+
+
+def _independent(cases: Sequence[Case]) -> list[tuple[Floats, int]]:
+    """Samples and number of chains of every case, those drawn together as the least of them."""
+    found: dict[str, tuple[Floats, int]] = {}
+    for number, case in enumerate(cases):
+        key, samples = case.joint or f"case {number}", case.limit.samples
+        if key in found:
+            samples = np.minimum(samples, found[key][0])
+        found[key] = (samples, case.limit.chains)
+    return list(found.values())

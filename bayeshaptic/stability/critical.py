@@ -14,6 +14,7 @@ from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_
 from bayeshaptic.stability.crossings import find_crossings, rational
 from bayeshaptic.stability.effective import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
+from bayeshaptic.threads import single_threaded
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -122,6 +123,7 @@ class CriticalStiffness:
         return replace(self, samples=self.samples / lever_m**2, unit="N/m")
 
 
+@single_threaded
 def critical_stiffness(
     source: Any,
     theta: ArrayLike | None = None,
@@ -167,6 +169,11 @@ def critical_stiffness(
     limit = _limits(model, vectors, chains, approximation, before)
     checkable = approximation == "exact" and rational(model.system(vectors[:1]))
     return _checked(limit, model, vectors) if checkable else limit
+
+
+def draws_of(posterior: Any, max_draws: int = MOST_DRAWS) -> Floats:
+    """The draws of a posterior in the order of the samples of its `critical_stiffness`."""
+    return _vectors(posterior, None, max_draws)[0]
 
 
 def _vectors(source: Any, theta: ArrayLike | None, max_draws: int) -> tuple[Floats, int]:
