@@ -7,6 +7,7 @@ the number of cores.
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
 from functools import wraps
 from typing import ParamSpec, TypeVar
@@ -14,16 +15,27 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_here = threading.local()
+
 
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorator: `function` runs with one BLAS thread; the setting is put back afterwards."""
+    """Decorator: `function` runs with one BLAS thread; the setting is put back afterwards.
+
+    Inside another such function it costs nothing.
+    """
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+        if getattr(_here, "limited", False):
+            return function(*args, **kwargs)
         from threadpoolctl import threadpool_limits
 
-        with threadpool_limits(limits=1, user_api="blas"):
-            return function(*args, **kwargs)
+        _here.limited = True
+        try:
+            with threadpool_limits(limits=1, user_api="blas"):
+                return function(*args, **kwargs)
+        finally:
+            _here.limited = False
 
     return limited
 

@@ -20,6 +20,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.stability.tail import TailWatch
+from bayeshaptic.threads import single_threaded
 
 Progress = Callable[[float, str], None]
 
@@ -86,6 +87,7 @@ class _Clock:
         self.seconds[name] = time.perf_counter() - began
 
 
+@single_threaded
 def analyse(
     measurement: Recording | Etfe,
     model: str | Model = "auto",
@@ -168,6 +170,7 @@ class Begun:
     lever_m: float | None
 
 
+@single_threaded
 def begin(
     measurement: Recording | Etfe,
     model: str | Model = "auto",
@@ -206,6 +209,7 @@ def begin(
     return Begun(etfe, device, fit, choice, notices + etfe.notices, clock.seconds, lever_m)
 
 
+@single_threaded
 def finish(
     begun: Begun,
     etfe: Etfe,

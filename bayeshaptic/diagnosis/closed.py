@@ -26,6 +26,7 @@ from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model, Prior
 from bayeshaptic.recordings.etfe import Etfe
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.threads import single_threaded
 
 _BEFORE_ESS = 1000
 
@@ -84,6 +85,7 @@ class Closed:
         }
 
 
+@single_threaded
 def close_loop(
     model: str | Model,
     measurement: Recording | Etfe,

@@ -12,6 +12,7 @@ from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.threads import single_threaded
 
 _MATERIAL = 2.0  # a richer model that misfits too must cut the squared residual by this factor
 _WORDS = {
@@ -54,6 +55,7 @@ class Choice:
     candidates: Mapping[str, Candidate]
 
 
+@single_threaded
 def choose_model(
     etfe: Etfe,
     device: Device | None = None,

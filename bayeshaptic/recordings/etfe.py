@@ -13,6 +13,7 @@ from bayeshaptic.recordings.periodic_excitation import estimate_periodic
 from bayeshaptic.recordings.random_excitation import estimate_random
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.spectra import PeriodicSpectra, RandomSpectra, Spectra, TableSpectra
+from bayeshaptic.threads import single_threaded
 
 __all__ = ["Etfe", "PeriodicSpectra", "RandomSpectra", "TableSpectra", "estimate_etfe"]
 
@@ -90,6 +91,7 @@ class Etfe:
         return np.degrees(np.unwrap(np.angle(self.value)))
 
 
+@single_threaded
 def estimate_etfe(
     recording: Recording,
     band_hz: tuple[float, float] | None = None,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.recordings.etfe import Etfe
 from bayeshaptic.stability.local_fit import LocalFit, ResponseData, local_fit, response_data
+from bayeshaptic.threads import single_threaded
 
 Floats = NDArray[np.float64]
 
@@ -61,6 +62,7 @@ class _Run(NamedTuple):
     strength: float
 
 
+@single_threaded
 def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> EtfeCriticalStiffness:
     """Smallest -Re(1/G) over the frequencies of the band where the measured G is real and negative.
 
