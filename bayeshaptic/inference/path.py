@@ -1,8 +1,8 @@
-"""Parameters along a configuration coordinate: a Gaussian process for each, with scatter.
+"""Parameters along a configuration coordinate: a straight line, bends, and scatter.
 
 Coordinates x_r of recording r at the configuration c_r, D of them, each on its own:
 
-    x_rj = m_j + f_j(c_r) + t_rj,    t_rj ~ N(0, s_j^2),
+    x_rj = m_j + g_j c_r + f_j(c_r) + t_rj,    t_rj ~ N(0, s_j^2),
 
 f_j a Gaussian process with amplitude a_j.  All f_j have the same length over which they bend, and a
 Matern 5/2 kernel (C. E. Rasmussen, C. K. I. Williams, "Gaussian Processes for Machine Learning",
@@ -20,15 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.inference.gaussian_likelihood import GaussianLikelihood
-from bayeshaptic.inference.hyperparameters import DEVICE_SPREAD, DEVICE_SPREAD_FACTOR
+from bayeshaptic.inference.hyperparameters import DEVICE_SPREAD
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 # Priors, log-normal: (median, log standard deviation).
 AMPLITUDE = (0.05, 1.5)  # of a parameter's logarithm along the coordinate
-LENGTH = (1.0, 0.7)  # in ranges of the measured coordinates
-DEVICE_SCATTER = (DEVICE_SPREAD, DEVICE_SPREAD_FACTOR)
+LENGTH = (1.0, 0.4)  # in ranges of the measured coordinates
+SLOPE = 0.3  # standard deviation of a parameter's logarithm, over half of the range
+DEVICE_SCATTER = (DEVICE_SPREAD, 1.0)
 HAND_SCATTER = (0.1, 1.0)
 
 
@@ -105,8 +106,9 @@ class Path:
         both = np.concatenate([self.coordinate, grid])
         kernel = self._kernel(length, both, both) + 1e-10 * np.eye(len(both))
         bend = np.linalg.cholesky(kernel) @ rng.standard_normal((count, len(both), size))
-        start = self.prior_sd * rng.standard_normal((count, 1, size))
-        prior = start + amplitude[:, None] * bend
+        start, slope = rng.standard_normal((2, count, 1, size))
+        line = self.prior_sd * start + SLOPE * self._centred(both)[:, None] * slope
+        prior = line + amplitude[:, None] * bend
         day = scatter[:, None] * rng.standard_normal((count, seen, size))
         noise = np.linalg.cholesky(self.noise) @ rng.standard_normal((count, seen * size, 1))
         off = self.seen - (prior[:, :seen] + day).reshape(count, -1) - noise[..., 0]
@@ -128,12 +130,19 @@ class Path:
         return whole + spread[:, :, None] * np.eye(spread.shape[1])
 
     def _prior(self, amplitude: Floats, length: Floats, one: Floats, other: Floats) -> Floats:
-        """Covariance of m + f between two sets of configurations, (B, G D, H D)."""
+        """Covariance of m + g c + f between two sets of configurations, (B, G D, H D)."""
         kernel = self._kernel(length, one, other)
+        line = SLOPE**2 * np.outer(self._centred(one), self._centred(other))
         own = kernel[..., None] * (amplitude**2)[:, None, None, :] + self.prior_sd**2
+        own += line[..., None]
         size = len(self.hand)
         full = own[:, :, None, :, :] * np.eye(size)[:, None, :]  # (B, G, D, H, D)
         return full.reshape(len(length), len(one) * size, len(other) * size)
+
+    def _centred(self, coordinate: Floats) -> Floats:
+        """From -1 to 1 over the measured range."""
+        middle = 0.5 * (self.coordinate.min() + self.coordinate.max())
+        return (coordinate - middle) / (0.5 * self.range)
 
     def _kernel(self, length: Floats, one: Floats, other: Floats) -> Floats:
         """Correlation of f between two sets of configurations, (B, G, H)."""

@@ -1,22 +1,24 @@
-"""`population.json`: what the recordings of a study say together, as plain numbers."""
+"""`population.json`: the numbers of one study, every key always there, null where missing."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bayeshaptic.report.limits import RISKS, decibel
-from bayeshaptic.report.study_bands import band_of
+from bayeshaptic.report.limits import RISKS
 from bayeshaptic.report.summary import QUANTILES, plain
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.study_analysis import StudyAnalysis
     from bayeshaptic.inference.population import Population
     from bayeshaptic.stability.cases import Case, DeviceLimit
+    from bayeshaptic.stability.critical import CriticalStiffness
 
-_LEVELS = tuple(QUANTILES.values())
+Floats = NDArray[np.float64]
 
 
 def population_summary(study: StudyAnalysis) -> dict[str, Any]:
@@ -30,91 +32,124 @@ def population_summary(study: StudyAnalysis) -> dict[str, Any]:
     -------
     dict
         SI units; None for what is missing, and for numbers that are infinite or not a number.
+        `recordings` is the number of recordings that could be used. Of a person not yet seen in
+        several configurations it is the one with the lowest limit.
     """
-    found = study.population
+    population = study.population
     return plain(
         {
             "device": study.device.name,
-            "recordings": [_recording(one) for one in study.recordings],
-            "users": [
-                {
-                    "user": case.label.removeprefix("user "),
-                    "critical_stiffness": _quantiles(case.limit.quantile(_LEVELS)),
-                }
-                for case in study.users
-            ],
-            "population": None if found is None else _population(found),
-            "correlation": None if found is None else np.median(found.correlation, axis=0),
-            "new_person": _new_person(study.new_person[0]) if study.new_person else None,
-            "configurations": _configurations(study) or None,
+            "recordings": sum(one.error is None for one in study.recordings),
+            "users": _users(study),
+            "population": None if population is None else _population(population),
+            "correlation": None if population is None else population.correlation.mean(axis=0),
+            "new_person": _new_person(study.new_person),
+            "configurations": _configurations(study),
             "device_limit": None if study.limit is None else _device_limit(study.limit),
         }
     )
 
 
 def population_json(study: StudyAnalysis) -> str:
-    """`population_summary` of `study` as text; strict JSON, without NaN and infinity."""
-    found = population_summary(study)
-    return json.dumps(found, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    """`population_summary` as text; strict JSON, without NaN and infinity."""
+    return json.dumps(population_summary(study), indent=2, allow_nan=False, ensure_ascii=False) + (
+        "\n"
+    )
 
 
-def _recording(one: Any) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "user": one.entry.user,
-        "configuration": one.entry.configuration,
-        "error": one.error,
-        "critical_stiffness": None
-        if one.analysis is None
-        else _quantiles(one.analysis.limit.quantile(_LEVELS)),
-    }
+def _users(study: StudyAnalysis) -> list[dict[str, Any]]:
+    """Each user's K_CR over all configurations and trials."""
+    found = []
+    for user in study.study.users:
+        starts = tuple(f"user {user}{after}" for after in (",", " ("))
+        own = [c for c in study.cases if c.label == f"user {user}" or c.label.startswith(starts)]
+        found.append({"user": user, "critical_stiffness": _together(own)})
+    return found
 
 
-def _population(found: Population) -> dict[str, Any]:
+def _population(population: Population) -> dict[str, Any]:
     return {
         name: {
-            "log_mean": _quantiles(np.quantile(found.log_mean[:, number], _LEVELS)),
-            "log_sd": _quantiles(np.quantile(found.log_sd[:, number], _LEVELS)),
+            "log_mean": _quantiles(population.log_mean[:, i]),
+            "log_sd": _quantiles(population.log_sd[:, i]),
         }
-        for number, name in enumerate(found.parameters)
+        for i, name in enumerate(population.parameters)
     }
 
 
-def _new_person(case: Case) -> dict[str, Any]:
-    limit = case.limit
-    values = limit.quantile(_LEVELS)
+def _new_person(cases: Sequence[Case]) -> dict[str, Any] | None:
+    if not cases:
+        return None
+    worst: CriticalStiffness = min(
+        (case.limit for case in cases), key=lambda one: one.quantile(0.01)
+    )
     return {
         "critical_stiffness": {
-            "unit": limit.unit,
-            **_quantiles(values),
-            "db": _quantiles([decibel(value) for value in values]),
-            "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
+            "unit": worst.unit,
+            **_quantiles(worst.samples),
+            "db": {name: worst.db(p) for name, p in QUANTILES.items()},
+            "safe": {f"{risk:g}": worst.safe(risk) for risk in RISKS},
             "crossings": [
                 {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
-                for c in limit.crossings
+                for c in worst.crossings
             ],
         }
     }
 
 
-def _configurations(study: StudyAnalysis) -> list[dict[str, Any]]:
-    return [
-        {"coordinate": coordinate, "held": one.held, "critical_stiffness": _quantiles(row)}
-        for one in study.configurations
-        for coordinate, row in band_of(one).rows()
+def _configurations(study: StudyAnalysis) -> list[dict[str, Any]] | None:
+    """Along a coordinate as predicted; at names, and where there are few numbers, as measured."""
+    rows = [
+        {
+            "coordinate": coordinate,
+            "held": along.held,
+            "critical_stiffness": _quantiles(along.samples[:, number]),
+        }
+        for along in study.configurations
+        for number, coordinate in enumerate(along.coordinates.tolist())
     ]
+    done = {(row["coordinate"], row["held"]) for row in rows}
+    for one in study.recordings:
+        coordinate, held = one.entry.configuration, one.entry.user is not None
+        if coordinate is None or (coordinate, held) in done:
+            continue
+        done.add((coordinate, held))
+        own = [
+            case
+            for case in study.cases
+            if case.group == ("held" if held else "free") and _is_at(case, coordinate)
+        ]
+        rows.append({"coordinate": coordinate, "held": held, "critical_stiffness": _together(own)})
+    return rows or None
+
+
+def _is_at(case: Case, coordinate: float | str) -> bool:
+    name = coordinate if isinstance(coordinate, str) else f"{coordinate:g}"
+    ending = f", configuration {name}"
+    return case.label.endswith(ending) or f"{ending} (" in case.label
 
 
 def _device_limit(limit: DeviceLimit) -> dict[str, Any]:
     return {
         "unit": limit.unit,
-        **_quantiles(limit.quantile(_LEVELS)),
+        **_quantiles(limit.samples),
         "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
-        "binding": [
-            {"case": found.case, "probability": found.probability} for found in limit.binding
-        ],
+        "binding": [{"case": b.case, "probability": b.probability} for b in limit.binding],
     }
 
 
-def _quantiles(values: Any) -> dict[str, Any]:
-    return dict(zip(QUANTILES, values, strict=True))
+def _together(cases: Sequence[Case]) -> dict[str, Any]:
+    """Quantiles over several cases, each as often as the others."""
+    if not cases:
+        return dict.fromkeys(QUANTILES)
+    count = min(len(case.limit.samples) for case in cases)
+    samples = [np.sort(case.limit.samples) for case in cases]
+    return _quantiles(
+        np.concatenate([one[np.linspace(0, len(one) - 1, count).astype(int)] for one in samples])
+    )
+
+
+def _quantiles(samples: Floats) -> dict[str, Any]:
+    method = "linear" if np.isfinite(samples).all() else "inverted_cdf"
+    values = np.quantile(samples, list(QUANTILES.values()), method=method)  # type: ignore[call-overload]
+    return dict(zip(QUANTILES, values.tolist(), strict=True))
