@@ -10,6 +10,7 @@ import numpy as np
 from fake_analysis import fake_analysis
 
 from bayeshaptic.devices import load_device
+from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits
 from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
@@ -77,8 +78,7 @@ def fake_study(
         )
     if len(places) > 1:
         bands = tuple(_configurations(held, places, device) for held in (False, True))
-        middle = _case("configuration 0.5, free", CONFIGURATION, cases[0].model, cases[0].draws)
-        cases.append(middle)
+        cases += [case for band in bands for case in band.cases]
     everything = (*cases, *users, *new)
     return StudyAnalysis(
         _study(device, recordings, references),
@@ -133,19 +133,20 @@ def _population(model: Model, people: int, spread: float, rng: Any) -> Any:
     )
 
 
-def _configurations(held: bool, places: tuple[float, ...], device: str) -> Any:
+def _configurations(held: bool, places: tuple[float, ...], device: str) -> ConfigurationLimits:
     one = fake_analysis("grasped" if held else "free", device, spread=0.02)
-    draws = one.posterior.draws[:200]
-    coordinates = np.linspace(min(places), max(places), 5)
+    coordinates = np.linspace(min(places), max(places), 3)
     index = one.model.names.index("b1")
-    limits = []
+    who = "held" if held else "nobody holds it"
+    cases = []
     for coordinate in coordinates:
-        there = draws.copy()
+        there = one.posterior.draws[:DRAWS].copy()
         there[:, index] *= 1.2 - 0.4 * coordinate
-        limits.append(critical_stiffness(one.model, there))
-    return SimpleNamespace(
-        held=held, coordinates=coordinates, measured=places, limits=tuple(limits)
-    )
+        cases.append(_case(f"configuration {coordinate:g}, {who}", CONFIGURATION, one.model, there))
+    samples = np.stack([case.limit.samples for case in cases], axis=1)
+    measured, unit = np.array(places), one.limit.unit
+    nothing: Any = None
+    return ConfigurationLimits(held, coordinates, measured, samples, unit, tuple(cases), nothing)
 
 
 def _study(device: str, recordings: list[Analysed], references: bool) -> Study:

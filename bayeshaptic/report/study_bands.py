@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from bayeshaptic.inference.configurations import Configurations
+    from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,6 @@ class Band:
             yield float(place), (float(low), float(middle), float(high))
 
 
-def band_of(one: Configurations) -> Band:
+def band_of(one: ConfigurationLimits) -> Band:
     """The band of one set of configurations."""
-    quantiles = np.array([limit.quantile([0.05, 0.5, 0.95]) for limit in one.limits])
-    return Band(np.asarray(one.coordinates, float), *quantiles.T)
+    return Band(np.asarray(one.coordinates, float), *one.quantile([0.05, 0.5, 0.95]))

@@ -13,13 +13,14 @@ from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
+    from bayeshaptic.stability.cases import Binding
 
 RISKS = (0.01, 0.05)
-GROUPS = {
+HOLDERS = {
     FREE: "nobody holds it",
     HELD: "one of these people holds it",
     NEW_PERSON: "a person not yet seen holds it",
-    CONFIGURATION: "a configuration in between",
+    CONFIGURATION: "somebody holds it in a configuration that was not recorded",
 }
 _WORTH_NAMING = 0.005
 
@@ -100,21 +101,27 @@ def _scope(study: StudyAnalysis) -> str:
 
 
 def what_binds(study: StudyAnalysis) -> str:
-    """Which case sets the limit, with its probability."""
+    """Who holds the device at its limit, and in which single case, with probabilities."""
     assert study.limit is not None
-    shares = {group: share for group, share in study.limit.by_group().items() if share > 0}
+    shares: dict[str, float] = {}
+    for found in study.limit.binding:
+        who = _holder(found)
+        shares[who] = shares.get(who, 0.0) + found.probability
     order = sorted(shares.items(), key=lambda item: -item[1])
-    likely = [(group, share) for group, share in order if share >= _WORTH_NAMING]
-    text = ", or ".join(f"{GROUPS.get(g, g)} ({percent(s)})" for g, s in likely)
-    first = study.limit.binding[0] if study.limit.binding else None
-    if first is None or not text:
+    likely = [f"{who} ({percent(share)})" for who, share in order if share >= _WORTH_NAMING]
+    if not likely:
         return "Nothing limits it."
-    worst = ""
-    if len(study.cases) > len(shares) and first.probability < 1.0:
-        worst = (
-            f" The single case that binds most often: {first.case} ({percent(first.probability)})."
-        )
-    return f"What sets the limit: {text}.{worst}"
+    text = f"What sets the limit: {', or '.join(likely)}."
+    first = study.limit.binding[0]
+    if first.probability < order[0][1] or first.case != order[0][0]:
+        text += f" Most often it is this case: {first.case} ({percent(first.probability)})."
+    return text
+
+
+def _holder(found: Binding) -> str:
+    """Who holds the device in a case, in words."""
+    free = found.group == CONFIGURATION and found.case.endswith(HOLDERS[FREE])
+    return HOLDERS[FREE] if free else HOLDERS.get(found.group, found.group)
 
 
 def sentence_of(text: str) -> str:

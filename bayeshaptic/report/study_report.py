@@ -11,14 +11,17 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.figures.study import STUDY_PICTURES, draw_study_pictures
+from bayeshaptic.report.guidance_section import guidance_section
 from bayeshaptic.report.limits_section import limits_section, table_of
 from bayeshaptic.report.population_json import population_json
 from bayeshaptic.report.study_headline import study_headline
 from bayeshaptic.report.study_page import render_study
 
 if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.study_analysis import StudyAnalysis
     from bayeshaptic.report.section import Section
+    from bayeshaptic.stability.cases import Case
 
 # Whoever waits for a report looks for its numbers: they arrive when the rest is there.
 _LAST = "population.json"
@@ -92,7 +95,22 @@ def _sections(study: StudyAnalysis, folder: Path) -> list[Section]:
     walls = limits_section(
         table, resolution=study.device.encoder_resolution, untrusted=status == "untrusted"
     )
-    return [walls]
+    first = study.limit.binding[0].case
+    case = next(case for case in study.cases if case.label == first)
+    advice = guidance_section(case, _analysis_of(case, study))
+    return [walls] if advice is None else [walls, advice]
+
+
+def _analysis_of(case: Case, study: StudyAnalysis) -> Analysis | None:
+    """The recording that a case is, where it is one alone."""
+    return next(
+        (
+            one.analysis
+            for one in study.recordings
+            if one.analysis and one.analysis.limit is case.limit
+        ),
+        None,
+    )
 
 
 def _link(page: Path, out: Path) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bayeshaptic.diagnosis.recorded_cases import place_of
 from bayeshaptic.report.limits import RISKS, decibel
 from bayeshaptic.report.quantities import interval, percent, pure, quantity, scale
 from bayeshaptic.report.study_words import spread_db
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 _DASH = "\N{EN DASH}"
 _LEVELS = tuple(QUANTILES.values())
-_MOST_CASES = 12
+_MOST_CASES = 8
 
 
 def device(study: StudyAnalysis) -> Rows:
@@ -151,10 +152,9 @@ def raw_limits(study: StudyAnalysis) -> dict[str, tuple[Any, ...]]:
 
 
 def belongs(one: Analysed, case: Case) -> bool:
-    """Whether a recording is of the user, and the configuration, of a case's label."""
-    name, _, place = case.label.removeprefix("user ").partition(", configuration ")
-    same = name == one.entry.user
-    return same and (not place or place == str(one.entry.configuration))
+    """Whether a recording is of the user, and the configuration, of a case."""
+    user = f"user {one.entry.user}"
+    return case.label in (user, user + place_of(one.entry.configuration))
 
 
 def population(found: Population) -> Rows:

@@ -52,20 +52,22 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
     if not study.new_person:
         return ()
     case = study.new_person[0]
+    _, _, place = case.label.partition(", configuration ")
+    where = f" (in configuration {place})" if len(study.new_person) > 1 else ""
     spread = spread_db(case)
     middle, low, high = case.limit.quantile([0.5, 0.05, 0.95])
     seen = estimate(middle, low, high, case.limit.unit)
     if spread < _HARDLY_DB:
         first = (
-            "People hardly move the critical stiffness of this device: for a person not yet seen "
-            f"it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does not "
-            "matter for the limit, and more people would not narrow it."
+            "People hardly move the critical stiffness of this device: for a person not yet seen"
+            f"{where} it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does "
+            "not matter for the limit, and more people would not narrow it."
         )
     else:
         size = "a little, " if spread < _LITTLE_DB else ""
         first = (
             f"People move the critical stiffness of this device {size}by {pure(spread, 2)} dB "
-            f"(sd): for a person not yet seen it is {seen}."
+            f"(sd): for a person not yet seen{where} it is {seen}."
         )
     branches = [c for c in case.limit.crossings if c.probability >= 0.01]
     found = [first]
@@ -144,11 +146,12 @@ def configurations(study: StudyAnalysis) -> tuple[str, ...]:
     found = []
     for one in study.configurations:
         band = band_of(one)
-        place = int(np.argmin(band.middle))
-        who = "Held" if one.held else "Free"
+        who = "Held" if one.held else "With nobody holding it"
         low, high = decibel(band.middle.min()), decibel(band.middle.max())
+        sure = float(one.worst_probability.max())
         found.append(
-            f"{who}, the median limit goes from {low:.1f} to {high:.1f} dB; the worst "
-            f"configuration is near {pure(float(band.coordinates[place]))}."
+            f"{who}, the median limit goes from {low:.1f} to {high:.1f} dB over the configurations "
+            f"from {pure(band.coordinates[0])} to {pure(band.coordinates[-1])}; the worst is most "
+            f"probably near {pure(one.worst_coordinate)} ({percent(sure)} among those looked at)."
         )
     return tuple(found)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits
     from bayeshaptic.diagnosis.study_analysis import StudyAnalysis
-    from bayeshaptic.inference.configurations import Configurations
 
 _FAR_DB = 8.0  # between free and held, to have a panel each
 _LOOKS = {False: (style.OTHER, "s", "--"), True: (style.MODEL, "o", "-")}
@@ -47,7 +47,7 @@ def _gap(bands: list[Band]) -> float:
     return max(later[0] - earlier[1] for earlier, later in zip(ends, ends[1:], strict=False))
 
 
-def _draw(axes: Axes, study: StudyAnalysis, one: Configurations, band: Band) -> None:
+def _draw(axes: Axes, study: StudyAnalysis, one: ConfigurationLimits, band: Band) -> None:
     colour, marker, line = _LOOKS[one.held]
     who = "held" if one.held else "nobody holds it"
     with np.errstate(divide="ignore"):

@@ -26,6 +26,7 @@ LOOKS = {
 }
 _ORDER = (FREE, HELD, NEW_PERSON, CONFIGURATION)
 _MOST = 24
+_SEEN = 0.02  # probability to set the limit
 _ROW_IN = 0.2
 _FAR_DB = 6.0
 
@@ -73,17 +74,15 @@ def _spans(study: StudyAnalysis, cases: tuple[Case, ...]) -> list[tuple[float, f
 
 
 def shown_cases(study: StudyAnalysis) -> tuple[Case, ...]:
-    """By group; of too many, those that bind most often."""
+    """By group; of the configurations those that may bind, of too many cases those that do so most.
+
+    The configurations have a figure of their own.
+    """
     assert study.limit is not None
     shares = {found.case: found.probability for found in study.limit.binding}
-    kept = sorted(study.cases, key=lambda case: -shares.get(case.label, 0.0))[:_MOST]
-    names = {case.label for case in kept}
-    return tuple(
-        case
-        for group in _ORDER
-        for case in study.cases
-        if case.group == group and case.label in names
-    )
+    kept = [c for c in study.cases if c.group != CONFIGURATION or shares.get(c.label, 0.0) > _SEEN]
+    kept = sorted(kept, key=lambda case: -shares.get(case.label, 0.0))[:_MOST]
+    return tuple(case for group in _ORDER for case in kept if case.group == group)
 
 
 def _row(
