@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bayeshaptic.inference.arviz_io import load_posterior
     from bayeshaptic.inference.choose import Choice, choose_model
     from bayeshaptic.inference.least_squares import Fit, least_squares
+    from bayeshaptic.inference.population import Population, infer_population
     from bayeshaptic.inference.posterior import Posterior
     from bayeshaptic.inference.sampler import sample
     from bayeshaptic.models import (
@@ -75,6 +76,7 @@ _HOMES = {
     "bayeshaptic.errors": ("BayeshapticWarning", "InputError", "Notice"),
     "bayeshaptic.inference": ("Fit", "Posterior", "least_squares", "load_posterior", "sample"),
     "bayeshaptic.inference.choose": ("Choice", "choose_model"),
+    "bayeshaptic.inference.population": ("Population", "infer_population"),
     "bayeshaptic.models": (
         "HalfNormal",
         "LogNormal",
@@ -130,6 +132,7 @@ __all__ = [
     "Model",
     "Normal",
     "Notice",
+    "Population",
     "Posterior",
     "Recording",
     "RelayMeasurement",
@@ -145,6 +148,7 @@ __all__ = [
     "estimate_etfe",
     "free",
     "grasped",
+    "infer_population",
     "kb_region",
     "least_squares",
     "load_device",

@@ -63,7 +63,8 @@ def _users(study: StudyAnalysis) -> list[dict[str, Any]]:
     for user in study.study.users:
         starts = tuple(f"user {user}{after}" for after in (",", " ("))
         own = [c for c in study.cases if c.label == f"user {user}" or c.label.startswith(starts)]
-        found.append({"user": user, "critical_stiffness": _together(own)})
+        if own:
+            found.append({"user": user, "critical_stiffness": _together(own)})
     return found
 
 

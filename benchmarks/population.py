@@ -1,0 +1,184 @@
+"""Is what a study says of people true?  Simulated studies of people from a known population.
+
+    python benchmarks/population.py [--studies 5] [--ess 500] [--first 1] [--device phantom ...]
+
+Each study has 12 users, 30 s each, on the virtual bench; hands are drawn around the paper's Table
+I (PHANToM) or II (LHIfAM), with correlations, the device is the same for all.  Shown are how many
+population means lie in their 90 % intervals, how many of 40 further people have their critical
+stiffness in the predictive 90 % interval, how many have it below the stiffness of 1 % risk, and the
+time from 12 recordings to the critical stiffness of a new person, in one process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from dataclasses import dataclass, replace
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+import numpy as np  # noqa: E402
+
+import bayeshaptic as bh  # noqa: E402
+from bayeshaptic.rig import Bench, simulate  # noqa: E402
+
+HAND = ("mh", "bh", "kh", "bs", "ks")
+LOG_SD = {"phantom": 0.38, "lhifam": 0.30}  # K_CR moves by 1.6 dB, and by 0.03 dB (sd)
+CORRELATION = {
+    ("mh", "kh"): 0.4, ("bh", "kh"): 0.5, ("bs", "ks"): 0.5, ("mh", "ks"): 0.2, ("mh", "bh"): 0.3
+}  # fmt: skip
+USERS, FURTHER, EACH = 12, 40, 20
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one study came out.
+
+    Attributes
+    ----------
+    device : str
+    means, spreads : ndarray of bool, shape (5,)
+        Which means and standard deviations of the population lie in their 90 % intervals.
+    covered, below : float
+        Share of further people in the predictive interval, and below the 1 % safe stiffness.
+    true_db : (low, high)
+        5 and 95 % quantiles of the further people's critical stiffness, dB.
+    predicted_db : (low, high)
+    pareto_k : float
+        The worst recording's.
+    seconds : (recordings, population)
+    processor_s : float
+    """
+
+    device: str
+    means: np.ndarray
+    spreads: np.ndarray
+    covered: float
+    below: float
+    true_db: tuple[float, float]
+    predicted_db: tuple[float, float]
+    pareto_k: float
+    seconds: tuple[float, float]
+    processor_s: float
+
+
+def people(device: str, seed: int) -> tuple[Bench, np.ndarray]:
+    """The held bench, and the hands of the users and of further people: (USERS + FURTHER, 5)."""
+    bench = Bench.from_device(device, held=True)
+    correlation = np.eye(len(HAND))
+    for (one, other), value in CORRELATION.items():
+        i, j = HAND.index(one), HAND.index(other)
+        correlation[i, j] = correlation[j, i] = value
+    root = LOG_SD[device] * np.linalg.cholesky(correlation)
+    rng = np.random.default_rng([seed, len(device)])
+    middle = np.array([bench.values[name] for name in HAND])
+    return bench, middle * np.exp(rng.standard_normal((USERS + FURTHER, len(HAND))) @ root.T)
+
+
+def held_by(bench: Bench, hand: np.ndarray) -> Bench:
+    """The bench in the hand of one person."""
+    return replace(bench, values=dict(bench.values) | dict(zip(HAND, hand.tolist(), strict=True)))
+
+
+def run(device: str, seed: int, ess: float) -> Outcome:
+    """Simulate one study, analyse it, and compare it with the truth."""
+    bench, hands = people(device, seed)
+    recordings = [
+        simulate(held_by(bench, hand), seed=1000 * seed + number)
+        for number, hand in enumerate(hands[:USERS])
+    ]
+    truth = np.array([held_by(bench, hand).true_critical_stiffness() for hand in hands[USERS:]])
+    began, processor = time.perf_counter(), time.process_time()
+    posteriors = [posterior(one, device, ess, seed) for one in recordings]
+    between = time.perf_counter()
+    population = bh.infer_population(posteriors, [str(n) for n in range(USERS)], seed=seed)
+    draws = population.new_person(np.random.default_rng(seed), EACH)
+    limit = replace(bh.critical_stiffness(population.model, draws), chains=len(population.log_mean))
+    seconds = (between - began, time.perf_counter() - between)
+    low, high = limit.quantile(np.array([0.05, 0.95]))
+    safe = limit.safe(0.01)
+    middle = np.log([bench.values[name] for name in population.parameters])
+    return Outcome(
+        device,
+        inside(population.log_mean, middle),
+        inside(population.log_sd, np.full(len(HAND), LOG_SD[device])),
+        float(np.mean((truth >= low) & (truth <= high))),
+        float(np.mean(truth < safe)) if safe is not None else float("nan"),
+        decibels(np.quantile(truth, [0.05, 0.95])),
+        decibels(np.array([low, high])),
+        max(one.pareto_k for one in population.recordings),
+        seconds,
+        time.process_time() - processor,
+    )
+
+
+def posterior(recorded: object, device: str, ess: float, seed: int) -> bh.Posterior:
+    """The posterior of one recording, as `analyse` finds it."""
+    recording = bh.recording_from_arrays(
+        recorded.force,  # type: ignore[attr-defined]
+        recorded.position,  # type: ignore[attr-defined]
+        recorded.period_s,  # type: ignore[attr-defined]
+        force_unit=recorded.force_unit,  # type: ignore[attr-defined]
+        position_unit=recorded.position_unit,  # type: ignore[attr-defined]
+    )
+    etfe = bh.estimate_etfe(recording)
+    model = bh.grasped(device=device)
+    return bh.sample(model, etfe, bh.least_squares(model, etfe, seed=seed), ess=ess, seed=seed)
+
+
+def inside(draws: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Which truths lie in the 90 % intervals of draws, shape (n, H)."""
+    low, high = np.quantile(draws, [0.05, 0.95], axis=0)
+    return (truth >= low) & (truth <= high)
+
+
+def decibels(stiffness: np.ndarray) -> tuple[float, float]:
+    low, high = 20 * np.log10(stiffness)
+    return float(low), float(high)
+
+
+def row(name: str, outcomes: list[Outcome]) -> str:
+    """One line of the table."""
+    means = np.mean([one.means for one in outcomes])
+    spreads = np.mean([one.spreads for one in outcomes])
+    true, predicted = (
+        np.mean([getattr(one, field) for one in outcomes], axis=0)
+        for field in ("true_db", "predicted_db")
+    )
+    seconds = np.mean([one.seconds for one in outcomes], axis=0)
+    return (
+        f"{name:12s} {len(outcomes):3d}   {means:6.1%}  {spreads:6.1%}   "
+        f"{np.mean([one.covered for one in outcomes]):6.1%}   "
+        f"{np.mean([one.below for one in outcomes]):5.1%}   "
+        f"{true[0]:.2f}..{true[1]:.2f}   {predicted[0]:.2f}..{predicted[1]:.2f}   "
+        f"{max(one.pareto_k for one in outcomes):5.2f}   {seconds[0]:4.0f} + {seconds[1]:3.0f}"
+        f"   {np.mean([one.processor_s for one in outcomes]):4.0f}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--studies", type=int, default=5, help="of each device")
+    parser.add_argument("--ess", type=float, default=500, help="effective draws a recording")
+    parser.add_argument("--first", type=int, default=1, help="first seed")
+    parser.add_argument("--device", nargs="+", default=["phantom", "lhifam"])
+    asked = parser.parse_args()
+    print(
+        "study        n    means   spreads  K_CR 90 %  < 1 %   true 90 %, dB  predicted, dB"
+        "    worst k   seconds   processor",
+        flush=True,
+    )
+    outcomes = []
+    for seed in range(asked.first, asked.first + asked.studies):
+        for device in asked.device:
+            outcomes.append(run(device, seed, asked.ess))
+            print(row(f"{device} {seed}", outcomes[-1:]), flush=True)
+    for device in asked.device:
+        print(row(device, [one for one in outcomes if one.device == device]))
+    print(row("all", outcomes))
+
+
+if __name__ == "__main__":
+    main()
