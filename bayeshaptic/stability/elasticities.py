@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 DRAWS = 160
 _STEP = 1e-4  # relative, of finite differences
 _SMALL = 1e-3
+_TURN = 1e-5  # relative, of the angle
 
 
 @dataclass(frozen=True)
@@ -113,9 +114,8 @@ def _slopes(
 ) -> Floats:
     """d ln K / d p of each draw at its own crossing, shape (n, P)."""
     theta = 2 * np.pi * frequency_hz * period_s
-    inside = np.minimum(theta, np.pi * (1 - _STEP))
-    h_theta = _difference(model, vectors, vectors, inside * (1 - _STEP), theta, period_s)
-    h_theta /= theta - inside * (1 - _STEP)
+    before, after = theta * (1 - _TURN), np.minimum(theta * (1 + _TURN), np.pi)
+    h_theta = _difference(model, vectors, vectors, before, after, period_s) / (after - before)
     slopes = np.empty(vectors.shape)
     steps = _STEP * _sizes(model, vectors)
     for column in range(vectors.shape[1]):

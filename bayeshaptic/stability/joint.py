@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,13 +30,10 @@ class JointRegion:
     regions : tuple of KbRegion
         One a case, with the same damping term.
     labels : tuple of str
-    seed : int
-        Of the order in which draws of different cases meet.
     """
 
     regions: tuple[KbRegion, ...] = field(repr=False)
     labels: tuple[str, ...]
-    seed: int = 0
 
     @property
     def kind(self) -> Damping:
@@ -58,16 +55,9 @@ class JointRegion:
         """Whether 20 effective draws lie below a stiffness of that risk."""
         return min(region.effective for region in self.regions) * risk >= ENOUGH_BELOW
 
-    def limits(self, damping: ArrayLike) -> Floats:
-        """The lowest limit of each joint draw, shape (n, J); see `KbRegion.limits`."""
-        every = [region.limits(damping) for region in self.regions]
-        return _lowest(every, self.seed)
-
-    def largest_damping(self) -> Floats:
-        """Of each joint draw, shape (n,); see `KbRegion.largest_damping`."""
-        return _lowest([region.largest_damping()[:, None] for region in self.regions], self.seed)[
-            :, 0
-        ]
+    def limits(self, damping: ArrayLike) -> tuple[Floats, ...]:
+        """The limits of each case, (n_c, J) each; see `KbRegion.limits`."""
+        return tuple(region.limits(damping) for region in self.regions)
 
     def probability_map(self, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
         """P(stable in every case) on a grid (I,) and (J,), both ascending; shape (J, I)."""
@@ -80,15 +70,17 @@ class JointRegion:
         The steps are closest at zero, where limits rise most steeply, and reach the damping that
         is unstable in 95 % of the draws.
         """
-        largest = self.largest_damping()
-        wanted = np.quantile(largest, [*risks, _BEYOND], method="inverted_cdf")
+        largest = [np.sort(region.largest_damping())[:, None] for region in self.regions]
+        totals = [len(part) for part in largest]
+        every = (*risks, _BEYOND)
+        wanted = np.array([joint_quantile(largest, totals, risk)[0] for risk in every])
         ends = _INSIDE * wanted[np.isfinite(wanted)]
         steps = np.linspace(0.0, 1.0, count) ** _CLOSER * (ends.max() if len(ends) else 1.0)
         return np.unique(np.concatenate([steps, ends]))
 
 
 def joint_region(
-    cases: Sequence[Any], damping: Damping | None = None, draws: int = DRAWS, seed: int = 0
+    cases: Sequence[Any], damping: Damping | None = None, draws: int = DRAWS
 ) -> JointRegion:
     """The region of one case or several.
 
@@ -99,17 +91,15 @@ def joint_region(
         By default the backward difference.
     draws : int
         Of each case.
-    seed : int
     """
     kind = damping or Backward()
     regions = tuple(kb_region(case, kind, draws=draws) for case in cases)
-    return JointRegion(regions, tuple(case.label for case in cases), seed)
+    return JointRegion(regions, tuple(case.label for case in cases))
 
 
 def filtered(region: JointRegion, kind: Damping) -> JointRegion:
     """The same with another way to get the velocity."""
-    parts = tuple(with_damping(part, kind) for part in region.regions)
-    return JointRegion(parts, region.labels, region.seed)
+    return replace(region, regions=tuple(with_damping(part, kind) for part in region.regions))
 
 
 def usual_dampings(period_s: float) -> tuple[Damping, ...]:
@@ -117,15 +107,26 @@ def usual_dampings(period_s: float) -> tuple[Damping, ...]:
     return Backward(), LowPass(CUTOFF / period_s)
 
 
-def _lowest(every: Sequence[Floats], seed: int) -> Floats:
-    """Smallest over the cases, rows of (n_c, J) in random order; shape (max n_c, J)."""
-    if len(every) == 1:
-        return every[0]
-    rng = np.random.default_rng(seed)
-    count = max(len(part) for part in every)
-    lowest = np.full((count, every[0].shape[1]), np.inf)
-    for part in every:
-        rounds = -(-count // len(part))
-        order = np.concatenate([rng.permutation(len(part)) for _ in range(rounds)])[:count]
-        np.minimum(lowest, part[order], out=lowest)
-    return lowest
+def joint_quantile(limits: Sequence[Floats], totals: Sequence[int], risk: float) -> Floats:
+    """The value that the smallest of independent variables is below with probability `risk`, (J,).
+
+    Parameters
+    ----------
+    limits : sequence of ndarray, shapes (n_c, J)
+        The lowest of the draws of each variable, each column in ascending order.
+    totals : sequence of int
+        How many draws they are the lowest of.
+    risk : float
+    """
+    if len(limits) == 1:
+        return limits[0][max(int(np.ceil(risk * totals[0] - 1e-9)) - 1, 0)]
+    found = np.empty(limits[0].shape[1])
+    for level in range(len(found)):
+        columns = [part[:, level] for part in limits]
+        places = np.sort(np.concatenate(columns))
+        above = np.ones(len(places))
+        for column, total in zip(columns, totals, strict=True):
+            above *= 1 - np.searchsorted(column, places, side="right") / total
+        reached = int(np.argmax(1 - above >= risk - 1e-9))
+        found[level] = places[reached]
+    return found

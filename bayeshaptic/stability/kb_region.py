@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.models.model import Model
 from bayeshaptic.stability.critical import ENOUGH_BELOW
 from bayeshaptic.stability.damping import Backward, Damping
 from bayeshaptic.stability.kb_count import beyond_start, unstable_at_start
@@ -208,9 +209,10 @@ def kb_region(
     Parameters
     ----------
     source : Model, Posterior, Case or Analysis
-        Where it has a `limit`, the region is stretched draw by draw so that without damping it is
-        just that limit: what widens K_CR beyond the parameters' spread (an effect's strength,
-        what remains unexplained) widens the region alike.
+        Where it has a `limit`, the region is stretched draw by draw (by rank, where the limit is
+        not one of the draws) so that without damping it is just that limit: what widens K_CR
+        beyond the parameters' spread (an effect's strength, what remains unexplained) widens the
+        region alike.
     damping : Backward or LowPass, optional
         How the damping term gets its velocity; by default the backward difference.
     theta : array_like, shape (n, P) or (P,), optional
@@ -233,27 +235,43 @@ def kb_region(
     one that touches the origin and all other pairs without a pole outside the unit circle.
     """
     loops = loops_of(source, theta, draws)
-    inverse = inverse_curve(loops.model.system(loops.draws), loops.period_s)
-    critical = _critical(inverse)
-    if loops.target is not None:
-        factor = _stretch(critical, loops.target)
-        inverse, critical = inverse.scaled(factor), critical * factor
-    known = np.where(np.isfinite(critical), critical, np.abs(inverse.nyquist))
-    start = np.where(critical > 0, _START * known, np.nan)
-    curve = kb_curve(inverse, damping or Backward())
-    return KbRegion(curve, start, critical, loops.effective, loops.model.stiffness_unit)
+    region = region_of_draws(loops.model, loops.draws, damping or Backward(), None, loops.effective)
+    if loops.target is None:
+        return region
+    if loops.aligned:
+        return _stretched(region, loops.target)
+    return _stretched(region, loops.target[np.argsort(np.argsort(region.critical))])
+
+
+def region_of_draws(
+    model: Model,
+    draws: Floats,
+    kind: Damping,
+    critical: Floats | None = None,
+    effective: float = np.nan,
+) -> KbRegion:
+    """The region of parameter vectors (n, P), stretched to a stated K_CR of each, shape (n,)."""
+    assert model.period_s is not None
+    inverse = inverse_curve(model.system(draws), model.period_s)
+    own = _critical(inverse)
+    known = np.where(np.isfinite(own), own, np.abs(inverse.nyquist))
+    start = np.where(own > 0, _START * known, np.nan)
+    region = KbRegion(kb_curve(inverse, kind), start, own, effective, model.stiffness_unit)
+    return region if critical is None else _stretched(region, critical)
+
+
+def _stretched(region: KbRegion, wanted: Floats) -> KbRegion:
+    """With every boundary scaled so that K_CR without damping is the one that is wanted, (n,)."""
+    own = region.critical
+    usable = np.isfinite(own) & (own > 0) & np.isfinite(wanted) & (wanted > 0)
+    factor = np.where(usable, wanted / np.where(usable, own, 1.0), 1.0)
+    curve = kb_curve(region.curve.inverse.scaled(factor), region.kind)
+    return replace(region, curve=curve, start=region.start * factor, critical=own * factor)
 
 
 def with_damping(region: KbRegion, kind: Damping) -> KbRegion:
     """The same loops with another way to get the velocity; the response is evaluated once only."""
     return replace(region, curve=kb_curve(region.curve.inverse, kind))
-
-
-def _stretch(critical: Floats, target: Floats) -> Floats:
-    """Factors that take K_CR (n,) to the stated one of the same rank; `target` is ascending."""
-    wanted = target[np.argsort(np.argsort(critical))]
-    usable = np.isfinite(critical) & (critical > 0) & np.isfinite(wanted) & (wanted > 0)
-    return np.where(usable, wanted / np.where(usable, critical, 1.0), 1.0)
 
 
 def _critical(inverse: InverseCurve) -> Floats:

@@ -27,13 +27,17 @@ class Loops:
     effective : float
         Effective number of them.
     target : ndarray, shape (n,), or None
-        Equal quantiles of the K_CR that the caller states, ascending; None where nothing is stated.
+        The K_CR that the caller states: of these draws, or its equal quantiles in ascending order.
+        None where nothing is stated.
+    aligned : bool
+        Whether `target` is of these draws.
     """
 
     model: Model
     draws: Floats
     effective: float
     target: Floats | None
+    aligned: bool = False
 
     @property
     def period_s(self) -> float:
@@ -67,9 +71,11 @@ def loops_of(source: Any, theta: ArrayLike | None = None, draws: int = 4000) -> 
     if hasattr(holder, "chains"):
         vectors, effective = _thinned_chains(np.asarray(holder.chains), draws)
     elif hasattr(holder, "draws"):
-        every = holder.draws
-        vectors = every[np.linspace(0, len(every) - 1, min(draws, len(every))).astype(int)]
-        effective = float(len(vectors))
+        kept = np.linspace(0, len(holder.draws) - 1, min(draws, len(holder.draws))).astype(int)
+        vectors, effective = holder.draws[kept], float(len(kept))
+        if limit is not None and len(limit.samples) == len(holder.draws):
+            effective = min(effective, limit.effective)
+            return Loops(model, vectors, effective, limit.samples[kept], aligned=True)
     else:
         vectors, effective = np.atleast_2d(holder.theta), 1.0
     if limit is None:

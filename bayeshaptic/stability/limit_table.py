@@ -18,8 +18,16 @@ from bayeshaptic import __version__
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.damping import Damping
-from bayeshaptic.stability.joint import JointRegion, filtered, joint_region, usual_dampings
+from bayeshaptic.stability.joint import (
+    JointRegion,
+    filtered,
+    joint_quantile,
+    joint_region,
+    usual_dampings,
+)
 from bayeshaptic.stability.kb_region import DRAWS
+from bayeshaptic.stability.kb_source import loops_of
+from bayeshaptic.stability.kb_tail import Tail, lower_tail
 from bayeshaptic.stability.kb_width import Boundary, ZWidth, width_of
 
 Floats = NDArray[np.float64]
@@ -39,13 +47,16 @@ class FilterLimits:
     region : JointRegion
     damping : ndarray, shape (J,)
         Ascending from zero; the end of the boundary at each risk is among them.
-    limits : ndarray, shape (n, J)
-        Limits of the joint draws, each column in ascending order.
+    limits : tuple of ndarray, shapes (n_c, J)
+        Limits of some draws of each case, each column in ascending order.
+    tails : tuple of Tail, or None
+        The lowest limits of more draws of each case, for small risks.
     """
 
     region: JointRegion = field(repr=False)
     damping: Floats = field(repr=False)
-    limits: Floats = field(repr=False)
+    limits: tuple[Floats, ...] = field(repr=False)
+    tails: tuple[Tail, ...] | None = field(repr=False, default=None)
 
     @property
     def kind(self) -> Damping:
@@ -53,12 +64,17 @@ class FilterLimits:
 
     def quantile(self, risk: float) -> Floats:
         """The stiffness at that risk whether or not the draws are enough for it, shape (J,)."""
-        return self.limits[max(int(np.ceil(risk * len(self.limits))) - 1, 0)]
+        return joint_quantile(self.limits, [len(part) for part in self.limits], risk)
 
     def boundary(self, risk: float) -> Boundary | None:
         """The stiffness at that risk; None where the draws are too few to state it."""
-        known = self.region.says(risk)
-        return Boundary(risk, self.damping, self.quantile(risk)) if known else None
+        if self.region.says(risk):
+            return Boundary(risk, self.damping, self.quantile(risk))
+        if self.tails is None:
+            return None
+        totals = [tail.total for tail in self.tails]
+        stiffness = joint_quantile([tail.limits for tail in self.tails], totals, risk)
+        return Boundary(risk, self.damping, stiffness)
 
     def width(self, risk: float) -> ZWidth | None:
         """How wide the range of walls is at that risk; None where the draws are too few."""
@@ -210,7 +226,7 @@ def limit_table(
     cases = tuple(cases)
     over_all: DeviceLimit | CriticalStiffness
     over_all = device_limit(cases, seed=seed) if len(cases) != 1 else cases[0].limit
-    region = joint_region(cases, draws=draws, seed=seed)
+    region = joint_region(cases, draws=draws)
     kinds = usual_dampings(region.period_s) if dampings is None else tuple(dampings)
     return LimitTable(
         cases,
@@ -218,13 +234,37 @@ def limit_table(
         over_all.samples,
         tuple(over_all.safe(risk) for risk in risks),
         tuple(tuple(case.limit.safe(risk) for risk in risks) for case in cases),
-        tuple(_filter_limits(filtered(region, kind), risks) for kind in kinds),
+        tuple(_filter_limits(cases, filtered(region, kind), risks, draws) for kind in kinds),
     )
 
 
-def _filter_limits(region: JointRegion, risks: tuple[float, ...]) -> FilterLimits:
+def _filter_limits(
+    cases: Sequence[Case], region: JointRegion, risks: tuple[float, ...], draws: int
+) -> FilterLimits:
     levels = region.dampings(risks, ROWS)
-    return FilterLimits(region, levels, np.sort(region.limits(levels), axis=0))
+    limits = region.limits(levels)
+    tails = None
+    if not region.says(min(risks)):
+        tails = _tails(cases, region.kind, levels, limits, min(risks), draws)
+    return FilterLimits(region, levels, tuple(np.sort(part, axis=0) for part in limits), tails)
+
+
+def _tails(
+    cases: Sequence[Case],
+    kind: Damping,
+    levels: Floats,
+    limits: tuple[Floats, ...],
+    risk: float,
+    draws: int,
+) -> tuple[Tail, ...] | None:
+    """The lowest limits of every case, or None as soon as one of them cannot say it."""
+    found = []
+    for case, own in zip(cases, limits, strict=True):
+        tail = lower_tail(case, kind, loops_of(case, draws=draws).draws, levels, own, risk)
+        if tail is None:
+            return None
+        found.append(tail)
+    return tuple(found)
 
 
 def _plain(value: float | None) -> float | None:

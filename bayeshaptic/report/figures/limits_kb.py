@@ -65,7 +65,7 @@ def _panel(axes: Axes, part: FilterLimits, table: LimitTable, rules: Rules | Non
                 linestyle=style.DASHES[number],
                 label=f"{percent(risk)} risk of instability",
             )
-    axes.set_xlim(0, 1.04 * damping[-1])
+    axes.set_xlim(0, 1.04 * damping[-1] or 1.0)
     axes.set_ylim(0, 1.12 * top * k.factor or 1.0)
     if rules is not None:
         _rules(axes, rules, part.damping[-1], b.factor, k.factor)

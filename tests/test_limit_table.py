@@ -1,0 +1,142 @@
+"""The limits that a rendering program loads."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bayeshaptic as bh
+from bayeshaptic.models import build_model
+from bayeshaptic.report.limit_rules import rules_of
+from bayeshaptic.report.limits_section import limits_section
+from bayeshaptic.stability.cases import Case
+from bayeshaptic.stability.damping import Backward, LowPass
+from bayeshaptic.stability.joint import joint_region
+from bayeshaptic.stability.kb_region import kb_region
+from bayeshaptic.stability.limit_table import limit_table
+
+COMPARE = (np.less, np.less_equal)
+
+
+def case(name, device="lhifam", spread=0.03, draws=2400, label="held", group="held", seed=1):
+    model = build_model(name, device, delay_sd_s=20e-6)
+    rng = np.random.default_rng(seed)
+    values = model.values * np.exp(spread * rng.standard_normal((draws, model.size)))
+    return Case(label, group, model, values, bh.critical_stiffness(model, values))
+
+
+@pytest.fixture(scope="module")
+def one():
+    return case("grasped")
+
+
+@pytest.fixture(scope="module")
+def table(one):
+    return limit_table([one], [Backward(), LowPass(80.0)])
+
+
+def test_json_is_strict_and_has_every_limit(table, one):
+    found = json.loads(table.as_json("lhifam", "safe"), parse_constant=pytest.fail)
+    assert found["format"] == "bayeshaptic limits 1"
+    assert (found["device"], found["status"], found["period_s"]) == ("lhifam", "safe", 1e-3)
+    assert (found["stiffness_unit"], found["damping_unit"]) == ("N/m", "N s/m")
+    assert found["stiffness"]["0.05"] == pytest.approx(one.limit.safe(0.05), rel=1e-5)
+    assert found["stiffness"]["0.001"] is None  # 2400 draws do not say it
+    assert [c["label"] for c in found["cases"]] == ["held"]
+    backward, low_pass = found["boundaries"]
+    assert (backward["damping_filter"], backward["cutoff_hz"]) == ("backward", None)
+    assert low_pass["damping_filter"] == "low_pass"
+    assert low_pass["smoothing"] == pytest.approx(np.exp(-2 * np.pi * 80.0 * 1e-3))
+    for part in found["boundaries"]:
+        assert part["damping"][0] == 0.0
+        assert np.all(np.diff(part["damping"]) > 0)
+        assert len(part["stiffness"]["0.01"]) == len(part["damping"])
+        assert part["stiffness"]["0.01"][0] == pytest.approx(found["stiffness"]["0.01"], rel=2e-3)
+
+
+def test_csv_has_the_same_numbers_and_units_in_its_heads(table):
+    rows = list(csv.DictReader(table.as_csv().splitlines()))
+    found = table.as_dict()["boundaries"]
+    assert len(rows) == sum(len(part["damping"]) for part in found)
+    last = rows[-1]
+    assert last["damping_filter"] == "low_pass" and float(last["cutoff_hz"]) == 80.0
+    assert float(last["damping_N_s_per_m"]) == found[1]["damping"][-1]
+    assert float(last["stiffness_N_per_m_at_risk_0.05"]) == found[1]["stiffness"]["0.05"][-1]
+    assert last["stiffness_N_per_m_at_risk_0.001"] == ""
+
+
+def test_the_risk_is_what_it_says(table, one):
+    for part in table.filters:
+        region = kb_region(one, part.kind, draws=len(one.draws))
+        for risk in (0.05, 0.01):
+            boundary = part.boundary(risk)
+            limits = region.limits(boundary.damping)
+            inside = boundary.stiffness > 0
+            below, upto = (np.mean(c(limits, boundary.stiffness), axis=0) for c in COMPARE)
+            assert np.all((below < risk) & (upto >= risk - 1e-9) | ~inside)
+            b, k = boundary.damping[10], boundary.stiffness[10]
+            assert region.probability(k * (1 - 1e-6), b) == pytest.approx(1 - below[10], abs=1e-9)
+
+
+def test_straight_lines_between_rows_are_on_the_safe_side(table, one):
+    for part in table.filters:
+        region = kb_region(one, part.kind)
+        boundary = part.boundary(0.05)
+        between = 0.5 * (boundary.damping[1:] + boundary.damping[:-1])
+        line = np.interp(between, boundary.damping, boundary.stiffness)
+        truth = region.quantile(0.05, between)
+        assert np.all(line <= truth + 2e-3 * boundary.stiffness.max())
+
+
+def test_a_device_is_stable_where_all_of_its_cases_are(one):
+    bare = case("free", label="nobody holds it", group="free", draws=900, seed=2)
+    region = joint_region([bare, one])
+    stiffness, levels = np.array([5e3, 2.15e4, 2.2e4, 5e4]), np.array([0.0, 60.0])
+    each = [kb_region(c).probability_map(stiffness, levels) for c in (bare, one)]
+    np.testing.assert_allclose(region.probability_map(stiffness, levels), each[0] * each[1])
+    together = limit_table([bare, one])
+    for part in together.filters:
+        alone = [kb_region(c, part.kind).quantile(0.05, part.damping) for c in (bare, one)]
+        assert np.all(part.quantile(0.05) <= np.minimum(*alone) * (1 + 1e-9))
+    assert together.stiffness[0] <= 1.01 * min(c.limit.safe(0.05) for c in (bare, one))
+    assert [c["group"] for c in together.as_dict()["cases"]] == ["free", "held"]
+
+
+def test_rotational_devices_have_their_units():
+    found = limit_table([case("free", "phantom", draws=400)])
+    assert (found.unit, found.damping_unit) == ("N m/rad", "N m s/rad")
+    assert "stiffness_N_m_per_rad_at_risk_0.05" in found.as_csv().splitlines()[0]
+
+
+def test_loops_that_are_never_stable_have_limits_of_zero(one):
+    values = np.array(one.draws[:400])
+    values[:, one.model.names.index("kh")] = -5e3
+    limit = bh.critical_stiffness(one.model, values)
+    found = limit_table([replace(one, draws=values, limit=limit)])
+    assert set(found.filters[0].quantile(0.05)) == {0.0}
+    json.loads(found.as_json(), parse_constant=pytest.fail)
+    assert limits_section(found).html
+
+
+def test_rules_of_the_case_with_the_least_damping(one):
+    bare = case("free", label="nobody holds it", group="free", draws=100)
+    rules = rules_of([one, bare], friction=0.01, resolution=1e-6)
+    assert (
+        rules.label == "nobody holds it"
+    )  # 6.9 N s/m to the ground; held 4.1, and 18.3 of the hand
+
+
+def test_small_risks_come_from_the_lowest_of_many_draws():
+    many = case("free", "phantom", draws=24_000, spread=0.05)
+    found = limit_table([many], [LowPass(100.0)], draws=1500).filters[0]
+    boundary = found.boundary(0.001)
+    region = kb_region(many, found.kind, draws=24_000)
+    inside = boundary.stiffness > 0
+    assert inside.sum() > 15
+    truth = region.quantile(0.001, boundary.damping[inside])
+    np.testing.assert_allclose(boundary.stiffness[inside], truth, rtol=1e-9)
+    assert np.all(boundary.stiffness <= found.boundary(0.05).stiffness)
