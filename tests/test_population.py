@@ -1,0 +1,304 @@
+"""Users: the levels of a study against slow references, and what is said of people not yet seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from toy_study import toy_model, toy_posterior
+
+import bayeshaptic as bh
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.gaussian_likelihood import fit_quadratic, linearised
+from bayeshaptic.inference.hierarchy import Hierarchy
+from bayeshaptic.inference.hyperparameters import LKJ, Layout
+from bayeshaptic.inference.pareto import pareto_k
+from bayeshaptic.inference.population import (
+    Population,
+    infer_population,
+    prior_moments,
+    study_coordinates,
+)
+
+Floats = NDArray[np.float64]
+
+
+def quadratic(mean: Floats, covariance: Floats, seed: int = 0) -> object:
+    rng = np.random.default_rng(seed)
+    x = rng.multivariate_normal(mean, covariance, size=300)
+    off = x - mean
+    values = 3.0 - 0.5 * np.einsum("bi,ij,bj->b", off, np.linalg.inv(covariance), off)
+    return fit_quadratic(x, values)
+
+
+def random_covariance(rng: np.random.Generator, size: int, sd: float) -> Floats:
+    root = rng.standard_normal((size, size + 2)) * sd
+    return root @ root.T / size
+
+
+def test_a_gaussian_likelihood_is_found_again() -> None:
+    rng = np.random.default_rng(1)
+    mean, covariance = rng.standard_normal(4), random_covariance(rng, 4, 0.1)
+    found = quadratic(mean, covariance)
+    np.testing.assert_allclose(found.mean, mean, atol=1e-9)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-6, atol=1e-9)  # type: ignore[attr-defined]
+    assert found.constant == pytest.approx(3.0)  # type: ignore[attr-defined]
+
+
+def dense_log_density(levels: Hierarchy, phi: Floats) -> float:
+    """The marginal likelihood from the covariance of everything seen, one big normal density."""
+    level = levels.layout.read(phi[None])
+    root = level.hand_sd[0][:, None] * level.correlation_root[0]
+    size, count = len(levels.prior_mean), len(levels.user)
+    whole = np.zeros((count * size, count * size))
+    for r in range(count):
+        for q in range(count):
+            block = levels.design[r] @ np.diag(levels.beta_sd**2) @ levels.design[q].T
+            if levels.user[r] == levels.user[q]:
+                block[np.ix_(levels.hand, levels.hand)] += root @ root.T
+            if r == q:
+                block += levels.likelihoods[r].covariance + np.diag(levels.spread(level)[0])
+            whole[r * size : (r + 1) * size, q * size : (q + 1) * size] = block
+    seen = levels.mean.ravel()
+    value = -0.5 * np.linalg.slogdet(whole)[1] - 0.5 * seen @ np.linalg.solve(whole, seen)
+    return float(value + level.log_prior[0])
+
+
+def test_integrals_against_one_big_normal_density() -> None:
+    rng = np.random.default_rng(2)
+    size, user, place = 5, np.array([0, 0, 1, 2, 2]), np.array([0, 1, 0, 1, 0])
+    levels = Hierarchy(
+        tuple(
+            quadratic(0.3 * rng.standard_normal(size), random_covariance(rng, size, 0.05), n)  # type: ignore[misc]
+            for n in range(5)
+        ),
+        user,
+        place,
+        np.array([1, 3, 4]),
+        np.array([0, 2]),
+        0.1 * rng.standard_normal(size),
+        np.array([0.5, 0.7, 0.5, 0.7, 0.7]),
+    )
+    middle, width = levels.guess()
+    phi = middle + 0.5 * width * rng.standard_normal((6, len(middle)))
+    fast = levels.log_density(phi)
+    slow = np.array([dense_log_density(levels, one) for one in phi])
+    np.testing.assert_allclose(fast - fast[0], slow - slow[0], rtol=1e-7, atol=1e-6)
+
+
+def test_correlations_have_the_density_that_they_should() -> None:
+    layout = Layout(3, 0, False)
+    rng = np.random.default_rng(3)
+    partial = 0.6 * rng.standard_normal((4, 3))
+    phi = np.concatenate([np.zeros((4, 3)), partial], axis=1)
+
+    def correlation(z: Floats) -> Floats:
+        root = layout.read(np.concatenate([np.zeros(3), z])[None]).correlation_root[0]
+        return np.asarray((root @ root.T)[np.tril_indices(3, -1)])
+
+    # LKJ: det(C)^(LKJ - 1), times the Jacobian of the map, by differences.
+    expected = []
+    for z in partial:
+        steps = [(correlation(z + h) - correlation(z - h)) / 2e-5 for h in 1e-5 * np.eye(3)]
+        lower = correlation(z)
+        full = np.eye(3)
+        full[np.tril_indices(3, -1)] = lower
+        full = full + full.T - np.eye(3)
+        jacobian = np.linalg.slogdet(np.array(steps))[1]
+        expected.append((LKJ - 1) * np.linalg.slogdet(full)[1] + jacobian)
+    found = layout.read(phi).log_prior
+    np.testing.assert_allclose(found - found[0], np.array(expected) - expected[0], atol=1e-6)
+
+
+def direct_draws(means: Floats, covariances: Floats, prior: tuple[Floats, Floats]) -> Floats:
+    """mu, log sd, device, log spread by sampling them with every recording's own parameters.
+
+    One hand's parameter and one of the device; x_r = (mu + sd v_r, device + spread t_r).
+    """
+    import emcee
+
+    count = len(means)
+    weight = np.linalg.inv(covariances)
+
+    def log_density(p: Floats) -> Floats:
+        mu, log_sd, device, log_spread = p[:, :4].T
+        v, t = p[:, 4 : 4 + count], p[:, 4 + count :]
+        x = np.stack(
+            [
+                mu[:, None] + np.exp(log_sd)[:, None] * v,
+                device[:, None] + np.exp(log_spread)[:, None] * t,
+            ],
+            axis=2,
+        )
+        off = x - means
+        value = -0.5 * np.einsum("bri,rij,brj->b", off, weight, off)
+        value -= 0.5 * np.sum(v**2, axis=1) + 0.5 * np.sum(t**2, axis=1)
+        value += log_sd - 0.5 * (np.exp(log_sd) / 0.7) ** 2
+        value -= 0.5 * ((log_spread - np.log(0.003)) / 1.5) ** 2
+        value -= 0.5 * ((mu - prior[0][0]) / prior[1][0]) ** 2
+        value -= 0.5 * ((device - prior[0][1]) / prior[1][1]) ** 2
+        return np.asarray(value)
+
+    rng = np.random.default_rng(4)
+    middle = np.concatenate(
+        [[means[:, 0].mean(), -1.0, means[:, 1].mean(), -6.0], np.zeros(2 * count)]
+    )
+    width = np.concatenate([[0.1, 0.2, 0.003, 1.0], np.ones(2 * count)])
+    start = middle + width * rng.standard_normal((80, len(middle)))
+    sampler = emcee.EnsembleSampler(
+        80,
+        len(middle),
+        log_density,
+        vectorize=True,
+        moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.StretchMove(), 0.2)],
+    )
+    sampler.random_state = np.random.RandomState(5).get_state()
+    sampler.run_mcmc(start, 6000)
+    return np.asarray(sampler.get_chain(discard=1000, flat=True, thin=20))[:, :4]
+
+
+def test_against_sampling_everything_together() -> None:
+    model = toy_model("kc", "kh")  # device, hand
+    mean, sd = prior_moments(model, study_coordinates(model))
+    rng = np.random.default_rng(6)
+    truth = mean + np.array([0.02, 0.1])
+    covariance = np.array([[4e-5, 1.2e-4], [1.2e-4, 1e-3]])
+    means = truth + np.column_stack([np.zeros(5), 0.3 * rng.standard_normal(5)])
+    means += rng.multivariate_normal(np.zeros(2), covariance, size=5)
+    posteriors = [toy_posterior(model, one, covariance, n) for n, one in enumerate(means)]
+    found = infer_population(posteriors, list("abcde"), seed=1)
+    order = [1, 0]  # the hand first, there
+    turned = covariance[np.ix_(order, order)]
+    slow = direct_draws(means[:, order], np.tile(turned, (5, 1, 1)), (mean[order], sd[order]))
+    assert found._below is not None
+    fast = np.column_stack(
+        [
+            found.log_mean[:, 0],
+            np.log(found.log_sd[:, 0]),
+            found._below.beta[:, 1],
+            np.log(found.device_spread[:, 0]),
+        ]
+    )
+    scale = slow.std(axis=0)
+    # 500 effective draws: an error of 0.045 sd of a mean, three times that for two chains.
+    assert np.all(np.abs(fast.mean(axis=0) - slow.mean(axis=0)) < 0.2 * scale)
+    np.testing.assert_allclose(fast.std(axis=0), scale, rtol=0.2)
+
+
+@pytest.fixture(scope="module")
+def people() -> tuple[Population, Floats, Floats]:
+    """Ten users of whom the last was recorded badly: population, their hands, and their peaks."""
+    model = toy_model("kc", "b1", "mh", "kh")
+    here = study_coordinates(model)
+    names = list(model.names)
+    rng = np.random.default_rng(7)
+    mean, _ = prior_moments(model, here)
+    x = np.tile(mean, (10, 1))
+    hand = [names.index("mh"), names.index("kh")]
+    x[:, hand] += rng.multivariate_normal([0.1, -0.1], [[0.09, 0.05], [0.05, 0.09]], size=10)
+    x[:, names.index("b1")] = 0.01  # nearly none, in units of the prior's width
+    peaks, posteriors = [], []
+    for number, one in enumerate(x):
+        noise = random_covariance(rng, 4, 0.02 if number < 9 else 0.5)
+        peaks.append(rng.multivariate_normal(one, noise))
+        posteriors.append(toy_posterior(model, peaks[-1], noise, number))
+    found = infer_population(posteriors, [f"user {n}" for n in range(10)], seed=2)
+    return found, x[:, hand], np.array(peaks)[:, hand]
+
+
+def test_population_mean_and_correlation(people: tuple[Population, Floats, Floats]) -> None:
+    found, hands, _ = people
+    assert found.parameters == ("mh", "kh") and found.device_parameters == ("b1", "kc")
+    middle = np.log([toy_model("mh", "kh").reference[name] for name in found.parameters])
+    truth = middle + np.array([0.1, -0.1])
+    off = (found.log_mean.mean(axis=0) - truth) / found.log_mean.std(axis=0)
+    assert np.all(np.abs(off) < 3)
+    assert np.quantile(found.correlation[:, 0, 1], 0.95) > np.corrcoef(hands.T)[0, 1]
+
+
+def test_a_poor_recording_is_drawn_to_the_others(people: tuple[Population, Floats, Floats]) -> None:
+    found, hands, peaks = people
+    columns = [found.model.names.index(name) for name in found.parameters]
+    own = np.log(found.of_user("user 9")[0].draws[:, columns]).mean(axis=0)
+    centre = found.log_mean.mean(axis=0)
+    assert np.linalg.norm(own - centre) < np.linalg.norm(peaks[9] - centre)
+    good = np.log(found.of_user("user 0")[0].draws[:, columns])
+    assert np.all(np.abs(good.mean(axis=0) - hands[0]) < 4 * good.std(axis=0))
+
+
+def test_new_people(people: tuple[Population, Floats, Floats]) -> None:
+    found, hands, _ = people
+    draws = found.new_person(np.random.default_rng(1), each=5)
+    assert draws.shape == (5 * len(found.log_mean), 4)
+    assert np.all(draws >= 0)  # no damper below its wall
+    same = found.new_person(np.random.default_rng(1), each=5)
+    np.testing.assert_array_equal(draws, same)
+    # As the ten that were seen, and wider, because mean and spread are not known.
+    own = np.log(draws[:, [found.model.names.index(name) for name in found.parameters]])
+    width = np.ptp(np.quantile(own, [0.05, 0.95], axis=0), axis=0)
+    plain = 2 * 1.645 * hands.std(axis=0, ddof=1)
+    assert np.all((width > plain) & (width < 1.5 * plain))
+
+
+def test_two_trials_of_one_person() -> None:
+    model = toy_model("kc", "kh")
+    mean, _ = prior_moments(model, study_coordinates(model))
+    noise = np.diag([1e-6, 1e-4])
+    off = (0.3, -0.2, 0.1, -0.4, 0.2)
+    posteriors, users = [], []
+    for number, one in enumerate(off):
+        for trial in range(2):
+            peak = mean + np.array([0.0, one + 0.01 * (-1) ** trial])
+            posteriors.append(toy_posterior(model, peak, noise, 2 * number + trial))
+            users.append(f"user {number}")
+    found = infer_population(posteriors, users, seed=3)
+    assert found.users == tuple(dict.fromkeys(users)) and len(found.of_user("user 1")) == 2
+    assert found._below is not None
+    assert np.median(found._below.level.trial_sd) < 0.1 < np.median(found.log_sd)
+
+
+def test_models_must_agree_and_have_a_hand() -> None:
+    one = toy_posterior(toy_model("kc", "kh"), np.array([3.0, 0.3]), 1e-4 * np.eye(2), 0)
+    other = toy_posterior(toy_model("kc", "mh"), np.array([3.0, -6.0]), 1e-4 * np.eye(2), 0)
+    with pytest.raises(InputError, match="posterior 2 has the parameters kc, mh"):
+        infer_population([one, other], ["a", "b"])
+    free = toy_model("kc", base="free")
+    with pytest.raises(InputError, match="the free model has no hand"):
+        infer_population([toy_posterior(free, np.array([3.0]), 1e-4 * np.eye(1), 0)], ["a"])
+    with pytest.raises(InputError, match="1 posteriors, but 2 users"):
+        infer_population([one], ["a", "b"])
+    with pytest.raises(InputError, match="no recording"):
+        infer_population([], [])
+
+
+def test_tail_of_weights() -> None:
+    rng = np.random.default_rng(9)
+    assert pareto_k(np.zeros(1000)) == -np.inf
+    for shape in (0.1, 0.3, 0.6, 0.9):
+        found = [pareto_k(shape * rng.exponential(size=4000)) for _ in range(20)]
+        # 189 weights in the tail: an error of (1 + k) / sqrt(189) of one, and drawn towards 0.5
+        expected = (189 * shape + 5) / 199
+        assert np.mean(found) == pytest.approx(expected, abs=3 * (1 + shape) / np.sqrt(189 * 20))
+
+
+def test_linearised_likelihood_is_that_of_the_model() -> None:
+    from bayeshaptic.rig import Bench, simulate
+
+    done = simulate(Bench.from_device("phantom", held=True), seed=1)
+    recording = bh.recording_from_arrays(
+        done.force, done.position, done.period_s, force_unit="Nm", position_unit="rad"
+    )
+    model = toy_model("kc", "ks", "mh")
+    etfe = bh.estimate_etfe(recording)
+    fit = bh.least_squares(model, etfe, seed=1)
+    posterior = bh.sample(model, etfe, fit, ess=200, seed=1)
+    here = study_coordinates(posterior.model)
+    x = here.coordinate(posterior.draws)
+    found = linearised(posterior, here, x.mean(axis=0), 0.05 * x.std(axis=0))
+    assert found is not None
+    left = posterior.log_likelihood.ravel() - found(x)
+    assert left.std() < 0.1  # nats; the likelihood itself varies by more than 1
+    bare = replace(posterior, windows=None)
+    assert linearised(bare, here, x.mean(axis=0), x.std(axis=0)) is None
