@@ -1,0 +1,87 @@
+"""The limit of a device over all its cases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.models import build_model
+from bayeshaptic.stability.cases import FREE, HELD, Case, device_limit
+from bayeshaptic.stability.critical import CriticalStiffness
+
+Floats = NDArray[np.float64]
+MODEL = build_model("free", "phantom")
+
+
+def case(label: str, samples: Floats, joint: str | None = None, unit: str = "N/m") -> Case:
+    """A case with invented limits of independent draws."""
+    count = len(samples)
+    limit = CriticalStiffness(samples, np.ones(count), unit, (), np.zeros(count, int), chains=count)
+    group = FREE if label == "nobody holds it" else HELD
+    return Case(label, group, MODEL, np.ones((count, MODEL.size)), limit, joint)
+
+
+def test_the_least_of_two_independent_cases() -> None:
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(100, 5, 40_000), rng.normal(104, 5, 20_000)
+    found = device_limit([case("nobody holds it", one), case("user ana", other)])
+    # P(one < other) = Phi(4 / sqrt(50)); 40,000 draws: 0.0023 is one standard error.
+    shares = {binding.case: binding.probability for binding in found.binding}
+    assert shares["nobody holds it"] == pytest.approx(0.7142, abs=0.01)
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert found.by_group() == {FREE: shares["nobody holds it"], HELD: shares["user ana"]}
+    assert found.binding[0].case == "nobody holds it"
+    below = 1 - (1 - np.mean(one < 95)) * (1 - np.mean(other < 95))
+    assert found.probability_unstable(95.0) == pytest.approx(below, abs=0.006)
+
+
+def test_safe_wants_twenty_draws_below() -> None:
+    rng = np.random.default_rng(2)
+    found = device_limit([case("nobody holds it", rng.normal(100, 5, 1900))])
+    assert found.safe(0.05) == pytest.approx(100 - 1.645 * 5, abs=1.0)
+    assert found.safe(0.01) is None and found.safe(0.001) is None
+    many = [
+        case("nobody holds it", rng.normal(100, 5, 1900)),
+        case("user ana", 1e6 + rng.normal(size=60_000)),
+    ]
+    assert device_limit(many).safe(0.01) is None  # draws of a case that never binds do not count
+
+
+def test_few_draws_of_the_binding_case_limit_the_whole() -> None:
+    rng = np.random.default_rng(3)
+    few, plenty = rng.normal(100, 5, 1000), rng.normal(100, 5, 50_000)
+    both = device_limit([case("nobody holds it", few), case("user ana", plenty)])
+    assert both.safe(0.05) is not None and both.safe(0.01) is None
+    alone = device_limit([case("user ana", plenty)])
+    assert alone.safe(0.001) is not None
+
+
+def test_cases_that_are_drawn_together_keep_their_order() -> None:
+    rng = np.random.default_rng(4)
+    samples = rng.normal(100, 5, 30_000)
+    together = [case(f"user {n}", samples + 0.1 * n, joint="a path") for n in range(9)]
+    found = device_limit(together)
+    assert found.binding[0].case == "user 0" and found.binding[0].probability == 1.0
+    assert found.quantile(0.01) == pytest.approx(np.quantile(samples, 0.01))
+    assert found.safe(0.001) is not None
+    apart = device_limit([case(f"user {n}", samples + 0.1 * n) for n in range(9)])
+    assert apart.quantile(0.5) < found.quantile(0.5) - 5  # the least of nine
+
+
+def test_unstable_and_unlimited_draws() -> None:
+    never = case("nobody holds it", np.full(1000, np.inf))
+    found = device_limit([never])
+    assert found.quantile(0.5) == np.inf and found.binding[0].probability == 0.0
+    always = device_limit([never, case("user ana", np.zeros(1000))])
+    assert always.quantile(0.5) == 0.0 and always.binding[0].case == "user ana"
+    assert always.db(0.5) == -np.inf
+
+
+def test_units_must_agree() -> None:
+    ones = np.ones(10)
+    with pytest.raises(InputError, match="N m/rad and N/m"):
+        device_limit([case("a", ones), case("b", ones, unit="N m/rad")])
+    with pytest.raises(InputError, match="no case"):
+        device_limit([])

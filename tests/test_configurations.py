@@ -1,0 +1,224 @@
+"""Configurations: a device along a coordinate, and a study's cases and numbers."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_analysis import fake_analysis
+from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
+from toy_study import toy_model, toy_posterior
+
+import bayeshaptic as bh
+from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.diagnosis.configuration_limits import configuration_limits
+from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
+from bayeshaptic.diagnosis.study_cases import study_cases
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.configurations import Configurations, infer_configurations
+from bayeshaptic.inference.path import Path as Line
+from bayeshaptic.inference.population import prior_moments, study_coordinates
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.recordings.study import Study, StudyEntry
+from bayeshaptic.report.population_json import population_json
+
+Floats = NDArray[np.float64]
+PLACES = (0.0, 0.2, 0.5, 0.7, 1.0)
+KEYS = (
+    "device", "recordings", "users", "population", "correlation", "new_person", "configurations",
+    "device_limit",
+)  # fmt: skip
+
+
+def along(places: tuple[float, ...], bend: float = 0.0) -> list[Posterior]:
+    """Recordings of a device whose kc rises by 20 % along the coordinate, m2 by 5 %."""
+    model = toy_model("kc", "m2", "b1", base="free")
+    mean, _ = prior_moments(model, study_coordinates(model))
+    names = list(model.names)
+    noise = np.diag([1e-6, 1e-6, 1e-6])
+    rng = np.random.default_rng(5)
+    posteriors = []
+    for number, place in enumerate(places):
+        peak = mean.copy()
+        peak[names.index("b1")] = 0.3
+        peak[names.index("kc")] += 0.2 * place + bend * (place - 0.5) ** 2
+        peak[names.index("m2")] += 0.05 * place
+        peak += rng.multivariate_normal(np.zeros(3), noise)
+        posteriors.append(toy_posterior(model, peak, noise, number))
+    return posteriors
+
+
+@pytest.fixture(scope="module")
+def inferred() -> Configurations:
+    return infer_configurations(along(PLACES), PLACES, seed=1)
+
+
+def test_density_against_scipy(inferred: Configurations) -> None:
+    line = inferred._path
+    assert isinstance(line, Line)
+    middle, width = line.guess()
+    phi = middle + width * np.random.default_rng(1).standard_normal((4, len(middle)))
+    expected = []
+    for one in phi:
+        prior = multivariate_normal(middle, np.diag(width**2)).logpdf(one)
+        whole = line._covariance(one[None])[0]
+        expected.append(prior + multivariate_normal(cov=whole).logpdf(line.seen))
+    found = line.log_density(phi)
+    np.testing.assert_allclose(found - found[0], np.array(expected) - expected[0], atol=1e-6)
+
+
+def test_between_measured_configurations(inferred: Configurations) -> None:
+    grid = inferred.grid(9)
+    assert set(PLACES) <= set(grid) and np.all(np.diff(grid) > 0) and len(grid) >= 9
+    draws = inferred.predict(grid, np.random.default_rng(2), 600)
+    kc = np.log(draws[:, :, inferred.model.names.index("kc")])
+    truth = np.log(inferred.model.reference["kc"]) + 0.2 * grid
+    off = np.abs(np.median(kc, axis=0) - truth)
+    assert np.all(off < 0.01)  # of 20 % along the coordinate
+    low, high = np.quantile(kc, [0.05, 0.95], axis=0)
+    assert np.all((low < truth) & (truth < high)) and np.all(high - low < 0.06)
+    assert np.all(draws > 0)
+
+
+def test_two_configurations_are_not_a_path() -> None:
+    with pytest.raises(InputError, match="2 different configurations"):
+        infer_configurations(along((0.0, 1.0)), (0.0, 1.0))
+    with pytest.raises(InputError, match="1 posteriors, but 2 configurations"):
+        infer_configurations(along((0.0,)), (0.0, 1.0))
+
+
+def test_the_worst_configuration() -> None:
+    # The limit of the free PHANToM is that of its damping: let that fall to one end.
+    posteriors = []
+    model = toy_model("m2", "b1", base="free")
+    mean, _ = prior_moments(model, study_coordinates(model))
+    names = list(model.names)
+    for number, place in enumerate(PLACES):
+        peak = mean.copy()
+        peak[names.index("b1")] = 0.5 - 0.2 * place
+        posteriors.append(toy_posterior(model, peak, 1e-6 * np.eye(2), number))
+    found = configuration_limits(posteriors, PLACES, held=False)
+    assert found.worst_coordinate == 1.0 and found.worst_probability[-1] > 0.9
+    assert found.worst_probability.sum() == pytest.approx(1.0)
+    middle = found.quantile(0.5)
+    assert np.all(np.diff(middle) < 0)
+    assert [case.joint for case in found.cases] == ["along, nobody holds it"] * len(
+        found.coordinates
+    )
+
+
+def analysed(name: str, posterior: Posterior, **entry: object) -> Analysed:
+    """A recording with the given posterior; the rest of its analysis is invented."""
+    fake = fake_analysis("free", "phantom")
+    limit = bh.critical_stiffness(posterior)
+    keys = Analysis.__dataclass_fields__
+    parts = {key: getattr(fake, key) for key in keys} | {
+        "posterior": posterior, "model": posterior.model, "limit": limit
+    }  # fmt: skip
+    return Analysed(name, StudyEntry(Path(f"{name}.csv"), **entry), Analysis(**parts))  # type: ignore[arg-type]
+
+
+def whole_study(recordings: list[Analysed]) -> StudyAnalysis:
+    cases = study_cases(recordings, 0, lambda share, word: None)
+    device = bh.load_device("phantom")
+    study = Study("toy", Path("toy.toml"), device, tuple(one.entry for one in recordings))
+    names = ("population", "new_person", "users", "configurations", "cases", "limit")
+    parts = {name: getattr(cases, name) for name in names}
+    return StudyAnalysis(
+        study, device, tuple(recordings), notices=cases.notices, seconds=cases.seconds, **parts
+    )
+
+
+@pytest.fixture(scope="module")
+def mixed() -> StudyAnalysis:
+    """Free in five configurations, and three users, one of them with another model."""
+    free = [
+        analysed(f"free-{n}", one, configuration=place)
+        for n, (one, place) in enumerate(zip(along(PLACES), PLACES, strict=True))
+    ]
+    model, odd = toy_model("kc", "kh"), toy_model("kc", "mh")
+    mean, _ = prior_moments(model, study_coordinates(model))
+    users = [
+        analysed(f"u-{n}", toy_posterior(model, mean + 0.1 * n, 1e-4 * np.eye(2), n), user=f"u{n}")
+        for n in range(3)
+    ]
+    other, _ = prior_moments(odd, study_coordinates(odd))
+    users.append(analysed("odd", toy_posterior(odd, other, 1e-4 * np.eye(2), 9), user="odd"))
+    failed = Analysed("bad", StudyEntry(Path("bad.csv"), user="h"), None, "bad.csv: no data")
+    return whole_study([*free, *users, failed])
+
+
+def test_cases_of_a_study(mixed: StudyAnalysis) -> None:
+    labels = [case.label for case in mixed.cases]
+    assert labels[:4] == ["user u0", "user u1", "user u2", "user odd"]
+    assert labels[4] == "a new person"
+    assert "configuration 0.2, nobody holds it" in labels
+    assert any("(predicted)" in label for label in labels)
+    assert mixed.population is not None and mixed.population.users == ("u0", "u1", "u2")
+    assert any("Left out" in one.text and "odd" in one.text for one in mixed.notices)
+    assert mixed.limit is not None
+    # Free, the PHANToM is far worse than held; and that comes out by itself.
+    assert mixed.limit.binding[0].group == "configuration"
+    assert mixed.limit.by_group()["held"] < 0.01
+    assert mixed.new_person[0].limit.chains == len(mixed.population.log_mean)
+    assert pickle.loads(pickle.dumps(mixed)).cases[0].label == "user u0"
+
+
+def test_numbers_of_a_study(mixed: StudyAnalysis) -> None:
+    found = json.loads(population_json(mixed))
+    assert tuple(found) == KEYS
+    assert found["device"] == "phantom" and found["recordings"] == 9
+    assert [row["user"] for row in found["users"]] == ["u0", "u1", "u2", "odd"]
+    assert list(found["population"]) == ["kh"]
+    assert found["population"]["kh"].keys() == {"log_mean", "log_sd"}
+    assert found["population"]["kh"]["log_sd"].keys() == {"q05", "q50", "q95"}
+    assert found["correlation"] == [[pytest.approx(1.0)]]
+    new = found["new_person"]["critical_stiffness"]
+    assert new.keys() == {"unit", "q05", "q50", "q95", "db", "safe", "crossings"}
+    assert new["q05"] < new["q50"] < new["q95"] and new["unit"] == "N m/rad"
+    assert new["safe"].keys() == {"0.05", "0.01", "0.001"}
+    rows = found["configurations"]
+    assert {row["coordinate"] for row in rows} >= set(PLACES) and not any(r["held"] for r in rows)
+    assert found["device_limit"]["binding"][0].keys() == {"case", "probability"}
+
+
+def test_named_configurations_are_cases_and_nothing_between() -> None:
+    found = whole_study(
+        [
+            analysed(name, one, configuration=name, trial=trial)
+            for name, one, trial in zip("aab", along((0.0, 0.0, 1.0)), (1, 2, 1), strict=True)
+        ]
+    )
+    assert found.configurations == () and found.population is None
+    assert [c.label for c in found.cases] == [f"nobody holds it, configuration {n}" for n in "ab"]
+    assert len(found.cases[0].draws) == 2 * len(found.cases[1].draws)
+    numbers = json.loads(population_json(found))
+    assert numbers["population"] is None and numbers["new_person"] is None
+    assert [row["coordinate"] for row in numbers["configurations"]] == ["a", "b"]
+
+
+def test_nothing_left() -> None:
+    failed = Analysed("bad", StudyEntry(Path("bad.csv")), None, "bad.csv: no data")
+    found = whole_study([failed])
+    assert found.limit is None and found.cases == () and found.failed == (failed,)
+    numbers = json.loads(population_json(found))
+    assert tuple(numbers) == KEYS and numbers["device_limit"] is None and numbers["users"] == []
+
+
+def test_a_recording_that_fails_stops_nothing(tmp_path: Path) -> None:
+    (tmp_path / "bad.csv").write_text("time_s,force_n\n0,1\n", encoding="utf-8")
+    (tmp_path / "study.toml").write_text(
+        '[device]\nname = "phantom"\n[[recording]]\nfile = "bad.csv"\nuser = "h"\n',
+        encoding="utf-8",
+    )
+    said: list[str] = []
+    study = bh.read_study(tmp_path / "study.toml")
+    found = bh.analyse_study(study, progress=lambda share, word: said.append(word))
+    assert found.limit is None and "no column" in str(found.recordings[0].error)
+    assert any(one.topic == "recordings" for one in found.notices) and said[-1] == "done"
+    assert replace(found.recordings[0], error=None).effects == ()
