@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.report.headline import Headline, headline, rounded_down
 from bayeshaptic.report.quantities import percent, quantity
-from bayeshaptic.report.study_words import Z90, listed, missing
+from bayeshaptic.report.study_words import Z90, is_free, listed, missing
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def _scope(study: StudyAnalysis) -> str:
     groups = {case.group for case in study.cases}
     count = len({one.entry.user for one in study.recordings if one.result} - {None})
     found = []
-    if FREE in groups:
+    if any(is_free(case.label, case.group) for case in study.cases):
         found.append("nobody holding it")
     if HELD in groups:
         found.append("its one user" if count == 1 else f"these {count} people")
@@ -120,8 +120,8 @@ def what_binds(study: StudyAnalysis) -> str:
 
 def _holder(found: Binding) -> str:
     """Who holds the device in a case, in words."""
-    free = found.group == CONFIGURATION and found.case.endswith(HOLDERS[FREE])
-    return HOLDERS[FREE] if free else HOLDERS.get(found.group, found.group)
+    group = FREE if is_free(found.case, found.group) else found.group
+    return HOLDERS.get(group, group)
 
 
 def sentence_of(text: str) -> str:

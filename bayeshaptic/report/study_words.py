@@ -10,7 +10,7 @@ import numpy as np
 from bayeshaptic.report.limits import decibel
 from bayeshaptic.report.quantities import estimate, percent, pure
 from bayeshaptic.report.study_bands import band_of
-from bayeshaptic.stability.cases import FREE, HELD, NEW_PERSON
+from bayeshaptic.stability.cases import CONFIGURATION, FREE
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.study_analysis import StudyAnalysis
@@ -20,13 +20,19 @@ from bayeshaptic.stability.cases import Case
 _HARDLY_DB = 0.15  # a spread of K_CR between people that nobody needs to care about
 _LITTLE_DB = 0.5
 _AS_BAD_DB = 1.0
+_CONFIGURATION = ", configuration "
 Z90 = 3.29  # width of a normal 90 % interval in standard deviations
+
+
+def is_free(label: str, group: str) -> bool:
+    """Whether nobody holds the device in a case, recorded or predicted along a coordinate."""
+    return group == FREE or (group == CONFIGURATION and label.endswith("nobody holds it"))
 
 
 def hands(study: StudyAnalysis) -> str:
     """Free or held: which is worse, and by how much."""
-    free = [case for case in study.cases if case.group == FREE]
-    held = [case for case in study.cases if case.group in (HELD, NEW_PERSON)]
+    free = [case for case in study.cases if is_free(case.label, case.group)]
+    held = [case for case in study.cases if not is_free(case.label, case.group)]
     if not free or not held:
         return ""
     alone, in_hand = (_median_db(cases) for cases in (free, held))
@@ -52,8 +58,7 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
     if not study.new_person:
         return ()
     case = study.new_person[0]
-    _, _, place = case.label.partition(", configuration ")
-    where = f" (in configuration {place})" if len(study.new_person) > 1 else ""
+    where = f" (in configuration {_place(case)})" if len(study.new_person) > 1 else ""
     spread = spread_db(case)
     middle, low, high = case.limit.quantile([0.5, 0.05, 0.95])
     seen = estimate(middle, low, high, case.limit.unit)
@@ -81,12 +86,16 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
 
 
 def _between(study: StudyAnalysis) -> str:
-    """The lowest and the highest of the people that were seen."""
-    if len(study.users) < 2:
+    """The lowest and the highest of the people that were seen in one configuration."""
+    place = _place(study.new_person[0])
+    seen = [case for case in study.users if _place(case) == place]
+    if len(seen) < 2:
         return ""
-    order = sorted(study.users, key=lambda case: case.limit.quantile(0.5))
-    low, high = (decibel(case.limit.quantile(0.5)) for case in (order[0], order[-1]))
-    blur = float(np.median([spread_db(case) for case in study.users]))
+    order = sorted(seen, key=lambda case: case.limit.quantile(0.5))
+    (low, least), (high, most) = (
+        (decibel(case.limit.quantile(0.5)), _user(case)) for case in (order[0], order[-1])
+    )
+    blur = float(np.median([spread_db(case) for case in seen]))
     same = (
         " That is no more than what one recording leaves open, so that these people cannot be "
         "told apart by it."
@@ -94,10 +103,18 @@ def _between(study: StudyAnalysis) -> str:
         else ""
     )
     return (
-        f"Of those who were recorded, {order[0].label.removeprefix('user ')} has the lowest limit "
-        f"({low:.2f} dB) and {order[-1].label.removeprefix('user ')} the highest ({high:.2f} dB)."
-        f"{same}"
+        f"Of those who were recorded{' there' if place else ''}, {least} has the lowest limit "
+        f"({low:.2f} dB) and {most} the highest ({high:.2f} dB).{same}"
     )
+
+
+def _place(case: Case) -> str:
+    """The configuration in the label of a case; empty without one."""
+    return case.label.partition(_CONFIGURATION)[2]
+
+
+def _user(case: Case) -> str:
+    return case.label.partition(_CONFIGURATION)[0].removeprefix("user ")
 
 
 def spread_db(case: Case) -> float:
