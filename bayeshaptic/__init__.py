@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bayeshaptic.inference.arviz_io import load_posterior
     from bayeshaptic.inference.choose import Choice, choose_model
     from bayeshaptic.inference.least_squares import Fit, least_squares
+    from bayeshaptic.inference.next_experiment import Experiment, next_experiment
     from bayeshaptic.inference.population import Population, infer_population
     from bayeshaptic.inference.posterior import Posterior
     from bayeshaptic.inference.sampler import sample
@@ -56,14 +57,20 @@ if TYPE_CHECKING:
     from bayeshaptic.report.study_report import write_study_report
     from bayeshaptic.stability import (
         Backward,
+        Case,
         CriticalStiffness,
         KbRegion,
         LowPass,
         RelayMeasurement,
         critical_stiffness,
-        kb_region,
+        device_limit,
         measure_relay,
     )
+    from bayeshaptic.stability.elasticities import Elasticities, elasticities
+    from bayeshaptic.stability.kb_region import kb_region
+    from bayeshaptic.stability.limit_table import LimitTable, limit_table
+    from bayeshaptic.stability.shares import VarianceShares, variance_shares
+    from bayeshaptic.stability.sweep import Sweep, sweep
 
 __version__ = "0.1.0"
 
@@ -102,13 +109,27 @@ _HOMES = {
     "bayeshaptic.report.study_report": ("write_study_report",),
     "bayeshaptic.stability": (
         "Backward",
+        "Case",
         "CriticalStiffness",
+        "Elasticities",
         "KbRegion",
+        "LimitTable",
         "LowPass",
         "RelayMeasurement",
+        "Sweep",
+        "VarianceShares",
         "critical_stiffness",
+        "device_limit",
+        "elasticities",
         "kb_region",
+        "limit_table",
         "measure_relay",
+        "sweep",
+        "variance_shares",
+    ),
+    "bayeshaptic.inference.next_experiment": (
+        "Experiment",
+        "next_experiment",
     ),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
@@ -117,15 +138,19 @@ __all__ = [
     "Analysis",
     "Backward",
     "BayeshapticWarning",
+    "Case",
     "Choice",
     "Closed",
     "CriticalStiffness",
     "Device",
+    "Elasticities",
     "Etfe",
+    "Experiment",
     "Fit",
     "HalfNormal",
     "InputError",
     "KbRegion",
+    "LimitTable",
     "LogNormal",
     "LogUniform",
     "LowPass",
@@ -138,22 +163,28 @@ __all__ = [
     "RelayMeasurement",
     "Study",
     "StudyAnalysis",
+    "Sweep",
     "Uniform",
+    "VarianceShares",
     "analyse",
     "analyse_study",
     "choose_model",
     "close_loop",
     "critical_stiffness",
+    "device_limit",
     "device_names",
+    "elasticities",
     "estimate_etfe",
     "free",
     "grasped",
     "infer_population",
     "kb_region",
     "least_squares",
+    "limit_table",
     "load_device",
     "load_posterior",
     "measure_relay",
+    "next_experiment",
     "read_frf",
     "read_measurement",
     "read_recording",
@@ -161,6 +192,8 @@ __all__ = [
     "recording_from_arrays",
     "rigid",
     "sample",
+    "sweep",
+    "variance_shares",
     "write_report",
     "write_study_report",
 ]

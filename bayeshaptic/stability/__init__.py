@@ -1,12 +1,15 @@
 """Critical stiffness and the rules beside it."""
 
 from bayeshaptic.stability.binding import BindingCrossing
+from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.crossings import Crossings, find_crossings
 from bayeshaptic.stability.damping import Backward, LowPass
+from bayeshaptic.stability.elasticities import Elasticities, elasticities
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.stability.kb_region import KbRegion, kb_region
 from bayeshaptic.stability.kb_width import Boundary, ZWidth
+from bayeshaptic.stability.limit_table import LimitTable, limit_table
 from bayeshaptic.stability.relay import RelayMeasurement, measure_relay
 from bayeshaptic.stability.relay_check import RelayCheck, check_relay
 from bayeshaptic.stability.rules import (
@@ -15,30 +18,45 @@ from bayeshaptic.stability.rules import (
     quantisation_limit,
     rigid_limit,
 )
+from bayeshaptic.stability.shares import Share, VarianceShares, variance_shares
 from bayeshaptic.stability.spectral_radius import confirms, spectral_radius
+from bayeshaptic.stability.sweep import Jump, Sweep, sweep
 
 __all__ = [
     "Backward",
-    "KbRegion",
-    "Boundary",
-    "LowPass",
-    "ZWidth",
-    "kb_region",
     "BindingCrossing",
+    "Boundary",
+    "Case",
     "CriticalStiffness",
     "Crossings",
+    "DeviceLimit",
+    "Elasticities",
     "EtfeCriticalStiffness",
+    "Jump",
+    "KbRegion",
+    "LimitTable",
+    "LowPass",
     "RelayCheck",
     "RelayMeasurement",
+    "Share",
+    "Sweep",
+    "VarianceShares",
+    "ZWidth",
     "check_relay",
     "confirms",
     "critical_stiffness",
+    "device_limit",
+    "elasticities",
     "etfe_critical_stiffness",
     "find_crossings",
     "ground_damping",
+    "kb_region",
+    "limit_table",
     "measure_relay",
     "passivity_limit",
     "quantisation_limit",
     "rigid_limit",
     "spectral_radius",
+    "sweep",
+    "variance_shares",
 ]
