@@ -302,3 +302,15 @@ def test_linearised_likelihood_is_that_of_the_model() -> None:
     assert left.std() < 0.1  # nats; the likelihood itself varies by more than 1
     bare = replace(posterior, windows=None)
     assert linearised(bare, here, x.mean(axis=0), x.std(axis=0)) is None
+
+
+def test_priors_in_the_coordinates_of_a_study() -> None:
+    model = bh.grasped(device="phantom", delay_sd_s=20e-6)
+    here = study_coordinates(model)
+    mean, sd = prior_moments(model, here)
+    at = dict(zip(model.names, zip(mean, sd, here.scale, strict=True), strict=True))
+    assert at["kh"][:2] == pytest.approx((np.log(model.reference["kh"]), 0.7), rel=0.01)
+    assert at["b2"][0] == 0.0  # the wall: its half-normal is one half of a normal
+    assert at["b2"][1] * at["b2"][2] == pytest.approx(2 * 0.057, rel=0.01)
+    assert at["delay_s"][0] * at["delay_s"][2] == pytest.approx(150e-6)
+    assert at["delay_s"][1] * at["delay_s"][2] == pytest.approx(20e-6, rel=0.01)

@@ -18,7 +18,7 @@ from bayeshaptic.inference.population_sampler import LevelChains, sample_level
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.reweighting import Reweighted, inside, reweight
 from bayeshaptic.inference.settling import settled
-from bayeshaptic.models import Model
+from bayeshaptic.models import HalfNormal, Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.threads import single_threaded
 
@@ -51,6 +51,8 @@ class Population:
         Every recording's parameters given all recordings, in the order that they came.
     notices : tuple of Notice
     seconds : float
+    chains : LevelChains or None
+        Of the spreads and correlations, with what it takes to trust them.
     """
 
     parameters: tuple[str, ...]
@@ -212,8 +214,9 @@ def prior_moments(model: Model, here: Coordinates) -> tuple[Floats, Floats]:
         here.coordinate(np.array([float(prior.quantile(p)) for prior in priors])[None])[0]
         for p in (0.16, 0.5, 0.84)
     )
-    mean = np.where(here.walls, here.low, middle)
-    sd = np.where(here.walls, (high - here.low) / 1.405, 0.5 * (high - low))
+    half = np.array([isinstance(prior, HalfNormal) for prior in priors]) & ~here.log
+    mean = np.where(half, 0.0, middle)
+    sd = np.where(half, high / 1.405, 0.5 * (high - low))
     return mean, np.where(here.log, np.minimum(sd, high - middle), sd)
 
 
