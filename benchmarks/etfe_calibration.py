@@ -1,15 +1,18 @@
 """Calibration and information of the ETFE's windows, on simulated recordings.
 
-    python benchmarks/etfe_calibration.py [recordings]
+    python benchmarks/etfe_calibration.py [recordings] [--limit RECORDINGS]
 
 For each device and length: the rms of the pulls of a free scale and delay (1 is right), their
 widths over the Cramer-Rao bound with the noise known and nothing leaking (1 is the best there is),
 with the true response and with the default as reference, and the mean square of the ETFE's error
-over its variance (1 is right).
+over its variance (1 is right).  With --limit instead: how often the 90 % interval of the critical
+stiffness read from the ETFE alone covers the truth, for devices drawn from the priors and for those of
+the tables.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -17,6 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
+from calibration import CASES, as_recording, truth_and_bench
 from linear_bench import (
     LHIFAM_FREE,
     LHIFAM_HELD,
@@ -29,6 +33,8 @@ from test_windows import PERIOD, cramer_rao, record, scale_and_delay
 
 from bayeshaptic.recordings.etfe import estimate_etfe
 from bayeshaptic.recordings.windows import compress
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.stability import etfe_critical_stiffness
 
 DEVICES = {
     "LHIfAM free": (LHIFAM_FREE, 1.0, 5e-7),
@@ -74,5 +80,53 @@ def campaign(device, force, encoder, samples, band_hz, recordings):
     )
 
 
+def limits(recordings: int) -> None:
+    """Coverage of K_CR read from the ETFE; the pull is of its logarithm, from the median's error."""
+    print(f"{'':16} {'truth':6} {'s':>3}   read   covered  K below  K above  width %  pull")
+    for seconds in (10.0, 30.0):
+        everything = []
+        for case in CASES:
+            for drawn in (True, False):
+                found = [_limit(case, seed, seconds, drawn) for seed in range(recordings)]
+                read = np.array([row for row in found if row[1] is not None], float)
+                if drawn:
+                    everything.append(read)
+                _print_limits(case, "prior" if drawn else "table", seconds, read, recordings)
+        together = np.concatenate(everything)
+        _print_limits("all", "prior", seconds, together, recordings * len(CASES))
+
+
+def _limit(case: str, seed: int, seconds: float, drawn: bool) -> tuple:
+    """Truth and the 5, 50 and 95 % quantiles of one recording."""
+    bench = truth_and_bench(case, 5000 + seed)[2]
+    if not drawn:
+        device, structure = case.split()
+        bench = Bench.from_device(device, held=structure == "grasped")
+    low_hz, high_hz = bench.band_hz
+    excitation = WhiteNoise(bench.force_rms, high_hz, low_hz, seconds)
+    etfe = estimate_etfe(as_recording(simulate(bench, excitation, seed=9000 + seed)))
+    own = etfe_critical_stiffness(etfe, seed=seed)
+    return bench.true_critical_stiffness(), own.q05, own.q50, own.q95
+
+
+def _print_limits(case: str, truth: str, seconds: float, read: np.ndarray, of: int) -> None:
+    below, above = read[:, 0] < read[:, 1], read[:, 0] > read[:, 3]
+    width = np.log(read[:, 3] / read[:, 1]) / 3.29
+    pull = np.abs(np.log(read[:, 2] / read[:, 0])) / width
+    print(
+        f"{case:16} {truth:6} {seconds:3.0f} {len(read):4d}/{of:<4d} "
+        f"{1 - np.mean(below | above):6.1%}  {below.mean():6.1%}   {above.mean():6.1%}   "
+        f"{100 * np.median(width):6.2f}  {np.median(pull) / 0.6745:5.2f}",
+        flush=True,
+    )
+
+
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("recordings", type=int, nargs="?", default=100)
+    parser.add_argument("--limit", type=int, metavar="RECORDINGS")
+    asked = parser.parse_args()
+    if asked.limit:
+        limits(asked.limit)
+    else:
+        main(asked.recordings)

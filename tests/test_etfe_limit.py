@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.spectra import TableSpectra
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability import critical_stiffness, etfe_critical_stiffness
-from bayeshaptic.stability.from_etfe import _runs
+from bayeshaptic.stability.from_etfe import _caveat, _runs
 
 T = 1e-3
 
@@ -119,6 +121,19 @@ def test_a_crossing_hidden_by_noise_is_mentioned_but_not_counted():
         assert own.q95 == pytest.approx(limit.value, rel=0.05)
         found.append(own.caveat is not None)
     assert any(found)
+
+
+def test_the_phase_just_short_of_180_degrees_is_mentioned():
+    """Within two standard deviations of -180 degrees, below the crossing that was read."""
+    inverse = [-3 + 3j, -2 + 1j, -1.5 + 0.2j, -2 + 1j, -3 - 3j]
+    fits = [
+        SimpleNamespace(inverse=v, centre_hz=hz)
+        for v, hz in zip(inverse, range(5, 10), strict=True)
+    ]
+    near = _caveat(fits, np.array([30.0, 9, 1.5, 9, -30]), 2.4, "N/m")
+    assert "near 7 Hz" in near and "1.5 N/m" in near
+    assert _caveat(fits, np.array([30.0, 9, 3.5, 9, -30]), 2.4, "N/m") is None
+    assert _caveat(fits, np.array([30.0, 9, 1.5, 9, -30]), 1.4, "N/m") is None
 
 
 def test_weak_stretches_join_their_neighbours():

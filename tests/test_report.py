@@ -28,7 +28,7 @@ from bayeshaptic.report.figures.sampler import rank_histogram
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.limits import least_squares_limit, witnesses
 from bayeshaptic.report.quantities import estimate, interval, percent, quantity, scale
-from bayeshaptic.report.tables import parameters, safe
+from bayeshaptic.report.tables import comparison, parameters, safe
 from bayeshaptic.report.words import agreement, hump, misfit
 
 WALLS = ("limits_curve", "limits_kb", "guidance_shares", "guidance_sweeps")
@@ -489,3 +489,14 @@ def test_the_page_as_a_picture_and_on_paper(tmp_path: Path) -> None:
         assert 0.005 < np.mean(part < 0.9) < 0.6
     pages = len(re.findall(rb"/Type\s*/Page\b(?!s)", paper.read_bytes()))
     assert 4 <= pages <= 10
+
+
+def test_what_the_measured_crossing_may_hide_stands_beside_it() -> None:
+    analysis = fake_analysis("rigid")
+    own = analysis.etfe_limit
+    said = "near 8.9 Hz the phase is nearer to -180 degrees than its noise"
+    plain = [w.remark for w in witnesses(analysis) if w.key == "etfe"]
+    analysis.etfe_limit = SimpleNamespace(**(vars(own) | {"caveat": said}))
+    (remark,) = [w.remark for w in witnesses(analysis) if w.key == "etfe"]
+    assert remark == f"{plain[0]}; {said}"
+    assert said in [row[-1] for row in comparison(analysis) if row[0] == "measurement alone"][0]

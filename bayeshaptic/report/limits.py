@@ -75,6 +75,9 @@ def witnesses(analysis: Analysis) -> tuple[Witness, ...]:
     if own is not None:
         low, middle, high = own
         remark = "the crossing read from the response, no model"
+        caveat = getattr(analysis.etfe_limit, "caveat", None)
+        if caveat:
+            remark += f"; {caveat}"
         found.append(Witness("etfe", "measurement alone", remark, middle, low, high))
     return (*found, *_rules(analysis))
 

@@ -16,8 +16,11 @@ Floats = NDArray[np.float64]
 
 DRAWS = 4000
 _STEP = 0.03  # relative distance of the places where the phase is looked at
-_PLAUSIBLE = 1.0  # standard deviations from -180 degrees from which a stretch counts at all
-_CERTAIN = 2.5  # and from which it counts in every draw
+# Standard deviations from -180 degrees from which a stretch counts, in equal shares of the draws:
+# the nearer it is, the more likely it is the noise that has put it on its side.
+_LEVELS = (0.25, 0.7, 1.2, 1.9, 2.5)
+_DOUBTFUL = 1.0  # a stretch below this is worth a word where it is not in the numbers,
+_NEAR = 2.0  # and a place that is nearer than this without reaching the other side
 _POINTS = 201
 _ENOUGH = 0.95  # share of draws with a crossing inside the band that an interval needs
 
@@ -70,8 +73,7 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
     The phase crosses between two stretches of the band that lie on either side of -180
     degrees.  The coefficients of the cubics at the crossings are drawn from their covariance, and
     the lowest crossing of each draw is read off.  A stretch that is on its side by no more than
-    noise counts with its neighbours: in all draws below 1 standard deviation, in half of them
-    below 2.5.
+    noise counts with its neighbours: the weaker it is, the more often.
 
     Parameters
     ----------
@@ -100,13 +102,14 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
         return missing(f"the response is too noisy between {band}")
     value = np.array([fit.inverse for fit in fits])
     noise = np.array([fit.relative_sd for fit in fits]) * np.abs(value)
-    certain, _ = _runs(value.imag / noise, _CERTAIN)
-    plausible, doubtful = _runs(value.imag / noise, _PLAUSIBLE)
+    side = value.imag / noise
+    levels = [_runs(side, level)[0] for level in _LEVELS]
+    certain = levels[-1]
     if certain[0].strength < 0 and value[certain[0].start].real < 0:
         return missing(f"the phase is beyond -180 degrees at {fits[0].centre_hz:.3g} Hz already")
     rng = np.random.default_rng(seed)
-    halves = [_samples(data, fits, runs, rng, draws // 2) for runs in (certain, plausible)]
-    samples, where = np.concatenate(halves, axis=1)
+    shares = [_samples(data, fits, runs, rng, draws // len(levels)) for runs in levels]
+    samples, where = np.concatenate(shares, axis=1)
     crosses = np.isfinite(samples)
     if not crosses.any():
         return missing(f"the phase does not reach -180 degrees between {band}")
@@ -115,7 +118,7 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
         return missing(f"the phase reaches -180 degrees between {band} in {share} only")
     q05, q50, q95 = (float(q) for q in np.quantile(samples[crosses], [0.05, 0.5, 0.95]))
     middle = float(np.median(where[crosses]))
-    caveat = _caveat(fits, doubtful, q05, etfe.stiffness_unit)
+    caveat = _caveat(fits, side, q05, etfe.stiffness_unit)
     return EtfeCriticalStiffness(q05, q50, q95, middle, etfe.stiffness_unit, None, caveat, samples)
 
 
@@ -190,12 +193,16 @@ def _lowest_crossing(
     return lowest, np.where(np.isfinite(lowest), where, np.nan)
 
 
-def _caveat(fits: list[LocalFit], doubtful: list[_Run], lowest: float, unit: str) -> str | None:
+def _caveat(fits: list[LocalFit], side: Floats, lowest: float, unit: str) -> str | None:
     """A sentence on the lowest crossing that the noise may hide or feign; None without one."""
+    doubtful = [n for run in _runs(side, _DOUBTFUL)[1] for n in (run.start, run.stop - 1)]
+    near = np.abs(side)
+    dips = 1 + np.flatnonzero(
+        (near[1:-1] <= np.minimum(near[:-2], near[2:])) & (near[1:-1] < _NEAR)
+    )
     places = [
         (-fits[n].inverse.real, fits[n].centre_hz)
-        for run in doubtful
-        for n in (run.start, run.stop - 1)
+        for n in (*doubtful, *dips.tolist())
         if 0 < -fits[n].inverse.real < lowest
     ]
     if not places:

@@ -19,7 +19,7 @@ _ORDER = 3
 _RICHER = 5
 _SPANS = np.geomspace(0.6, 0.02, 14)  # half widths over the centre frequency, widest first
 _BETTER = 5.0  # gain in chi-square by the richer polynomial that noise exceeds in 4 % of cases
-_NARROWER = 2  # steps from the widest span where a cubic passes: its bias is then below the noise
+_NARROWER = 3  # steps from the widest span where a cubic passes: its bias is then below the noise
 _NEIGHBOURS = 4  # windows on each side that share their noise variance
 _OUTLIER = 4.0
 _NOISIEST = 0.3  # relative sd above which 1/G is not linear in the noise
@@ -138,7 +138,7 @@ def local_fit(data: ResponseData, centre_hz: float) -> LocalFit | None:
 
 
 def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | None:
-    """The fit two spans below the widest that passes, or the narrowest that there is."""
+    """The fit three spans below the widest that passes, or the narrowest that there is."""
     last, accepted = None, 0
     for span in _SPANS:
         near = np.abs(data.centre_hz / centre_hz - 1) <= span
