@@ -99,16 +99,19 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
             wider = widening(like)
             new_person = _new_person(population, wider, seed)
             users = _users(population, like, seed)
-    ways = []
-    for number, (some, is_held) in enumerate(((_free(good), False), (like, True))):
+    ways: list[ConfigurationLimits] = []
+    covered: list[Analysed] = []
+    for is_held, some, begin in ((False, _free(good), 0.6), (True, like, 0.8)):
+        along = _alike([one for one in some if _numbered(one)])[0]
         with notes.stage(f"configurations ({'held' if is_held else 'free'})"):
-            way = _along(some, is_held, seed, report, 0.6 + 0.2 * number)
-            ways += [way] if way else []
-            notes.notices += way.inferred.notices if way else ()
+            way = _along(along, is_held, seed, report, begin)
+            if way is not None:
+                ways.append(way)
+                covered += along
+                notes.notices += way.inferred.notices
     own = [one for one in held if population is None or one in odd]
-    free = [one for one in _free(good) if not (ways and not ways[0].held and _numbered(one))]
     cases = (
-        *recorded(free, FREE),
+        *recorded([one for one in _free(good) if one not in covered], FREE),
         *users,
         *recorded(own, HELD),
         *new_person,
@@ -192,14 +195,18 @@ def _along(
     some: Sequence[Analysed], held: bool, seed: int, report: Progress, begin: float
 ) -> ConfigurationLimits | None:
     """K_CR over a numeric coordinate; None where there are too few of them."""
-    like, _ = _alike([one for one in some if _numbered(one)])
-    where = [float(one.entry.configuration or 0.0) for one in like]
+    where = [float(one.entry.configuration or 0.0) for one in some]
     if len(set(where)) < FEWEST:
         return None
-    return configuration_limits(
-        [posterior(one) for one in like],
+    found = configuration_limits(
+        [posterior(one) for one in some],
         where,
         held,
         seed,
         lambda share, word: report(begin + 0.2 * share, word),
     )
+    wider = widening(some)
+    # The same random numbers for every configuration: they are drawn together.
+    limits = [wider.apply(case.limit, np.random.default_rng(seed)) for case in found.cases]
+    cases = tuple(replace(c, limit=one) for c, one in zip(found.cases, limits, strict=True))
+    return replace(found, cases=cases, samples=np.stack([one.samples for one in limits], axis=1))

@@ -29,6 +29,7 @@ Progress = Callable[[float, str], None]
 DRAWS = 2000
 _FIRST_STEPS = 60
 _POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
+_FEW, _FEWEST = 0.5, 100  # share and number of effective draws that are few
 
 
 @dataclass(frozen=True)
@@ -265,13 +266,16 @@ def _hierarchy(
 
 def _notices(recordings: Sequence[Reweighted], users: tuple[str, ...]) -> tuple[Notice, ...]:
     notices = []
-    poor = [one for one in recordings if one.pareto_k > _POOR_K]
+    # A heavy tail is harmless where all weights are nearly equal.
+    few = [one for one in recordings if one.effective < _FEW * len(one.draws)]
+    poor = [one for one in few if one.pareto_k > _POOR_K or one.effective < _FEWEST]
     if poor:
         worst = max(poor, key=lambda one: one.pareto_k)
         text = (
             f"The weights of {len(poor)} of {len(recordings)} recordings are poor (Pareto k up to "
-            f"{worst.pareto_k:.2f}, user {worst.user}): their likelihoods are far from Gaussian, "
-            "and what the population says of them is rough."
+            f"{worst.pareto_k:.2f}, {worst.effective:.0f} effective draws, user {worst.user}): "
+            "their likelihoods are far from Gaussian, and what the population says of them is "
+            "rough."
         )
         notices.append(Notice("warning", "population", text))
     if len(users) < 4:
