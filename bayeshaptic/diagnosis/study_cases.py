@@ -79,29 +79,14 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
     """
     good = [one for one in recordings if one.analysis is not None]
     held = [one for one in good if one.entry.user is not None]
+    free = [one for one in good if one.entry.user is None]
     notes = _Notes()
-    population: Population | None = None
-    new_person: tuple[Case, ...] = ()
-    users: tuple[Case, ...] = ()
     like, odd = _alike(held)
     notes.notices += _odd_notice(odd, like)
-    if like:
-        with notes.stage("population"):
-            population = infer_population(
-                [posterior(one) for one in like],
-                [str(one.entry.user) for one in like],
-                [one.entry.configuration for one in like],
-                seed,
-                lambda share, word: report(0.5 * share, word),
-            )
-            notes.notices += population.notices
-            report(0.5, "critical stiffness of people")
-            wider = widening(like)
-            new_person = _new_person(population, wider, seed)
-            users = _users(population, like, seed)
+    population, new_person, users = _people(like, seed, report, notes)
     ways: list[ConfigurationLimits] = []
     covered: list[Analysed] = []
-    for is_held, some, begin in ((False, _free(good), 0.6), (True, like, 0.8)):
+    for is_held, some, begin in ((False, free, 0.6), (True, like, 0.8)):
         along = _alike([one for one in some if _numbered(one)])[0]
         with notes.stage(f"configurations ({'held' if is_held else 'free'})"):
             way = _along(along, is_held, seed, report, begin)
@@ -109,29 +94,43 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
                 ways.append(way)
                 covered += along
                 notes.notices += way.inferred.notices
-    own = [one for one in held if population is None or one in odd]
     cases = (
-        *recorded([one for one in _free(good) if one not in covered], FREE),
+        *recorded([one for one in free if one not in covered], FREE),
         *users,
-        *recorded(own, HELD),
+        *recorded([one for one in held if not users or one in odd], HELD),
         *new_person,
         *(case for way in ways for case in way.cases),
     )
-    limit = device_limit(cases, seed) if cases else None
     return StudyCases(
         population,
         new_person,
         users,
         tuple(ways),
         cases,
-        limit,
+        device_limit(cases, seed) if cases else None,
         tuple(notes.notices),
         notes.seconds,
     )
 
 
-def _free(good: Sequence[Analysed]) -> list[Analysed]:
-    return [one for one in good if one.entry.user is None]
+def _people(
+    like: Sequence[Analysed], seed: int, report: Progress, notes: _Notes
+) -> tuple[Population | None, tuple[Case, ...], tuple[Case, ...]]:
+    """The population of those recorded alike, a new person's cases, and the users' cases."""
+    if like:
+        with notes.stage("population"):
+            found = infer_population(
+                [posterior(one) for one in like],
+                [str(one.entry.user) for one in like],
+                [one.entry.configuration for one in like],
+                seed,
+                lambda share, word: report(0.5 * share, word),
+            )
+            notes.notices += found.notices
+            report(0.5, "critical stiffness of people")
+            new_person = _new_person(found, widening(like), seed)
+            return found, new_person, _users(found, like, seed)
+    return None, (), ()
 
 
 def _numbered(one: Analysed) -> bool:
