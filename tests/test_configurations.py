@@ -20,7 +20,7 @@ from bayeshaptic.diagnosis.configuration_limits import configuration_limits
 from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
 from bayeshaptic.diagnosis.study_cases import study_cases
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.configurations import Configurations, infer_configurations
+from bayeshaptic.inference.configurations import Configurations, _kept, infer_configurations
 from bayeshaptic.inference.path import Path as Line
 from bayeshaptic.inference.population import prior_moments, study_coordinates
 from bayeshaptic.inference.posterior import Posterior
@@ -90,6 +90,13 @@ def test_two_configurations_are_not_a_path() -> None:
         infer_configurations(along((0.0, 1.0)), (0.0, 1.0))
     with pytest.raises(InputError, match="1 posteriors, but 2 configurations"):
         infer_configurations(along((0.0,)), (0.0, 1.0))
+
+
+def test_many_recordings_of_a_configuration_are_too_many() -> None:
+    places = np.repeat([0.0, 0.5, 1.0], 12)
+    kept = _kept(places, 11)
+    assert [int(np.sum(places[kept] == place)) for place in (0.0, 0.5, 1.0)] == [3, 3, 3]
+    assert _kept(np.arange(20.0), 11) == list(range(20))
 
 
 def test_the_worst_configuration() -> None:
