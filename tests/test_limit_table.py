@@ -92,13 +92,14 @@ def test_straight_lines_between_rows_are_on_the_safe_side(table, one):
         assert np.all(line <= truth + 2e-3 * boundary.stiffness.max())
 
 
-def test_a_device_is_stable_where_all_of_its_cases_are(one):
-    bare = case("free", label="nobody holds it", group="free", draws=900, seed=2)
+def test_a_device_is_stable_where_all_of_its_cases_are():
+    one = case("grasped", draws=900)
+    bare = case("free", label="nobody holds it", group="free", draws=600, seed=2)
     region = joint_region([bare, one])
     stiffness, levels = np.array([5e3, 2.15e4, 2.2e4, 5e4]), np.array([0.0, 60.0])
     each = [kb_region(c).probability_map(stiffness, levels) for c in (bare, one)]
     np.testing.assert_allclose(region.probability_map(stiffness, levels), each[0] * each[1])
-    together = limit_table([bare, one])
+    together = limit_table([bare, one], [LowPass(80.0)])
     for part in together.filters:
         alone = [kb_region(c, part.kind).quantile(0.05, part.damping) for c in (bare, one)]
         assert np.all(part.quantile(0.05) <= np.minimum(*alone) * (1 + 1e-9))
@@ -107,13 +108,13 @@ def test_a_device_is_stable_where_all_of_its_cases_are(one):
 
 
 def test_rotational_devices_have_their_units():
-    found = limit_table([case("free", "phantom", draws=400)])
+    found = limit_table([case("free", "phantom", draws=100)])
     assert (found.unit, found.damping_unit) == ("N m/rad", "N m s/rad")
     assert "stiffness_N_m_per_rad_at_risk_0.05" in found.as_csv().splitlines()[0]
 
 
 def test_loops_that_are_never_stable_have_limits_of_zero(one):
-    values = np.array(one.draws[:400])
+    values = np.array(one.draws[:100])
     values[:, one.model.names.index("kh")] = -5e3
     limit = bh.critical_stiffness(one.model, values)
     found = limit_table([replace(one, draws=values, limit=limit)])
@@ -131,12 +132,13 @@ def test_rules_of_the_case_with_the_least_damping(one):
 
 
 def test_small_risks_come_from_the_lowest_of_many_draws():
-    many = case("free", "phantom", draws=24_000, spread=0.05)
-    found = limit_table([many], [LowPass(100.0)], draws=1500).filters[0]
-    boundary = found.boundary(0.001)
-    region = kb_region(many, found.kind, draws=24_000)
-    inside = boundary.stiffness > 0
-    assert inside.sum() > 15
-    truth = region.quantile(0.001, boundary.damping[inside])
-    np.testing.assert_allclose(boundary.stiffness[inside], truth, rtol=1e-9)
+    many = case("free", "phantom", draws=10_500, spread=0.05)
+    found = limit_table([many], [LowPass(100.0)], (0.05, 0.01, 0.002), 1500).filters[0]
+    boundary = found.boundary(0.002)
+    assert found.boundary(0.01) is None  # neither 1500 draws nor the tail say it
+    inside = np.flatnonzero(boundary.stiffness > 0)
+    assert len(inside) > 15
+    some = inside[::6]
+    truth = kb_region(many, found.kind, draws=10_500).quantile(0.002, boundary.damping[some])
+    np.testing.assert_allclose(boundary.stiffness[some], truth, rtol=1e-9)
     assert np.all(boundary.stiffness <= found.boundary(0.05).stiffness)

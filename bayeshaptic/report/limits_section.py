@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 DRAWS = 2400
-_SLOW_DRAWS = 600  # of a model without a finite set of poles
+_SLOW_DRAWS = 2000  # of a model without a finite set of poles
 _FRICTION = "friction_force"
 
 

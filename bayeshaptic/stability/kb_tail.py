@@ -35,10 +35,13 @@ class Tail:
         Each column in ascending order.
     total : int
         Number of draws that they are the lowest of.
+    risk : float
+        Up to which none is missing.
     """
 
     limits: Floats = field(repr=False)
     total: int
+    risk: float
 
 
 def lower_tail(
@@ -74,7 +77,7 @@ def lower_tail(
     if len(chosen) <= place or np.any(exact[place, possible] > safe):
         return None  # some of the lowest may not be among those looked at
     exact[:, ~possible] = 0.0
-    return Tail(exact, len(index))
+    return Tail(exact, len(index), risk)
 
 
 def _candidates(

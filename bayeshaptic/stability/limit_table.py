@@ -70,7 +70,7 @@ class FilterLimits:
         """The stiffness at that risk; None where the draws are too few to state it."""
         if self.region.says(risk):
             return Boundary(risk, self.damping, self.quantile(risk))
-        if self.tails is None:
+        if self.tails is None or risk > min(tail.risk for tail in self.tails):
             return None
         totals = [tail.total for tail in self.tails]
         stiffness = joint_quantile([tail.limits for tail in self.tails], totals, risk)
