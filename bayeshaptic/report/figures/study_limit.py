@@ -59,7 +59,7 @@ def draw(study: StudyAnalysis) -> Figure:
 def _spans(study: StudyAnalysis, cases: tuple[Case, ...]) -> list[tuple[float, float]]:
     """Ends of the axis; of two axes where the cases stand far apart, free and held mostly."""
     assert study.limit is not None
-    limits = [*(case.limit for case in cases), study.limit]
+    limits: list[Any] = [*(case.limit for case in cases), study.limit]
     ends = [tuple(decibel(limit.quantile(p)) for p in (0.05, 0.95)) for limit in limits]
     ends = sorted(pair for pair in ends if np.isfinite(pair).all())
     if not ends:
