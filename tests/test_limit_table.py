@@ -142,3 +142,5 @@ def test_small_risks_come_from_the_lowest_of_many_draws():
     truth = kb_region(many, found.kind, draws=10_500).quantile(0.002, boundary.damping[some])
     np.testing.assert_allclose(boundary.stiffness[some], truth, rtol=1e-9)
     assert np.all(boundary.stiffness <= found.boundary(0.05).stiffness)
+    ends = np.sort(kb_region(many, found.kind, draws=10_500).largest_damping())
+    assert found.width(0.002).damping == pytest.approx(ends[20], rel=1e-5)

@@ -15,7 +15,7 @@ from bayeshaptic.stability.kb_region import DRAWS, KbRegion, kb_region, with_dam
 
 Floats = NDArray[np.float64]
 
-_INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
+INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
 _BEYOND = 0.95
 _CLOSER = 1.5
 CUTOFF = 0.1  # of the sampling rate: the usual low-pass of a velocity
@@ -74,7 +74,7 @@ class JointRegion:
         totals = [len(part) for part in largest]
         every = (*risks, _BEYOND)
         wanted = np.array([joint_quantile(largest, totals, risk)[0] for risk in every])
-        ends = _INSIDE * wanted[np.isfinite(wanted)]
+        ends = INSIDE * wanted[np.isfinite(wanted)]
         steps = np.linspace(0.0, 1.0, count) ** _CLOSER * (ends.max() if len(ends) else 1.0)
         return np.unique(np.concatenate([steps, ends]))
 

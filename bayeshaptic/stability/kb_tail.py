@@ -7,14 +7,13 @@ among these; those are looked at, too.  Nothing that is stated comes from the fu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.stability.damping import Damping
-from bayeshaptic.stability.kb_region import region_of_draws
+from bayeshaptic.stability.kb_region import KbRegion, region_of_draws
 
 Floats = NDArray[np.float64]
 
@@ -31,30 +30,41 @@ class Tail:
 
     Attributes
     ----------
+    region : KbRegion
+        Of the draws that may have them.
     limits : ndarray, shape (m, J)
-        Each column in ascending order.
+        Their limits at each damping of a table, each column in ascending order.
+    ends : ndarray, shape (m,)
+        The dampings where their regions end, ascending.
     total : int
         Number of draws that they are the lowest of.
     risk : float
         Up to which none is missing.
     """
 
+    region: KbRegion = field(repr=False)
     limits: Floats = field(repr=False)
+    ends: Floats = field(repr=False)
     total: int
     risk: float
 
+    def at(self, levels: Floats) -> Tail:
+        """The same at other dampings."""
+        return replace(self, limits=np.sort(self.region.limits(levels), axis=0))
+
 
 def lower_tail(
-    case: Any, kind: Damping, draws: Floats, levels: Floats, limits: Floats, risk: float
+    case: Any, some: KbRegion, draws: Floats, levels: Floats, limits: Floats, risk: float
 ) -> Tail | None:
     """The lowest limits of a case at dampings `levels`; None where its draws do not allow it.
 
     Parameters
     ----------
     case : Case
-    kind : Damping
+    some : KbRegion
+        Of some of its draws.
     draws : ndarray, shape (n, P)
-        Some of its draws.
+        Those.
     levels : ndarray, shape (J,)
     limits : ndarray, shape (n, J)
         Their limits.
@@ -65,19 +75,22 @@ def lower_tail(
     if len(samples) != len(case.draws) or case.limit.safe(risk) is None:
         return None
     index = np.linspace(0, len(samples) - 1, min(len(samples), _MOST)).astype(int)
-    every, wanted = case.draws[index], samples[index]
-    possible = np.all(limits > 0, axis=0)  # where some have none, the lowest limit is nothing
-    found = _candidates(draws, limits[:, possible], every, risk)
+    possible = np.all(limits > 0, axis=0)  # near the ends the ends themselves tell
+    columns = np.column_stack([limits[:, possible], some.largest_damping()])
+    found = _candidates(draws, columns, case.draws[index], risk)
     if found is None:
         return None
     chosen, safe = found
-    part = region_of_draws(case.model, every[chosen], kind, wanted[chosen])
-    exact = np.sort(part.limits(levels), axis=0)
+    region = region_of_draws(
+        case.model, case.draws[index][chosen], some.kind, samples[index][chosen]
+    )
+    ends = np.sort(region.largest_damping())
+    tail = Tail(region, np.empty((0, 0)), ends, len(index), risk).at(levels)
     place = int(np.ceil(risk * len(index)))
-    if len(chosen) <= place or np.any(exact[place, possible] > safe):
-        return None  # some of the lowest may not be among those looked at
-    exact[:, ~possible] = 0.0
-    return Tail(exact, len(index), risk)
+    if len(chosen) <= place:
+        return None
+    reached = np.append(tail.limits[place, possible], ends[place])
+    return None if np.any(reached > safe) else tail  # some of the lowest may be missing
 
 
 def _candidates(

@@ -19,6 +19,7 @@ from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.damping import Damping
 from bayeshaptic.stability.joint import (
+    INSIDE,
     JointRegion,
     filtered,
     joint_quantile,
@@ -245,13 +246,22 @@ def _filter_limits(
     limits = region.limits(levels)
     tails = None
     if not region.says(min(risks)):
-        tails = _tails(cases, region.kind, levels, limits, min(risks), draws)
+        tails = _tails(cases, region, levels, limits, min(risks), draws)
+    if tails is not None:  # the table has the end of this boundary, too
+        ends = [tail.ends[:, None] for tail in tails]
+        end = INSIDE * joint_quantile(ends, [tail.total for tail in tails], min(risks))[0]
+        place = int(np.searchsorted(levels, end))
+        levels, there = np.insert(levels, place, end), region.limits([end])
+        limits = tuple(
+            np.insert(own, place, new[:, 0], axis=1) for own, new in zip(limits, there, strict=True)
+        )
+        tails = tuple(tail.at(levels) for tail in tails)
     return FilterLimits(region, levels, tuple(np.sort(part, axis=0) for part in limits), tails)
 
 
 def _tails(
     cases: Sequence[Case],
-    kind: Damping,
+    region: JointRegion,
     levels: Floats,
     limits: tuple[Floats, ...],
     risk: float,
@@ -259,8 +269,8 @@ def _tails(
 ) -> tuple[Tail, ...] | None:
     """The lowest limits of every case, or None as soon as one of them cannot say it."""
     found = []
-    for case, own in zip(cases, limits, strict=True):
-        tail = lower_tail(case, kind, loops_of(case, draws=draws).draws, levels, own, risk)
+    for case, own, part in zip(cases, limits, region.regions, strict=True):
+        tail = lower_tail(case, part, loops_of(case, draws=draws).draws, levels, own, risk)
         if tail is None:
             return None
         found.append(tail)
