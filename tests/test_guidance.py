@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.inference.least_squares import least_squares, summarise
 from bayeshaptic.inference.next_experiment import information, next_experiment
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.windows import compress
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.elasticities import elasticities, with_delay
@@ -133,10 +134,11 @@ def test_added_damping_raises_the_limit_of_a_rigid_device():
         sweep(model, "kc")
 
 
-def recorded(held, seconds, seed):
+def recorded(held, seconds, seed, force=1.0, band_hz=None):
     bench = Bench.from_device("phantom", held=held)
-    low, high = bench.band_hz
-    run = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds=seconds), seed=seed)
+    low, high = band_hz or bench.band_hz
+    noise = WhiteNoise(force * bench.force_rms, high, low, seconds=seconds)
+    run = simulate(bench, noise, seed=seed)
     units = {"force_unit": run.force_unit, "position_unit": run.position_unit}
     return bh.estimate_etfe(recording_from_arrays(run.force, run.position, run.period_s, **units))
 
@@ -176,3 +178,19 @@ def test_more_force_says_more_and_another_hand_less(fits):
     assert set(found) == {"again", "louder", "band", "another user", "no user"}
     assert found["louder"].ratio < found["again"].ratio <= found["another user"].ratio + 1e-9
     assert all(0 < one.ratio <= 1 for one in found.values())
+
+
+@pytest.mark.parametrize("name", ["again", "louder", "band"])
+def test_the_recording_that_was_proposed_says_what_was_predicted(fits, name):
+    fit = fits[30.0]
+    options = {"louder": {"force": 2.0}, "band": {"band_hz": (63.0 / 2**0.5, 63.0 * 2**0.5)}}
+    windows = compress(recorded(True, 30.0, 12, **options.get(name, {})), fit.response)
+    made = information(summarise(fit.model, windows, fit.theta)).fisher()
+    known, slope = information(fit), elasticities(fit)[0].slope
+    prior, gradient = known.prior_precision(), known.gradient(slope)
+
+    def spread(total):
+        return np.sqrt(gradient @ np.linalg.solve(total + prior, gradient))
+
+    ratio = spread(known.fisher() + made) / spread(known.fisher())
+    assert predicted(fit)[name].ratio == pytest.approx(ratio, rel=0.08)

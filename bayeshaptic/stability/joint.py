@@ -73,10 +73,11 @@ class JointRegion:
         largest = [np.sort(region.largest_damping())[:, None] for region in self.regions]
         totals = [len(part) for part in largest]
         every = (*risks, _BEYOND)
-        wanted = np.array([joint_quantile(largest, totals, risk)[0] for risk in every])
-        ends = INSIDE * wanted[np.isfinite(wanted)]
-        steps = np.linspace(0.0, 1.0, count) ** _CLOSER * (ends.max() if len(ends) else 1.0)
-        return np.unique(np.concatenate([steps, ends]))
+        ends = lowest(largest, totals)
+        wanted = np.array([ends.quantile(risk)[0] for risk in every])
+        known = INSIDE * wanted[np.isfinite(wanted)]
+        steps = np.linspace(0.0, 1.0, count) ** _CLOSER * (known.max() if len(known) else 1.0)
+        return np.unique(np.concatenate([steps, known]))
 
 
 def joint_region(
@@ -107,8 +108,29 @@ def usual_dampings(period_s: float) -> tuple[Damping, ...]:
     return Backward(), LowPass(CUTOFF / period_s)
 
 
-def joint_quantile(limits: Sequence[Floats], totals: Sequence[int], risk: float) -> Floats:
-    """The value that the smallest of independent variables is below with probability `risk`, (J,).
+@dataclass(frozen=True)
+class Lowest:
+    """Distribution of the smallest of independent variables, level by level.
+
+    Attributes
+    ----------
+    places : ndarray, shape (M, J)
+        Ascending.
+    share : ndarray, shape (M, J)
+        Probability of a value up to there.
+    """
+
+    places: Floats
+    share: Floats
+
+    def quantile(self, risk: float) -> Floats:
+        """The value that the smallest is below with probability `risk`, shape (J,)."""
+        reached = np.argmax(self.share >= risk - 1e-9, axis=0)
+        return np.take_along_axis(self.places, reached[None], axis=0)[0]
+
+
+def lowest(limits: Sequence[Floats], totals: Sequence[int]) -> Lowest:
+    """The distribution of the smallest of some variables, by their draws.
 
     Parameters
     ----------
@@ -116,17 +138,14 @@ def joint_quantile(limits: Sequence[Floats], totals: Sequence[int], risk: float)
         The lowest of the draws of each variable, each column in ascending order.
     totals : sequence of int
         How many draws they are the lowest of.
-    risk : float
     """
+    places = limits[0] if len(limits) == 1 else np.sort(np.concatenate(limits), axis=0)
     if len(limits) == 1:
-        return limits[0][max(int(np.ceil(risk * totals[0] - 1e-9)) - 1, 0)]
-    found = np.empty(limits[0].shape[1])
-    for level in range(len(found)):
-        columns = [part[:, level] for part in limits]
-        places = np.sort(np.concatenate(columns))
-        above = np.ones(len(places))
-        for column, total in zip(columns, totals, strict=True):
-            above *= 1 - np.searchsorted(column, places, side="right") / total
-        reached = int(np.argmax(1 - above >= risk - 1e-9))
-        found[level] = places[reached]
-    return found
+        share = np.arange(1, len(places) + 1)[:, None] / totals[0]
+        return Lowest(places, np.broadcast_to(share, places.shape))
+    above = np.ones_like(places)
+    for part, total in zip(limits, totals, strict=True):
+        for level in range(places.shape[1]):
+            count = np.searchsorted(part[:, level], places[:, level], side="right")
+            above[:, level] *= 1 - count / total
+    return Lowest(places, 1 - above)

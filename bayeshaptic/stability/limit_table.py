@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,10 @@ from bayeshaptic.stability.damping import Damping
 from bayeshaptic.stability.joint import (
     INSIDE,
     JointRegion,
+    Lowest,
     filtered,
-    joint_quantile,
     joint_region,
+    lowest,
     usual_dampings,
 )
 from bayeshaptic.stability.kb_region import DRAWS
@@ -65,7 +67,7 @@ class FilterLimits:
 
     def quantile(self, risk: float) -> Floats:
         """The stiffness at that risk whether or not the draws are enough for it, shape (J,)."""
-        return joint_quantile(self.limits, [len(part) for part in self.limits], risk)
+        return self._lowest.quantile(risk)
 
     def boundary(self, risk: float) -> Boundary | None:
         """The stiffness at that risk; None where the draws are too few to state it."""
@@ -73,9 +75,12 @@ class FilterLimits:
             return Boundary(risk, self.damping, self.quantile(risk))
         if self.tails is None or risk > min(tail.risk for tail in self.tails):
             return None
-        totals = [tail.total for tail in self.tails]
-        stiffness = joint_quantile([tail.limits for tail in self.tails], totals, risk)
-        return Boundary(risk, self.damping, stiffness)
+        tails = lowest([tail.limits for tail in self.tails], [tail.total for tail in self.tails])
+        return Boundary(risk, self.damping, tails.quantile(risk))
+
+    @cached_property
+    def _lowest(self) -> Lowest:
+        return lowest(self.limits, [len(part) for part in self.limits])
 
     def width(self, risk: float) -> ZWidth | None:
         """How wide the range of walls is at that risk; None where the draws are too few."""
@@ -249,7 +254,7 @@ def _filter_limits(
         tails = _tails(cases, region, levels, limits, min(risks), draws)
     if tails is not None:  # the table has the end of this boundary, too
         ends = [tail.ends[:, None] for tail in tails]
-        end = INSIDE * joint_quantile(ends, [tail.total for tail in tails], min(risks))[0]
+        end = INSIDE * lowest(ends, [tail.total for tail in tails]).quantile(min(risks))[0]
         place = int(np.searchsorted(levels, end))
         levels, there = np.insert(levels, place, end), region.limits([end])
         limits = tuple(
