@@ -6,8 +6,8 @@ For each device and length: the rms of the pulls of a free scale and delay (1 is
 widths over the Cramer-Rao bound with the noise known and nothing leaking (1 is the best there is),
 with the true response and with the default as reference, and the mean square of the ETFE's error
 over its variance (1 is right).  With --limit instead: how often the 90 % interval of the critical
-stiffness read from the ETFE alone covers the truth, for devices drawn from the priors and for those of
-the tables.
+stiffness read from the ETFE alone covers the truth, for devices drawn from the priors and for those
+of the tables.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def campaign(device, force, encoder, samples, band_hz, recordings):
 
 
 def limits(recordings: int) -> None:
-    """Coverage of K_CR read from the ETFE; the pull is of its logarithm, from the median's error."""
+    """Coverage of K_CR read from the ETFE; the pull is that of its logarithm."""
     print(f"{'':16} {'truth':6} {'s':>3}   read   covered  K below  K above  width %  pull")
     for seconds in (10.0, 30.0):
         everything = []
