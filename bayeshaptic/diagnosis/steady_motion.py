@@ -210,7 +210,7 @@ def steady_motion(system: LinearSystem, period: Period, applied: Applied) -> dic
     lines = np.linalg.solve(np.moveaxis(matrix, 2, 0), free.T[:, :, None])[:, :, 0].T
     lines = np.where(period.free, driven / own * period.transform(period.position), lines)
     return {
-        place: Motion(period.signal(row), period.signal(period.s * row))
+        place: Motion(period.signal(row), period.signal(period.s * row), period.force)
         for place, row in zip(applied.places, lines, strict=True)
     }
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bayeshaptic.effects.internal_force import MOTOR, Law, Place
+from bayeshaptic.effects.internal_force import MOTOR, Law, Place, Step
 from bayeshaptic.effects.nonlinear import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
@@ -40,8 +40,10 @@ class CoulombFriction(NonlinearEffect):
         return _force_scale(model, theta, motion) * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        def force(position: Floats, velocity: Floats, gain: float) -> Floats:
-            return np.minimum(np.maximum(velocity * (-1 / gain), -strength), strength)
+        def force(step: Step) -> Floats:
+            return np.minimum(
+                np.maximum(step.last_velocity * (-1 / step.gain), -strength), strength
+            )
 
         return force
 
@@ -50,14 +52,15 @@ class CoulombFriction(NonlinearEffect):
 class StribeckFriction(NonlinearEffect):
     """Dry friction that falls from a larger static value as the velocity grows.
 
-    Bound Fc (1 + (rise - 1) exp(-(v/vs)^2)); R. Stribeck, 1902.
+    Bound Fc (1 + excess exp(-(v/vs)^2)); R. Stribeck, 1902.
     """
 
     name = "stribeck_friction"
     title = "dry friction that falls with velocity (Stribeck)"
     columns = _BY_VELOCITY
     strength = ("friction_force", "force")
-    dimensions = {"static_over_moving": "number", "stribeck_velocity": "velocity"}
+    dimensions = {"static_excess": "number", "stribeck_velocity": "velocity"}
+    tuned = ("static_excess", "stribeck_velocity")
 
     @classmethod
     def candidates(
@@ -65,8 +68,8 @@ class StribeckFriction(NonlinearEffect):
     ) -> tuple[NonlinearEffect, ...]:
         usual = float(motion[MOTOR].velocity.std())
         return tuple(
-            cls(MOTOR, {"static_over_moving": rise, "stribeck_velocity": share * usual})
-            for rise in (1.35, 1.8)
+            cls(MOTOR, {"static_excess": rise, "stribeck_velocity": share * usual})
+            for rise in (0.35, 0.8)
             for share in (0.05, 0.25)
         )
 
@@ -74,12 +77,51 @@ class StribeckFriction(NonlinearEffect):
         return _force_scale(model, theta, motion) * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        rise = self.shape["static_over_moving"] - 1
+        rise = self.shape["static_excess"]
         scale = 1 / self.shape["stribeck_velocity"]
 
-        def force(position: Floats, velocity: Floats, gain: float) -> Floats:
-            bound = strength * (1 + rise * np.exp(-((velocity * scale) ** 2)))
-            return np.minimum(np.maximum(velocity * (-1 / gain), -bound), bound)
+        def force(step: Step) -> Floats:
+            bound = strength * (1 + rise * np.exp(-((step.velocity * scale) ** 2)))
+            return np.minimum(np.maximum(step.last_velocity * (-1 / step.gain), -bound), bound)
+
+        return force
+
+
+@register
+class DahlFriction(NonlinearEffect):
+    """Dry friction that begins as a spring: F' = -s (v + |v| F / Fc) with s = Fc / distance.
+
+    P. R. Dahl, "A solid friction model", Aerospace Corporation, TOR-0158, 1968.
+    """
+
+    name = "dahl_friction"
+    title = "dry friction that begins as a spring (Dahl)"
+    columns = (*_BY_VELOCITY, "x^3", "stretch^3", "clipped stretch")  # as it may look like one
+    strength = ("friction_force", "force")
+    dimensions = {"presliding_distance": "position"}
+    tuned = ("presliding_distance",)
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        usual = float(motion[MOTOR].velocity.std()) / (2 * np.pi * 10.0)
+        return tuple(
+            cls(MOTOR, {"presliding_distance": share * usual}) for share in (0.1, 0.3, 1.0, 3.0)
+        )
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return _force_scale(model, theta, motion) * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        distance = self.shape["presliding_distance"]
+
+        def force(step: Step) -> Floats:
+            stiffness = strength * step.duration_s / distance
+            speed = np.abs(step.velocity + 0.5 * step.gain * step.before)
+            # Implicit in the force, so that a stiff beginning is stable.
+            slip = 1 + stiffness * step.gain + speed * (step.duration_s / distance)
+            return (step.before - stiffness * step.velocity) / slip
 
         return force
 
@@ -104,8 +146,9 @@ class Drag(NonlinearEffect):
         return scale * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        def force(position: Floats, velocity: Floats, gain: float) -> Floats:
-            resistance = strength * np.abs(velocity)
-            return -resistance * velocity / (1 + resistance * gain)  # implicit: never reverses
+        def force(step: Step) -> Floats:
+            resistance = strength * np.abs(step.velocity)
+            # Implicit, so that it never reverses the motion.
+            return -resistance * step.velocity / (1 + 0.5 * resistance * step.gain)
 
         return force

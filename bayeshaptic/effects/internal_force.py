@@ -20,9 +20,34 @@ from bayeshaptic.models.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
 
-Law = Callable[[Floats, Floats, float], Floats]
-"""Position and velocity that the step would end with, and what a unit force adds to that
-velocity; to the force.  All of shape (segments,)."""
+
+@dataclass
+class Step:
+    """What a law knows of one step, in all segments side by side.
+
+    Attributes
+    ----------
+    position, velocity : ndarray, shape (segments,)
+        In the middle of the step, if the force were absent during it.
+    last_velocity : ndarray, shape (segments,)
+        At the end of the step, likewise.
+    gain : float
+        What a unit force adds to the last velocity.
+    before : ndarray, shape (segments,)
+        The force of the step before.
+    duration_s : float
+    """
+
+    position: Floats
+    velocity: Floats
+    last_velocity: Floats
+    gain: float
+    before: Floats
+    duration_s: float
+
+
+Law = Callable[[Step], Floats]
+"""The force of a step, shape (segments,)."""
 
 _SEGMENT_S = 0.3
 _SWEEPS = 15
@@ -100,25 +125,32 @@ def forced_motion(
     length = max(int(_SEGMENT_S / step_s) // substeps, 1) * substeps
     count = -(-len(position) // length)
     padding = (0, count * length + 1 - len(position))
-    index = np.arange(length)[:, None] + length * np.arange(count)[None, :] + 1
-    ahead = [np.pad(a, padding, mode="edge")[index] for a in (position, velocity)]
+    index = np.arange(length)[:, None] + length * np.arange(count)[None, :]
+    ahead = np.stack([np.pad(a, padding, mode="edge") for a in (position, velocity)])
+    ahead = np.stack(
+        [*(0.5 * (ahead[:, index] + ahead[:, index + 1])), ahead[1, index + 1]], axis=1
+    )
     gain = float(at_velocity @ drive)
+    nothing = np.zeros(count)
+    step = Step(nothing, nothing, nothing, gain, nothing, step_s)
     reading = np.concatenate([mechanism.drive_vector(), np.zeros(len(state) // 2)])
     moving = slice(len(state) // 2, None)
     if starts is None:
         starts = np.zeros((len(state), count))
     motor = np.empty((length // substeps, count))
     pull = drive[:, None]
-    both = np.stack([at_position, at_velocity]) @ state  # what is read a step later
+    read = np.stack([at_position, at_velocity])
+    read = np.stack([*(0.5 * (read + read @ state)), at_velocity @ state])
     for _ in range(_SWEEPS):
         z = starts.copy()
+        # A segment begins with the force that the one before it ended with the last time.
+        step.before = np.concatenate([[0.0], step.before[:-1]])
         for k in range(length):
             if k % substeps == 0:
                 motor[k // substeps] = reading @ z
-            place_position, place_velocity = both @ z
-            place_position += ahead[0][k]
-            place_velocity += ahead[1][k]
-            z = state @ z + pull * law(place_position, place_velocity, gain)
+            step.position, step.velocity, step.last_velocity = read @ z + ahead[k]
+            step.before = law(step)
+            z = state @ z + pull * step.before
         # Each segment starts where the one before it ended: friction forgets its beginning.
         used, starts = starts, np.concatenate([np.zeros_like(z[:, :1]), z[:, :-1]], axis=1)
         size = np.sqrt(np.mean(starts[moving] ** 2)) + 1e-300

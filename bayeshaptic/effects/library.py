@@ -1,6 +1,7 @@
 """Imports every effect of this package, so that it is registered."""
 
 from bayeshaptic.effects import (
+    actuator,
     attached_mass,
     base_compliance,
     centring_stiffness,
@@ -14,6 +15,7 @@ from bayeshaptic.effects import (
 )
 
 __all__ = [
+    "actuator",
     "attached_mass",
     "base_compliance",
     "centring_stiffness",

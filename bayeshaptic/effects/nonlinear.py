@@ -1,4 +1,4 @@
-"""The protocol of nonlinear effects: an internal force with one strength, and its shape."""
+"""The protocol of nonlinear effects: an internal force, or an actuator that is not linear."""
 
 from __future__ import annotations
 
@@ -23,10 +23,13 @@ class Motion:
     Attributes
     ----------
     position, velocity : ndarray
+    command : ndarray
+        The commanded force.
     """
 
     position: Floats
     velocity: Floats
+    command: Floats
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ class NonlinearEffect(ABC):
     """Dimensions of the shape's parameters."""
     signed: ClassVar[bool] = False
     """Whether the strength may be negative."""
+    tuned: ClassVar[tuple[str, ...]] = ()
+    """The shape's parameters that are fitted from the grid on; all above zero."""
     ties: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
 
@@ -75,3 +80,18 @@ class NonlinearEffect(ABC):
     @abstractmethod
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         """Strengths to begin a search with, from faint to strong, shape (S,)."""
+
+
+@dataclass(frozen=True)
+class CommandEffect(NonlinearEffect):
+    """An actuator whose force is not proportional to the command.
+
+    It adds no force to the mechanism: it takes some of the commanded one away.
+    """
+
+    @abstractmethod
+    def lost(self, strength: float, command: Floats) -> Floats:
+        """What of the command does not arrive, shape (N,)."""
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        raise NotImplementedError("acts on the command, not on the motion")

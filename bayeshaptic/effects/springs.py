@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bayeshaptic.effects.internal_force import CONNECTION, MOTOR, Law, Place
+from bayeshaptic.effects.internal_force import CONNECTION, MOTOR, Law, Place, Step
 from bayeshaptic.effects.nonlinear import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
@@ -42,8 +42,8 @@ class HardeningSpring(NonlinearEffect):
         return scale * np.array([0.001, 0.003, 0.01, 0.03, 0.1])
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        def force(position: Floats, velocity: Floats, gain: float) -> Floats:
-            return -strength * position**3
+        def force(step: Step) -> Floats:
+            return -strength * step.position**3
 
         return force
 
@@ -53,7 +53,7 @@ class Backlash(NonlinearEffect):
     """A gap in the connection: within it the spring of the transmission does nothing.
 
     The strength is half the gap; the force gives back what the linear connection takes inside it:
-    the spring, and in one of the two variants the damper too.
+    the spring, and a part of the damper.
     """
 
     name = "backlash"
@@ -61,6 +61,7 @@ class Backlash(NonlinearEffect):
     columns = ("clipped stretch", "stretch^3")
     strength = ("half_gap", "position")
     dimensions = {"damping_in_gap": "number"}
+    tuned = ("damping_in_gap",)
 
     @classmethod
     def candidates(
@@ -68,19 +69,19 @@ class Backlash(NonlinearEffect):
     ) -> tuple[NonlinearEffect, ...]:
         if CONNECTION not in motion:
             return ()
-        return tuple(cls(CONNECTION, {"damping_in_gap": share}) for share in (0.0, 1.0))
+        return (cls(CONNECTION, {"damping_in_gap": 0.5}),)
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return float(motion.position.std()) * np.array([0.02, 0.05, 0.1, 0.3, 0.8])
+        return float(motion.position.std()) * np.array([0.05, 0.1, 0.2, 0.3])
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         values = dict(zip(model.names, theta, strict=True))
         stiffness = values["kc"]
         damping = (1 - self.shape["damping_in_gap"]) * values["bc"]
 
-        def force(position: Floats, velocity: Floats, gain: float) -> Floats:
-            inside = np.abs(position) < strength
-            slack = np.where(inside, damping * velocity, 0.0)
-            return stiffness * np.clip(position, -strength, strength) + slack
+        def force(step: Step) -> Floats:
+            inside = np.abs(step.position) < strength
+            slack = np.where(inside, damping * step.velocity, 0.0)
+            return stiffness * np.clip(step.position, -strength, strength) + slack
 
         return force

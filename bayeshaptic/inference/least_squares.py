@@ -123,7 +123,7 @@ def refine(model: Model, windows: Windows, start: Floats) -> tuple[Floats, int]:
     agreeing : int
         How many of those refined to the end found the same optimum.
     """
-    here, low, high = _search_box(model)
+    here, low, high = search_box(model)
     residuals = weighted_residuals(Likelihood(model, windows), here)
     phi = np.clip(here.coordinate(np.atleast_2d(start)), low, high)
 
@@ -137,13 +137,14 @@ def refine(model: Model, windows: Windows, start: Floats) -> tuple[Floats, int]:
 
 def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
     """The optimum nearest to one vector, shape (P,)."""
-    here, low, high = _search_box(model)
+    here, low, high = search_box(model)
     residuals = weighted_residuals(Likelihood(model, windows), here)
     phi, _ = minimise(residuals, here.coordinate(theta[None]), low, high, 60, 1e-8)
     return np.asarray(here.natural(phi)[0])
 
 
-def _search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
+def search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
+    """The coordinates of a fit, and its bounds in them."""
     here = coordinates(model)
     low, high = (here.coordinate(bound) for bound in reach(model, _REACH_SDS))
     return here, low, high
@@ -178,7 +179,7 @@ def _best_of_many(
 
 def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) -> Fit:
     """The fit at `theta`, with its covariance and outcomes."""
-    here, low, high = _search_box(model)
+    here, low, high = search_box(model)
     likelihood = Likelihood(model, windows)
     phi = here.coordinate(theta[None])
     slope = jacobian(weighted_residuals(likelihood, here), phi)[0]

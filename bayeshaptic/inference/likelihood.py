@@ -13,7 +13,7 @@ from bayeshaptic.recordings.windows import Windows
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-_CHUNK = 48
+_CHUNK = 128
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Likelihood:
         return np.ascontiguousarray(self.windows.frequency_hz.ravel())
 
     def deviations(self, theta: Floats) -> Complexes:
-        """z - R g(theta): what the model leaves in every window, shape (B, W, k)."""
-        count, nodes = self.windows.target.shape
-        out = np.empty((len(theta), count, nodes), complex)
+        """z - R g(theta): what the model leaves in every window, shape (B, W, r)."""
+        count, nodes = self.windows.frequency_hz.shape
+        out = np.empty((len(theta), *self.windows.target.shape), complex)
         for start in range(0, len(theta), _CHUNK):
             part = theta[start : start + _CHUNK]
             g = self.model.response(part, self._frequencies).reshape(len(part), count, nodes)

@@ -1,0 +1,159 @@
+"""One recording and one linear model, on which internal forces are tried.
+
+What a force adds to the motion is simulated and taken off the recording; the linear parameters are
+fitted to what is left.  What goes into the law is the simulated motion, without encoder noise;
+taking sign(v) from the encoder would miss half of the friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from bayeshaptic.diagnosis.columns import line_transform
+from bayeshaptic.diagnosis.state import CHOOSE, FIT, State, share
+from bayeshaptic.effects.internal_force import CONNECTION, MOTOR, Place, forced_motion
+from bayeshaptic.effects.nonlinear import CommandEffect, Motion, NonlinearEffect
+from bayeshaptic.inference.least_squares import polish
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models.motion import linear_motion
+from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.windows import Windows, compress
+
+Floats = NDArray[np.float64]
+
+SUBSTEPS = 8
+_HAND_HZ = 20.0
+
+
+@dataclass(frozen=True)
+class Point:
+    """What one force gives.
+
+    Attributes
+    ----------
+    effect : NonlinearEffect
+    strength : float
+    theta : ndarray, shape (P,)
+        Linear parameters fitted beside it.
+    etfe : Etfe
+        Less the motion that the force adds.
+    windows : Windows
+    gain_fit, gain_choose : float
+        Gain in log likelihood on the windows to fit and on those to choose by.
+    """
+
+    effect: NonlinearEffect
+    strength: float
+    theta: Floats
+    etfe: Etfe
+    windows: Windows
+    gain_fit: float
+    gain_choose: float
+
+
+class ForceBench:
+    """Simulates forces, and fits what they leave.
+
+    Parameters
+    ----------
+    state : State
+    recording : Recording
+    """
+
+    def __init__(self, state: State, recording: Recording) -> None:
+        self.state = state
+        self.model = state.model
+        self.held = self.model.name == "grasped"
+        self.recording = recording
+        self.force = recording.force - recording.force.mean()
+        self._transform = line_transform(state.etfe, recording)
+        self._starts: dict[Place, Floats] = {}
+        self._extra: Floats = np.zeros(recording.samples)
+        self._base = self._likelihoods(state.fit.theta, state.fit.windows)
+
+    def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
+        """Position and velocity at places, on the fine grid, without the force."""
+        system = self.model.system(theta)
+        period = self.recording.period_s
+        x, v = linear_motion(system, self.force, period, 0, SUBSTEPS)
+        found = {}
+        if CONNECTION in places and len(system.mechanism.masses) > 1:
+            x2, v2 = linear_motion(system, self.force, period, 1, SUBSTEPS)
+            found[CONNECTION] = Motion(x - x2, v - v2, self.force)
+        if MOTOR in places:
+            # The measured position has what a hand does, and where the device stands.
+            measured = self.recording.position
+            grid, samples = np.arange(len(x)) / SUBSTEPS, np.arange(len(measured))
+            if self.held:  # a hand moves it besides the command
+                hand = self._slow(measured - x[::SUBSTEPS] - self._extra)
+                v = v + np.interp(grid, samples, np.gradient(hand, period))
+            found[MOTOR] = Motion(np.interp(grid, samples, measured), v, self.force)
+        return found
+
+    def _slow(self, rest: Floats) -> Floats:
+        rate = 1 / self.recording.period_s
+        low = butter(2, min(_HAND_HZ, 0.4 * rate), fs=rate, output="sos")
+        return np.asarray(sosfiltfilt(low, rest))
+
+    def added_motion(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Floats:
+        """What the force adds to the motor's position at the samples, shape (N,)."""
+        system, period = self.model.system(theta), self.recording.period_s
+        if isinstance(effect, CommandEffect):
+            return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
+        motion = self.motions(theta, (effect.place,))[effect.place]
+        forced = forced_motion(
+            system.mechanism,
+            effect.place,
+            effect.law(strength, self.model, theta),
+            motion.position,
+            motion.velocity,
+            period / SUBSTEPS,
+            SUBSTEPS,
+            starts=self._starts.get(effect.place),
+        )
+        self._starts[effect.place] = forced.starts
+        return forced.motor_position
+
+    def remember(self, extra: Floats) -> None:
+        """Take this for what the force adds, when the slow motion is read off the encoder."""
+        self._extra = extra
+
+    def point(
+        self, effect: NonlinearEffect, strength: float, theta: Floats, rounds: int = 1
+    ) -> Point:
+        """Simulate, take off, fit; several times over, because the fit changes the motion."""
+        for _ in range(rounds):
+            self._extra = self.added_motion(effect, strength, theta)
+            etfe, windows = self.without(self._extra, theta)
+            theta = polish(self.model, windows.part(share(windows, FIT)), theta)
+        own = replace(self.recording, position=self.recording.position - self._extra)
+        gains = self._likelihoods(theta, windows) - self._base
+        return Point(
+            effect,
+            strength,
+            theta,
+            replace(etfe, recording=own),
+            windows,
+            float(gains[0]),
+            float(gains[1]),
+        )
+
+    def without(
+        self, extra: Floats, theta: Floats, columns: list[Floats] | None = None
+    ) -> tuple[Etfe, Windows]:
+        """The measurement less a motion, and its windows, with motions as further inputs."""
+        spectra = self.state.etfe.spectra
+        corrected = replace(spectra, position=spectra.position - self._transform(extra))  # type: ignore
+        etfe = replace(self.state.etfe, spectra=corrected)
+        inputs = np.stack([self._transform(column) for column in columns]) if columns else None
+        return etfe, compress(etfe, partial(self.model.response, theta), inputs)
+
+    def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
+        pointwise = Likelihood(self.model, windows).pointwise(theta[None])[0]
+        return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
