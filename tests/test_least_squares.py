@@ -1,0 +1,181 @@
+"""Least squares: unknown devices from the data alone, several starts, bounds, error bars."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_bench import LHIFAM_FREE, Device
+
+from bayeshaptic.inference.gauss_newton import jacobian, minimise
+from bayeshaptic.inference.laplace import _truncated_moments as truncated_moments
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import LogNormal, free, grasped, rigid
+from bayeshaptic.recordings import Recording
+from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+
+CASES = [("lhifam", False), ("phantom", True)]
+
+
+def measure(bench: Bench, seed: int, seconds: float = 30.0):
+    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds)
+    run = simulate(bench, noise, seed=seed)
+    recording = Recording(run.force, run.position, run.period_s, run.force_unit, run.position_unit)
+    return estimate_etfe(recording)
+
+
+@pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{case[0]}-{case[1]}")
+def unknown(request):
+    """A 30 s recording fitted without a device file, from two seeds."""
+    device, held = request.param
+    bench = Bench.from_device(device, held=held)
+    etfe = measure(bench, seed=21)
+    model = (grasped if held else free)()
+    return bench, etfe, [least_squares(model, etfe, seed=seed) for seed in (0, 1)]
+
+
+def test_the_truth_is_found_from_the_data_alone(unknown):
+    bench, _, (fit, _) = unknown
+    truth = np.array([bench.values.get(name, bench.delay_s) for name in fit.model.names])
+    # 330 complex residuals, F-distributed: a standard deviation of 0.06.
+    assert fit.reduced_chi_square == pytest.approx(1.0, abs=0.25)
+    seen = np.array([fit.outcome[name] == "converged" for name in fit.model.names])
+    assert {"m1", "kc", "m2", "delay_s"} <= {
+        n for n, s in zip(fit.model.names, seen, strict=True) if s
+    }
+    pulls = (fit.theta - truth)[seen] / fit.sd[seen]
+    assert np.abs(pulls).max() < 4.5  # of up to twelve: a chance of 1e-4
+    assert np.sqrt(np.mean(pulls**2)) < 2.0
+
+
+def test_other_starts_end_at_the_same_optimum(unknown):
+    _, _, (fit, other) = unknown
+    assert fit.starts >= 2
+    assert other.reduced_chi_square == pytest.approx(fit.reduced_chi_square, rel=1e-4)
+    width = np.where(np.isfinite(fit.sd), fit.sd, np.inf)
+    assert np.all(np.abs(other.theta - fit.theta) < 0.1 * width)
+
+
+def test_what_a_fit_carries(unknown):
+    bench, etfe, (fit, _) = unknown
+    assert fit.model.period_s == etfe.period_s
+    assert fit.model.force_unit == bench.force_unit
+    assert fit.residual.shape == fit.frequency_hz.shape == (fit.windows.target.size,)
+    freedom = len(fit.residual) - 0.5 * fit.model.size
+    assert np.sum(np.abs(fit.residual) ** 2) / freedom == pytest.approx(fit.reduced_chi_square)
+    assert fit.log_likelihood == pytest.approx(float(fit.likelihood(fit.theta[None])[0]))
+    assert np.allclose(
+        fit.response(etfe.frequency_hz), fit.model.response(fit.theta, etfe.frequency_hz)
+    )
+    # The fit runs through the points that a person sees.
+    z = (fit.response(etfe.frequency_hz) - etfe.value) / np.sqrt(etfe.variance)
+    assert np.mean(np.abs(z) ** 2) < 1.5
+
+
+def test_the_delay_is_found_as_well_as_it_says(unknown):
+    bench, _, (fit, _) = unknown
+    error = fit.theta[-1] - bench.delay_s
+    assert abs(error) < 4.5 * fit.sd[-1] < 0.02 * bench.period_s
+
+
+def test_pulls_of_many_short_recordings():
+    """Errors over their standard deviations, with the device file: rms one."""
+    bench = Bench.from_device("lhifam")
+    truth = np.array([bench.values[name] for name in free("lhifam").names])
+    model, pulls = free("lhifam"), []
+    for seed in range(12):
+        fit = least_squares(model, measure(bench, seed, seconds=12.0))
+        pulls.append((fit.theta - truth) / fit.sd)
+    pulls = np.array(pulls)[:, [0, 2, 3, 4]]  # dampers to the ground may stand at their bound
+    # Twelve recordings of four parameters, correlated: some 30 independent squares.
+    assert np.sqrt(np.mean(pulls**2)) == pytest.approx(1.0, abs=0.35)
+
+
+def test_a_parameter_at_a_bound_has_no_error_bar_and_the_others_have():
+    """The PHANToM has b2 = 0: about half of all fits end there."""
+    bench = Bench.from_device("phantom")
+    fits = [least_squares(free("phantom"), measure(bench, seed, 10.0)) for seed in range(6)]
+    at_bound = [fit.outcome["b2"] == "at a bound" for fit in fits]
+    assert any(at_bound) and not all(at_bound)
+    for fit, bound in zip(fits, at_bound, strict=True):
+        assert np.isnan(fit.sd[-1]) == bound
+        assert fit.theta[-1] == 0.0 if bound else fit.theta[-1] > 0
+        assert np.isfinite(np.delete(fit.sd, -1)).all()
+
+
+def test_what_the_data_do_not_decide_is_said():
+    """A tight prior against a recording that says nothing of the transmission's damper."""
+    bench = Bench.from_device("lhifam")
+    model = free("lhifam", prior={"bc": LogNormal(15.0, 1e-4)})
+    fit = least_squares(model, measure(bench, 3, 10.0))
+    assert fit.outcome["bc"] in ("prior-dominated", "at a bound")
+    assert fit.outcome["m1"] == "converged"
+
+
+def test_a_model_that_lacks_something_says_so_in_its_chi_square():
+    bench = Bench.from_device("lhifam")
+    etfe = measure(bench, 4, 10.0)
+    poor = least_squares(rigid("lhifam"), etfe)
+    good = least_squares(free("lhifam"), etfe)
+    assert poor.reduced_chi_square > 100 * good.reduced_chi_square
+    # Its error bars grow with it.
+    plain = poor.covariance / poor.reduced_chi_square
+    assert np.sqrt(plain[0, 0]) < 0.1 * poor.sd[0]
+
+
+def test_a_start_of_ones_own():
+    bench = Bench.from_device("phantom", held=True)
+    etfe = measure(bench, 5)
+    model = grasped("phantom")
+    near = least_squares(model, etfe, start=1.02 * model.values)
+    best = least_squares(model, etfe)
+    assert near.log_likelihood == pytest.approx(best.log_likelihood, abs=0.1)
+    assert near.starts == 1
+
+
+def test_noiseless_data_give_the_truth_to_many_digits():
+    rng = np.random.default_rng(0)
+    force = rng.standard_normal(20_000)
+    recording = Recording(force, Device(LHIFAM_FREE).simulate(force), 1e-3)
+    fit = least_squares(free("lhifam"), estimate_etfe(recording, band_hz=(2.0, 300.0)))
+    assert fit.theta == pytest.approx(free("lhifam").values, rel=2e-3)
+    masses = [fit.model.names.index(name) for name in ("m1", "m2", "kc")]
+    assert fit.theta[masses] == pytest.approx(free("lhifam").values[masses], rel=1e-5)
+
+
+def test_gauss_newton_on_a_problem_with_a_known_answer():
+    """Rosenbrock's valley, and the same with its optimum cut off by a bound."""
+
+    def residuals(phi):
+        return np.stack([10 * (phi[:, 1] - phi[:, 0] ** 2), 1 - phi[:, 0]], axis=1)
+
+    start = np.array([[-1.2, 1.0], [0.3, -0.8], [2.0, 2.0]])
+    box = np.full(2, -3.0), np.full(2, 3.0)
+    phi, cost = minimise(residuals, start, *box, steps=200, tolerance=1e-14)
+    assert phi == pytest.approx(np.ones((3, 2)), abs=1e-5)
+    assert cost == pytest.approx(np.zeros(3), abs=1e-10)
+    cut, _ = minimise(residuals, start, box[0], np.array([0.5, 3.0]), steps=200, tolerance=1e-14)
+    assert cut == pytest.approx(np.tile([0.5, 0.25], (3, 1)), abs=1e-5)
+    slope = jacobian(residuals, np.array([[0.5, 2.0]]))
+    assert slope[0] == pytest.approx(np.array([[-10.0, 10.0], [-1.0, 0.0]]), abs=1e-4)
+
+
+@pytest.mark.parametrize("mean", [-6.0, -1.0, 0.0, 0.7, 5.0])
+def test_moments_of_a_truncated_normal(mean):
+    from scipy.stats import truncnorm
+
+    found, spread = truncated_moments(np.array([2 * mean]), np.array([[4.0]]), np.zeros(1))
+    truth = truncnorm(-mean, np.inf, loc=2 * mean, scale=2.0)
+    # 2000 draws.
+    assert found[0] == pytest.approx(truth.mean(), abs=5 * truth.std() / np.sqrt(2000))
+    assert spread[0, 0] == pytest.approx(truth.var(), rel=0.2)
+
+
+def test_moments_of_two_truncated_normals():
+    rng = np.random.default_rng(0)
+    mean, covariance = np.array([0.3, -0.5]), np.array([[1.0, -0.8], [-0.8, 1.0]])
+    found, spread = truncated_moments(mean, covariance, np.zeros(2))
+    draws = rng.multivariate_normal(mean, covariance, 2_000_000)
+    draws = draws[np.all(draws > 0, axis=1)]
+    assert found == pytest.approx(draws.mean(axis=0), abs=5 * draws.std() / np.sqrt(2000))
+    assert spread == pytest.approx(np.cov(draws.T), rel=0.2)
