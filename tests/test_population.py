@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,7 +9,7 @@ from toy_study import toy_model, toy_posterior
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.gaussian_likelihood import fit_quadratic, linearised
+from bayeshaptic.inference.gaussian_likelihood import fit_quadratic
 from bayeshaptic.inference.hierarchy import Hierarchy
 from bayeshaptic.inference.hyperparameters import LKJ, Layout
 from bayeshaptic.inference.pareto import pareto_k
@@ -281,27 +279,6 @@ def test_tail_of_weights() -> None:
         # 189 weights in the tail: an error of (1 + k) / sqrt(189) of one, and drawn towards 0.5
         expected = (189 * shape + 5) / 199
         assert np.mean(found) == pytest.approx(expected, abs=3 * (1 + shape) / np.sqrt(189 * 20))
-
-
-def test_linearised_likelihood_is_that_of_the_model() -> None:
-    from bayeshaptic.rig import Bench, simulate
-
-    done = simulate(Bench.from_device("phantom", held=True), seed=1)
-    recording = bh.recording_from_arrays(
-        done.force, done.position, done.period_s, force_unit="Nm", position_unit="rad"
-    )
-    model = toy_model("kc", "ks", "mh")
-    etfe = bh.estimate_etfe(recording)
-    fit = bh.least_squares(model, etfe, seed=1)
-    posterior = bh.sample(model, etfe, fit, ess=200, seed=1)
-    here = study_coordinates(posterior.model)
-    x = here.coordinate(posterior.draws)
-    found = linearised(posterior, here, x.mean(axis=0), 0.05 * x.std(axis=0))
-    assert found is not None
-    left = posterior.log_likelihood.ravel() - found(x)
-    assert left.std() < 0.1  # nats; the likelihood itself varies by more than 1
-    bare = replace(posterior, windows=None)
-    assert linearised(bare, here, x.mean(axis=0), x.std(axis=0)) is None
 
 
 def test_priors_in_the_coordinates_of_a_study() -> None:
