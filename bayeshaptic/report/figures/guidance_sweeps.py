@@ -26,7 +26,7 @@ def draw(sweeps: tuple[Sweep, ...]) -> Figure:
     for axes, one in zip(panels, sweeps, strict=True):
         _panel(axes, one, k.factor, kinds)
     panels[0].set_ylabel(f"critical stiffness, {k.unit}", fontsize=style.FONT)
-    _legend(figure, kinds)
+    _legend(figure, kinds, any(one.jumps for one in sweeps))
     return figure
 
 
@@ -79,7 +79,7 @@ def _log_axis(axes: Axes, values: np.ndarray) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(style.plain))
 
 
-def _legend(figure: Figure, kinds: list[str]) -> None:
+def _legend(figure: Figure, kinds: list[str], jumps: bool) -> None:
     from matplotlib.lines import Line2D
 
     looks: list[dict[str, Any]] = [
@@ -90,7 +90,9 @@ def _legend(figure: Figure, kinds: list[str]) -> None:
     handles.append(
         Line2D([], [], color=style.DATA, marker="o", linestyle="none", label="as measured")
     )
-    handles.append(Line2D([], [], color=style.OTHER, linestyle=":", label="another crossing binds"))
+    if jumps:
+        look = {"color": style.OTHER, "linestyle": ":", "label": "another crossing binds"}
+        handles.append(Line2D([], [], **look))
     figure.legend(
         handles=handles,
         loc="outside lower center",
