@@ -91,8 +91,8 @@ def _legend(figure: Figure, kinds: list[str], jumps: bool) -> None:
         Line2D([], [], color=style.DATA, marker="o", linestyle="none", label="as measured")
     )
     if jumps:
-        look = {"color": style.OTHER, "linestyle": ":", "label": "another crossing binds"}
-        handles.append(Line2D([], [], **look))
+        dots = Line2D([], [], color=style.OTHER, linestyle=":", label="another crossing binds")
+        handles.append(dots)
     figure.legend(
         handles=handles,
         loc="outside lower center",
