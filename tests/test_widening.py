@@ -1,0 +1,53 @@
+"""What closing the loop adds to the limits of single recordings reaches those of people."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fake_analysis import fake_closed
+
+from bayeshaptic.diagnosis.recorded_cases import recorded, signature, widening
+from bayeshaptic.diagnosis.study_analysis import Analysed
+from bayeshaptic.recordings.study import StudyEntry
+from bayeshaptic.stability.cases import HELD
+
+
+def closed(name: str, log_sd: float = 0.0, shift: float = 0.0, family: str = "linear") -> Analysed:
+    """A closed loop whose limit is wider than its posterior says."""
+    found = fake_closed("explained", family)
+    parts = dict(vars(found.analysis))
+    rng = np.random.default_rng(1)
+    factor = np.exp(shift + log_sd * rng.standard_normal(len(found.analysis.limit.samples)))
+    parts["limit"] = replace(parts["limit"], samples=parts["limit"].samples * factor)
+    done = replace(found, analysis=SimpleNamespace(**parts))  # type: ignore[arg-type]
+    return Analysed(name, StudyEntry(Path(f"{name}.csv"), user=name), done)
+
+
+def test_effects_and_what_is_unexplained_are_passed_on() -> None:
+    some = [closed("ana"), closed("ben", log_sd=0.1), closed("eva", log_sd=0.05, shift=-0.2)]
+    found = widening(some)
+    # 3200 draws: a standard deviation is known to 1.3 %.
+    np.testing.assert_allclose(found.log_sd, [0.0, 0.1, 0.05], atol=0.005)
+    np.testing.assert_allclose(found.shift, [0.0, 0.0, -0.2], atol=0.01)
+    limit = some[0].analysis.limit  # type: ignore[union-attr]
+    wider = found.apply(limit, np.random.default_rng(2))
+    ratio = np.log(wider.samples / limit.samples)
+    assert ratio.mean() == pytest.approx(-0.2 / 3, abs=0.01)
+    assert widening(some[:1]).apply(limit, np.random.default_rng(2)) is limit
+
+
+def test_a_case_keeps_its_widened_samples() -> None:
+    one = closed("ana", log_sd=0.1)
+    (case,) = recorded([one], HELD)
+    assert case.label == "user ana" and len(case.draws) == len(case.limit.samples)
+    np.testing.assert_array_equal(case.limit.samples, one.analysis.limit.samples)  # type: ignore[union-attr]
+
+
+def test_recordings_with_different_effects_are_not_alike() -> None:
+    reflex, friction = closed("ana"), closed("ben", family="nonlinear")
+    assert reflex.effects == ("reflex",) and friction.effects == ("coulomb_friction",)
+    assert signature(reflex) != signature(friction)
