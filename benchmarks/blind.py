@@ -167,19 +167,26 @@ def main() -> None:
         groups.setdefault(name, []).extend(
             jobs_for(pair, 4, chosen.seed + 50_000 + 10 * i)[i // len(PAIRS) :][:1]
         )
-    flat = [job for jobs in groups.values() for job in jobs]
-    with ProcessPoolExecutor(chosen.workers) as pool:
-        found = dict(zip(flat, pool.map(run, flat), strict=True))
     print(
         f"{'effect':32s} {'n':>3s} {'class':>6s} {'name':>6s} {'expl.':>6s} {'K dB, worst':>12s} "
         f"{'covers before':>14s} {'after':>6s} {'held-out':>9s} {'CPU s':>6s}"
     )
-    every = []
-    for name, jobs in groups.items():
-        outcomes = [found[job] for job in jobs]
-        every += outcomes if name != "clean" else []
-        print(_row(name, outcomes), flush=True)
+    every: list[Outcome] = []
+    with ProcessPoolExecutor(chosen.workers) as pool:
+        flat = [job for jobs in groups.values() for job in jobs]
+        results = iter(pool.map(run, flat))  # rows are printed as their recordings are done
+        for name, jobs in groups.items():
+            outcomes = [next(results) for _ in jobs]
+            every += outcomes if name != "clean" else []
+            print(_row(name, outcomes), flush=True)
     print(_row("all but clean", every))
+    missed = [o for o in every if not (_class_right(o) and _name_right(o))]
+    print(f"class or name missed: {len(missed)} of {len(every)}")
+    for o in missed:
+        print(
+            f"  {o.job.case}, {', '.join(o.job.effects)}, seed {o.job.seed}: {o.verdict}, "
+            f"{', '.join(o.found) or 'nothing'}, K_CR {o.error_db:+.2f} dB"
+        )
     unsafe = [o for o in every if o.error_db > 1.5 and o.verdict != "unexplained"]
     print(f"median over 1.5 dB too high and not called unexplained: {len(unsafe)} of {len(every)}")
     for o in unsafe:
