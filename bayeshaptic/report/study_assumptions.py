@@ -15,7 +15,7 @@ def assumptions(study: StudyAnalysis) -> tuple[str, ...]:
         "and delay, a device that is linear at the amplitudes that matter.",
         "The limit of the device is the lowest critical stiffness over all cases. Cases that share "
         "the device's parameters are taken as independent of each other, which errs on the safe "
-        "side.",
+        "side; only configurations along a coordinate are drawn together.",
     ]
     if study.population is not None:
         found += [

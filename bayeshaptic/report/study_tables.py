@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 _DASH = "\N{EN DASH}"
 _LEVELS = tuple(QUANTILES.values())
 _MOST_CASES = 8
+_FEWEST = 20  # different draws, for an interval
 
 
 def device(study: StudyAnalysis) -> Rows:
@@ -127,16 +127,20 @@ def users(study: StudyAnalysis) -> Rows:
     rows = []
     for case in study.users:
         own = alone.get(case.label, ())
-        rows.append(
-            (
-                case.label.removeprefix("user "),
-                ", ".join(f"{decibel(one.quantile(0.5)):.2f}" for one in own) or _DASH,
-                f"{decibel(case.limit.quantile(0.5)):.2f}",
-                *(f"{decibel(case.limit.quantile(p)):.2f}" for p in (0.05, 0.95)),
+        given: tuple[str, ...] = ("too few draws to say", _DASH, _DASH, _DASH)
+        if has_draws(case):
+            given = (
+                *(f"{decibel(case.limit.quantile(p)):.2f}" for p in (0.5, 0.05, 0.95)),
                 pure(spread_db(case), 2),
             )
-        )
+        middles = ", ".join(f"{decibel(one.quantile(0.5)):.2f}" for one in own)
+        rows.append((case.label.removeprefix("user "), middles or _DASH, *given))
     return tuple(rows)
+
+
+def has_draws(case: Case) -> bool:
+    """Whether a case has enough different draws for an interval, and not a few weighted ones."""
+    return len(np.unique(case.limit.samples)) >= _FEWEST
 
 
 def raw_limits(study: StudyAnalysis) -> dict[str, tuple[Any, ...]]:
@@ -201,7 +205,7 @@ def crossings(cases: Sequence[Case]) -> Rows:
 def provenance(study: StudyAnalysis) -> Rows:
     """Where this comes from: (what, value)."""
     seconds = sum(study.seconds.values())
-    return (("Study file", Path(study.study.path).as_posix()), ("Took", f"{seconds:.0f} s"))
+    return (("Took", f"{seconds:.0f} s"),)
 
 
 def _four(value: float, unit: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,11 +51,17 @@ def draw(table: LimitTable) -> Figure:
         figure.legend(
             *left.get_legend_handles_labels(),
             loc="outside lower center",
-            ncols=4,
+            ncols=_columns(label for label, _ in curves),
             fontsize=style.SMALL + 0.5,
             frameon=False,
         )
     return figure
+
+
+def _columns(labels: Iterable[str]) -> int:
+    """How many entries of a legend stand side by side on the page's width."""
+    widest = 0.45 + 0.06 * max(len(label) for label in labels)
+    return min(max(int(style.WIDTH_IN / widest), 1), 4)
 
 
 def _curves(table: LimitTable) -> list[tuple[str, NDArray[Any]]]:

@@ -9,6 +9,7 @@ import numpy as np
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.limits import decibel
 from bayeshaptic.report.quantities import percent, pretty_unit
+from bayeshaptic.report.study_words import is_free
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ LOOKS = {
 }
 _ORDER = (FREE, HELD, NEW_PERSON, CONFIGURATION)
 _MOST = 24
+_PREDICTED = "(predicted)"  # as labels of configurations that were not recorded have it
 _SEEN = 0.02  # probability to set the limit
 _ROW_IN = 0.2
 _FAR_DB = 6.0
@@ -74,13 +76,19 @@ def _spans(study: StudyAnalysis, cases: tuple[Case, ...]) -> list[tuple[float, f
 
 
 def shown_cases(study: StudyAnalysis) -> tuple[Case, ...]:
-    """By group; of the configurations those that may bind, of too many cases those that do so most.
+    """By group; of the configurations those that may bind or were recorded with nobody holding it.
 
-    The configurations have a figure of their own.
+    Of too many cases those that bind most. The configurations have a figure of their own.
     """
     assert study.limit is not None
     shares = {found.case: found.probability for found in study.limit.binding}
-    kept = [c for c in study.cases if c.group != CONFIGURATION or shares.get(c.label, 0.0) > _SEEN]
+    kept = [
+        case
+        for case in study.cases
+        if case.group != CONFIGURATION
+        or shares.get(case.label, 0.0) > _SEEN
+        or (is_free(case.label, case.group) and _PREDICTED not in case.label)
+    ]
     kept = sorted(kept, key=lambda case: -shares.get(case.label, 0.0))[:_MOST]
     return tuple(case for group in _ORDER for case in kept if case.group == group)
 

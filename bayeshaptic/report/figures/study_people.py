@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.limits import RISKS, decibel
 from bayeshaptic.report.quantities import percent, pretty_unit
-from bayeshaptic.report.study_tables import raw_limits
+from bayeshaptic.report.study_tables import has_draws, raw_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,7 +132,8 @@ def _users(axes: Axes, study: StudyAnalysis) -> None:
     for place, case in enumerate(study.users):
         for limit in alone[case.label]:
             _bar(axes, limit, place + 0.17, "s", style.DATA, "white", 3.5, 1.0)
-        _bar(axes, case.limit, place - 0.17, "o", style.MODEL, style.MODEL, 4.0, 1.8)
+        if has_draws(case):
+            _bar(axes, case.limit, place - 0.17, "o", style.MODEL, style.MODEL, 4.0, 1.8)
     names = [case.label.removeprefix("user ") for case in study.users]
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
