@@ -46,7 +46,7 @@ def moments(name: str, device: str, structure, steps: int) -> str:
     sd = theirs.std(axis=0)
     mean = np.abs(ours.mean(axis=0) - theirs.mean(axis=0)) / sd
     ratio = np.abs(ours.std(axis=0) / sd - 1)
-    worth = diagnose(chains[None])
+    worth = diagnose(chains.reshape(2, -1, WALKERS, fit.model.size))
     return (
         f"{name:14s} {posterior.effective:8.0f} {worth.ess_bulk.min():8.0f}   "
         f"{mean.max():6.3f} sd ({fit.model.names[int(mean.argmax())]:4s})   "

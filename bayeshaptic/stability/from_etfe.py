@@ -69,9 +69,9 @@ class _Run(NamedTuple):
 def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> EtfeCriticalStiffness:
     """Smallest -Re(1/G) over the frequencies of the band where the measured G is real and negative.
 
-    The response is fitted by cubics, each over a span of windows where a quintic is no better.
+    The response is fitted by quintics, each over a span of windows where a cubic is as good.
     The phase crosses between two stretches of the band that lie on either side of -180
-    degrees.  The coefficients of the cubics at the crossings are drawn from their covariance, and
+    degrees.  The coefficients at the crossings are drawn from their covariance, and
     the lowest crossing of each draw is read off.  A stretch that is on its side by no more than
     noise counts with its neighbours: the weaker it is, the more often.
 

@@ -19,9 +19,9 @@ _ORDER = 3
 _RICHER = 5
 _SPANS = np.geomspace(0.6, 0.02, 14)  # half widths over the centre frequency, widest first
 _BETTER = 5.0  # gain in chi-square by the richer polynomial that noise exceeds in 4 % of cases
-_NARROWER = 3  # steps from the widest span where a cubic passes: its bias is then below the noise
+_NARROWER = 2  # steps from the widest span where a cubic passes
 _NEIGHBOURS = 4  # windows on each side that share their noise variance
-_OUTLIER = 4.0
+_OUTLIER = 1.6  # share of its own noise variance that a window keeps at least: a tremor is a peak
 _NOISIEST = 0.3  # relative sd above which 1/G is not linear in the noise
 
 
@@ -88,8 +88,8 @@ class LocalFit:
         beside antiresonances and for a mass.
     low_hz, high_hz : float
         What the data under it cover.
-    coefficients : ndarray of complex, shape (4,)
-    covariance : ndarray of complex, shape (4, 4)
+    coefficients : ndarray of complex, shape (6,)
+    covariance : ndarray of complex, shape (6, 6)
         E[d d^H] of the coefficients; real and imaginary parts have half each.
     """
 
@@ -117,16 +117,20 @@ class LocalFit:
         half = np.linalg.cholesky(self.covariance / 2)
         noise = rng.standard_normal((2, count, len(half)))
         coefficients = self.coefficients + (noise[0] + 1j * noise[1]) @ half.T
-        value = coefficients @ _powers(frequency_hz, self.centre_hz, self.span, _ORDER).T
+        value = coefficients @ _powers(frequency_hz, self.centre_hz, self.span, _RICHER).T
         return value if self.inverted else (frequency_hz / self.centre_hz) ** 2 / value
 
 
 def local_fit(data: ResponseData, centre_hz: float) -> LocalFit | None:
-    """The fit with the least noise in which a cubic is enough; None where data are too few.
+    """The quintic with the least noise where a cubic is enough; None where data are too few.
 
     Of 1/G and G (f/f0)^2, each over a span a little narrower than the widest that a cubic
     describes: there a quintic gains less than noise would let it, and what is left is as large as
-    the noise.  Where not even the narrowest span passes, the covariance is scaled by what is left.
+    the noise.  The quintic is taken all the same: the span was chosen for the cubic's variance to
+    be as large as its bias, which an interval must not have (S. Calonico, M. D. Cattaneo and
+    R. Titiunik, "Robust nonparametric confidence intervals for regression-discontinuity designs",
+    Econometrica 82, 2014).  Where not even the narrowest span passes, the covariance is scaled by
+    what is left.
 
     Parameters
     ----------
@@ -138,18 +142,18 @@ def local_fit(data: ResponseData, centre_hz: float) -> LocalFit | None:
 
 
 def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | None:
-    """The fit three spans below the widest that passes, or the narrowest that there is."""
+    """The fit two spans below the widest that passes, or the narrowest that there is."""
     last, accepted = None, 0
     for span in _SPANS:
         near = np.abs(data.centre_hz / centre_hz - 1) <= span
         numbers = int(near.sum()) * data.frequency_hz.shape[1]
-        freedom = numbers - _ORDER - 1
-        if freedom < 2:
+        freedom, richer = numbers - _ORDER - 1, numbers - _RICHER - 1
+        if richer < 2:
             break
         matrix, target = _equations(data, near, centre_hz, span, inverted)
-        fit = _solve(matrix[:, : _ORDER + 1], target)
-        gain = fit.left - _solve(matrix, target).left if numbers > _RICHER + 1 else 0.0
-        enough = gain < _BETTER and fit.left < freedom + 3 * np.sqrt(1.2 * freedom)
+        left = _solve(matrix[:, : _ORDER + 1], target).left
+        fit = _solve(matrix, target)
+        enough = left - fit.left < _BETTER and left < freedom + 3 * np.sqrt(1.2 * freedom)
         accepted += enough or accepted > 0
         used = data.frequency_hz[near]
         last = LocalFit(
@@ -159,7 +163,7 @@ def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | 
             float(used.min()),
             float(used.max()),
             fit.coefficients,
-            fit.covariance * (1.0 if enough else max(fit.left / freedom, 1.0)),
+            fit.covariance * (1.0 if enough else max(fit.left / richer, 1.0)),
         )
         if accepted > _NARROWER:
             break
