@@ -90,16 +90,28 @@ class ForceBench:
             # The measured position has what a hand does, and where the device stands.
             measured = self.recording.position
             grid, samples = np.arange(len(x)) / SUBSTEPS, np.arange(len(measured))
-            if self.held:  # a hand moves it besides the command
-                hand = self._slow(measured - x[::SUBSTEPS] - self._extra)
-                v = v + np.interp(grid, samples, np.gradient(hand, period))
+            besides = measured - x[::SUBSTEPS] - self._extra
+            slow = self._hand(besides) if self.held else self._drift(besides, theta)
+            v = v + np.interp(grid, samples, slow)
             found[MOTOR] = Motion(np.interp(grid, samples, measured), v, self.force)
         return found
 
-    def _slow(self, rest: Floats) -> Floats:
+    def _hand(self, besides: Floats) -> Floats:
+        """Velocity that a hand adds: what is slow, because there the encoder sees it well."""
         rate = 1 / self.recording.period_s
         low = butter(2, min(_HAND_HZ, 0.4 * rate), fs=rate, output="sos")
-        return np.asarray(sosfiltfilt(low, rest))
+        return np.gradient(sosfiltfilt(low, besides), 1 / rate)
+
+    def _drift(self, besides: Floats, theta: Floats) -> Floats:
+        """Velocity of a free device from how it began and from a constant force.
+
+        Nobody knows either; friction depends on it, and the spectra do not.
+        """
+        period = self.recording.period_s
+        steady = np.ones(len(besides))
+        x, v = linear_motion(self.model.system(theta), steady, period)
+        weights = np.linalg.lstsq(np.stack([steady, x, v], axis=1), besides, rcond=None)[0]
+        return weights[1] * v + weights[2] * np.gradient(v, period)
 
     def added_motion(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Floats:
         """What the force adds to the motor's position at the samples, shape (N,)."""

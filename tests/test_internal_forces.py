@@ -1,0 +1,99 @@
+"""What a force adds to the motion, against the virtual bench, which shares no code with it."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.force_bench import ForceBench
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.effects.internal_force import CONNECTION, MOTOR
+from bayeshaptic.effects.registry import effect_class
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings import Recording, recording_from_arrays
+from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig.excitation import Given
+
+LHIFAM = Bench.from_device("lhifam")
+SECONDS, SEED = 6.0, 4
+
+# Name, fields on the bench, strength, shape, place.
+FORCES: tuple[tuple[str, dict[str, float], float, dict[str, float], Any], ...] = (
+    ("coulomb_friction", {"force": 0.6}, 0.6, {}, MOTOR),
+    (
+        "stribeck_friction",
+        {"force": 0.5, "static": 0.8, "velocity": 0.02},
+        0.5,
+        {"static_excess": 0.6, "stribeck_velocity": 0.02},
+        MOTOR,
+    ),
+    (
+        "dahl_friction",
+        {"force": 0.6, "stiffness": 1500.0},
+        0.6,
+        {"presliding_distance": 4e-4},
+        MOTOR,
+    ),
+    ("drag", {"coefficient": 150.0}, 150.0, {}, MOTOR),
+    ("hardening_connection", {"stiffness": 1.5e11}, 1.5e11, {}, CONNECTION),
+    ("backlash", {"gap": 4e-5, "free_damping": 0.0}, 4e-5, {"damping_in_gap": 1.0}, CONNECTION),
+    ("actuator_saturation", {"limit": 5.0}, 5.0, {}, MOTOR),
+)
+OURS = {"hardening_connection": "hardening_spring"}
+
+
+@cache
+def command() -> Any:
+    """White noise without a mean: a free device then does not run away."""
+    force = simulate(LHIFAM, WhiteNoise(4.0, 300.0, 0.3, SECONDS), seed=SEED).force
+    return Given(force - force.mean())
+
+
+def recorded(bench: Bench) -> Recording:
+    made = simulate(bench, command(), seed=SEED)
+    return recording_from_arrays(
+        made.force,
+        made.position,
+        period_s=bench.period_s,
+        encoder_resolution=bench.encoder_resolution,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "fields", "strength", "shape", "place"), FORCES, ids=[force[0] for force in FORCES]
+)
+def test_added_motion_is_that_of_the_bench(
+    name: str,
+    fields: dict[str, float],
+    strength: float,
+    shape: dict[str, float],
+    place: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with_force = recorded(LHIFAM.with_effect(name, **fields))
+    without = recorded(LHIFAM)
+    etfe = estimate_etfe(with_force)
+    model = build_model("free", "lhifam")
+    fit = least_squares(model, etfe, start=model.values)
+    own = fit.model
+    assert own.values is not None
+    effect = effect_class(OURS.get(name, name))(place, shape)
+    # It begins at rest, and no constant force acts: there is no drift to look for.
+    monkeypatch.setattr(ForceBench, "_drift", lambda bench, besides, theta: np.zeros(len(besides)))
+    bench = ForceBench(State(etfe, fit), with_force)
+    found = bench.added_motion(effect, strength, own.values)
+    # Moves in 50 ms: a mean and a slope do not matter.
+    found, added = (
+        signal[50:] - signal[:-50] for signal in (found, with_force.position - without.position)
+    )
+    # Four encoder readings, each off by a uniform count; and the eighth of a period in which dry
+    # friction turns, twice an oscillation of the mode (103 Hz): 2.6 %.
+    counting = LHIFAM.encoder_resolution * np.sqrt(4 / 12)
+    allowed = 1.2 * counting + 0.026 * added.std()
+    assert np.std(found - added) < allowed, (np.std(found - added), counting, added.std())
+    assert added.std() > 3 * counting  # or this would show nothing
