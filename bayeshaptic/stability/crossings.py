@@ -116,8 +116,12 @@ def search(response: Response, period_s: float) -> Crossings:
 
 
 def _sine(response: NDArray[np.complex128]) -> Floats:
-    """Im(-G)/|G|: the sine of how far the phase is from -180 degrees."""
-    return -response.imag / np.abs(response)
+    """Im(-G)/|G|: the sine of how far the phase is from -180 degrees.
+
+    It is 0 where G is: a mass without damping or delay has a zero at the Nyquist frequency.
+    """
+    size = np.abs(response)
+    return np.divide(-response.imag, size, out=np.zeros_like(size), where=size > 0)
 
 
 def _scan(response: Response, rows: slice) -> tuple[Ints, Floats, Floats, Floats, Floats]:
