@@ -18,15 +18,18 @@ from bayeshaptic.rig import Bench, WhiteNoise, simulate
 RIDGE = {"m1": 1.44e-3, "b1": 0.57e-3, "bc": 5.1e-3, "kc": 34.7, "m2": 0.113e-3, "b2": 25e-3}
 
 
-@pytest.fixture(scope="module")
-def on_a_ridge():
+def _recording() -> bh.Recording:
     bench = Bench.from_device("phantom", values=RIDGE)
     noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 30.0)
     run = simulate(bench, noise, seed=1010)
-    recording = bh.recording_from_arrays(
+    return bh.recording_from_arrays(
         run.force, run.position, period_s=1e-3, force_unit="Nm", position_unit="rad"
     )
-    fit = bh.least_squares(bh.free(device="phantom"), bh.estimate_etfe(recording))
+
+
+@pytest.fixture(scope="module")
+def on_a_ridge():
+    fit = bh.least_squares(bh.free(device="phantom"), bh.estimate_etfe(_recording()))
     here = sampling_coordinates(fit.model, fit.theta, fit.sd)
     return fit, here, Density(fit.likelihood, here)
 
@@ -52,3 +55,20 @@ def test_walkers_start_inside_even_where_the_proposal_misses(on_a_ridge):
     assert start.shape == (64, fit.model.size)
     assert np.isfinite(density(start)).all()
     assert np.linalg.matrix_rank(start - start.mean(axis=0), tol=1e-12) == fit.model.size
+
+
+def test_a_fit_at_the_end_of_a_prior_still_finds_the_peak(on_a_ridge):
+    """Following a wall's ridge must not lead out of another prior's support, into nothing."""
+    fit, _, _ = on_a_ridge
+    value = fit.theta[fit.model.names.index("bc")]
+    for prior in (bh.LogUniform(1.001 * value, 10 * value), bh.LogUniform(0.1 * value, value)):
+        model = fit.model.with_prior({"bc": prior})
+        there = bh.least_squares(model, bh.estimate_etfe(_recording()), start=fit.theta)
+        here = sampling_coordinates(model, there.theta, there.sd)
+        density = Density(there.likelihood, here)
+        for end in (0.0, 1e-8, -1e-8):  # of rounding
+            peak, proposal = laplace(density, here.coordinate(there.theta) + end)
+            assert density(peak[None])[0] > there.log_likelihood - 20
+            drawn = proposal.sample(np.random.default_rng(0), 2000)
+            assert np.isfinite(density(drawn)).mean() > 0.1
+            assert adapt(density, proposal, np.random.default_rng(1)).efficiency > 0.2

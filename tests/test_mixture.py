@@ -123,6 +123,30 @@ def test_adapting_survives_a_guess_outside_the_support():
     assert np.isfinite(nowhere.weights).all()
 
 
+def test_one_point_that_outweighs_all_others_by_far_decides_nothing():
+    """Heavier by more than a number can hold: log weights hundreds apart."""
+    guess = student(np.zeros(3), np.eye(3))
+
+    def narrow(x):
+        return -0.5e8 * np.sum((x - 2.0) ** 2, axis=1)
+
+    adapted = adapt(narrow, guess, np.random.default_rng(16))
+    assert np.isfinite(adapted.points).all()
+    # The proposals have moved towards the peak, instead of collapsing on the best point so far.
+    assert np.linalg.norm(adapted.points[-2000:].mean(axis=0) - 2.0) < 1.5
+    assert adapted.points[-2000:].std(axis=0).min() > 1e-3
+
+
+def test_a_fit_to_one_point_is_that_point():
+    x = np.random.default_rng(17).standard_normal((500, 3))
+    weights = np.zeros(500)
+    weights[7] = 1.0
+    fitted = fit_student_mixture(x, weights, 1, 8.0, np.random.default_rng(18))
+    drawn = fitted.sample(np.random.default_rng(19), 100)
+    assert drawn == pytest.approx(np.tile(x[7], (100, 1)), abs=1e-6)
+    assert np.isfinite(fitted.log_density(x)).all()
+
+
 def banana(rng: np.random.Generator, count: int) -> np.ndarray:
     """A ridge bent twice in five dimensions, a hundred times longer than it is thick."""
     z = rng.standard_normal((count, 5)) * [3.0, 1.0, 0.03, 0.05, 0.5]

@@ -14,6 +14,7 @@ Floats = NDArray[np.float64]
 _DRAWS = 2000
 _GOOD = 0.5  # efficiency at which the proposal is left as it is
 _COMPONENTS = 3
+_POWERS = 0.7 ** np.arange(60)  # of weights that a few points would have for themselves
 
 
 @dataclass(frozen=True)
@@ -62,12 +63,14 @@ def adapt(
     while True:
         average = np.mean(np.exp(_shifted([p.log_density(points) for p in proposals])), axis=0)
         base = np.max([p.log_density(points) for p in proposals], axis=0)
-        weights = _normalised(target - base - np.log(average))
+        log_weights = target - base - np.log(average)
+        weights = _normalised(log_weights)
         newest = weights[-_DRAWS:]
         efficiency = float(newest.sum() ** 2 / max(np.sum(newest**2), 1e-300) / _DRAWS)
         if efficiency > _GOOD or len(proposals) > rounds:
             return Adapted(proposals[-1], points, weights, efficiency)
-        fitted = fit_student_mixture(points, _tempered(weights), _COMPONENTS, 8.0, rng)
+        flat = _tempered(log_weights, 5 * points.shape[1])
+        fitted = fit_student_mixture(points, flat, _COMPONENTS, 8.0, rng)
         proposals.append(fitted.with_component(first, 0.1))
         drawn = proposals[-1].sample(rng, _DRAWS)
         points = np.concatenate([points, drawn])
@@ -87,13 +90,18 @@ def _normalised(log_weights: Floats) -> Floats:
     return weights / weights.sum()
 
 
-def _tempered(weights: Floats, least: float = 100.0) -> Floats:
-    """Flatten weights until at least `least` points count: a fit to five points means nothing."""
-    power = 1.0
-    for _ in range(12):
-        flat = weights**power
-        flat /= flat.sum()
+def _tempered(log_weights: Floats, fewest: int, least: float = 100.0) -> Floats:
+    """Flatten weights until at least `least` points count: a fit to five points means nothing.
+
+    In logarithms, because one point may outweigh the others by more than a number can hold.  Where
+    not even `fewest` points lie in the support, all count alike: the proposal stays as it is.
+    """
+    possible = np.isfinite(log_weights)
+    if possible.sum() < fewest:
+        return np.full(len(log_weights), 1 / len(log_weights))
+    least = min(least, 0.9 * float(possible.sum()))
+    for power in _POWERS:
+        flat = _normalised(power * log_weights)
         if 1 / np.sum(flat**2) >= least:
-            return flat
-        power *= 0.7
+            break
     return flat

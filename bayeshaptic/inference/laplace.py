@@ -12,6 +12,7 @@ from bayeshaptic.inference.mixture import StudentMixture, student
 
 Floats = NDArray[np.float64]
 _STEP = 0.1  # of finite differences, in conditional standard deviations
+_MARGIN = 2.5 * _STEP  # from where second differences stay inside the support
 
 
 def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
@@ -35,7 +36,8 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
     proposal : StudentMixture
     """
     here = density.coordinates
-    widths = _conditional_widths(density, phi)
+    widths = np.minimum(_conditional_widths(density, phi), here.high - here.low)
+    phi = _within(density, phi, widths)
     everything = np.ones(len(phi), bool)
     peak = _climb(density, phi, everything, widths)
     covariance = _inverse(-_hessian(density, peak, widths))
@@ -51,6 +53,7 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
     inside = peak + covariance[:, leaning] @ along
     inside = np.where(here.walls, np.maximum(inside, here.low), inside)
     inside[leaning] = mean
+    inside = _within(density, inside, widths)
     inside = _climb(density, inside, ~leaning, widths)
     curvature = -_hessian(density, inside, widths)
     others = ~leaning
@@ -71,6 +74,17 @@ def _conditional_widths(density: Density, phi: Floats) -> Floats:
     return 1 / np.sqrt(1 + np.sum(slope**2, axis=0))
 
 
+def _within(density: Density, phi: Floats, widths: Floats) -> Floats:
+    """`phi` a little inside those ends of the support that are no walls.
+
+    Beyond a wall the prior goes on as it begins; beyond other ends there is nothing, and
+    differences would find neither slope nor curvature.
+    """
+    here = density.coordinates
+    low = np.where(here.walls, -np.inf, here.low + _MARGIN * widths)
+    return np.clip(phi, low, here.high - _MARGIN * widths)
+
+
 def _climb(
     density: Density, phi: Floats, free: NDArray[np.bool_], widths: Floats, steps: int = 30
 ) -> Floats:
@@ -87,6 +101,7 @@ def _climb(
             move = vectors @ ((vectors.T @ gradient) / (eigenvalues * (1 + damping) + damping))
             trial = phi.copy()
             trial[free] += np.clip(move * widths[free], -1.0, 1.0)
+            trial = _within(density, trial, widths)
             trial_value = float(density.beyond_walls(trial)[0])
             if trial_value >= value:
                 break

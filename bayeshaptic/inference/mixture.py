@@ -11,6 +11,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import gammaln, logsumexp
 
 Floats = NDArray[np.float64]
+_NO_WIDTH = 1e-24  # variance, of coordinates of order one, that rounding errors have
 
 
 @dataclass(frozen=True)
@@ -139,8 +140,9 @@ def _covariance(x: Floats, w: Floats, mean: Floats) -> Floats:
 def _root(covariance: Floats) -> Floats:
     """Cholesky factor; directions that the points do not span get a little width of their own."""
     covariance = 0.5 * (covariance + covariance.T)
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    scale = np.sqrt(np.maximum(np.diag(covariance), _NO_WIDTH))
     correlation = covariance / np.outer(scale, scale)
+    np.fill_diagonal(correlation, 1.0)  # where all points are one, there is none
     values, vectors = np.linalg.eigh(correlation)
     values = np.maximum(values, 1e-10 * values[-1])
     mended = (vectors * values) @ vectors.T
