@@ -157,7 +157,7 @@ def close_loop(
             seed=seed,
             progress=lambda part, word: report(0.6 + 0.3 * part, word),
         )
-    limit = with_discrepancy(analysis.limit, analysis.posterior, state.fit, traced, seed)
+    limit = with_discrepancy(analysis.limit, analysis.posterior, begun.fit, state.fit, traced, seed)
     notices = analysis.notices + _notices(traced)
     analysis = replace(analysis, limit=limit, notices=notices)
     return Closed(base, analysis, traced, _error(base), _error(analysis), force)

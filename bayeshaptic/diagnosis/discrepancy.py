@@ -3,7 +3,9 @@
 A linear remainder multiplies the response by exp(delta), delta a complex Gaussian process over log
 frequency whose size and smoothness the residual itself decides (M. C. Kennedy and A. O'Hagan,
 "Bayesian calibration of computer models", J. R. Statist. Soc. B 63, 2001).  A nonlinear remainder
-would invent crossings there; it widens the limit downwards instead, and keeps its upper end.
+would invent crossings there.  Where nothing of its class was found it widens the limit downwards
+instead, and keeps its upper end; where an effect was found and leaves a rest, the limit is
+uncertain by that share of how far the effect has moved it.
 """
 
 from __future__ import annotations
@@ -32,9 +34,17 @@ _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
 def with_discrepancy(
-    limit: CriticalStiffness, posterior: Posterior, fit: Fit, traced: Traced, seed: int = 0
+    limit: CriticalStiffness,
+    posterior: Posterior,
+    base: Fit,
+    fit: Fit,
+    traced: Traced,
+    seed: int = 0,
 ) -> CriticalStiffness:
-    """The limit with the spread of accepted effects and of what is unexplained."""
+    """The limit with the spread of accepted effects and of what is unexplained.
+
+    `base` is the fit of the model as declared, `fit` that with the accepted effects.
+    """
     rng = np.random.default_rng(seed)
     spread = np.sqrt(sum(effect.limit_log_sd**2 for effect in traced.state.accepted))
     if spread > 0:
@@ -46,10 +56,27 @@ def with_discrepancy(
     if "linear" in families:
         limit = _with_linear(limit, posterior, fit, rng)
     for family in sorted(families - {"linear"}):
-        width = _downwards(fit, traced, family)
-        factor = np.exp(-width * rng.uniform(size=len(limit.samples)))
+        if any(effect.family == family for effect in traced.state.accepted):
+            low, high = -1.0, 1.0
+            width = _rest(base, fit, traced, family)
+        else:
+            low, high = -1.0, 0.0
+            width = _downwards(fit, traced, family)
+        factor = np.exp(width * rng.uniform(low, high, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
     return limit
+
+
+def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
+    """How far, in log stiffness, the rest of an effect may take the limit either way."""
+    before, after = (
+        max((test.statistic for test in tests if test.family == family), default=0.0)
+        for tests in (traced.before, traced.after)
+    )
+    left = min(after / before, 1.0) if before > 0 else 1.0
+    limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
+    moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
+    return max(_LEAST[family], left * moved)
 
 
 def _downwards(fit: Fit, traced: Traced, family: str) -> float:

@@ -6,6 +6,7 @@ simulated, enter the likelihood as further inputs, and one Gauss-Newton fit move
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -23,10 +24,10 @@ from bayeshaptic.recordings.windows import Windows
 Floats = NDArray[np.float64]
 
 _ROUNDS = 12
-_ENOUGH = 3e-3  # relative change of strength and shape
 _NO_GAIN = 0.5  # of the log likelihood
-_NUDGE = 0.05  # relative, for the slopes
-_SMALL = 3e-3  # the same of a linear parameter: resonances are sharp
+_ON, _BACK = 3.0, 0.3  # factors on a step that goes well, and on one that does not
+_NUDGE = 0.1  # relative, of strength and shape for the slopes
+_SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
 _MOST = 0.8  # log change a round
 _SHAPE_SD = 1.0  # log; how far a shape may be from the grid's
 
@@ -44,41 +45,35 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     -------
     Point
     """
-    effect, theta = found.effect, found.theta
-    names = effect.tuned
+    effect = found.effect
+    names, sign = effect.tuned, float(np.sign(found.strength))
     logs = np.log([abs(found.strength), *(effect.shape[name] for name in names)])
-    first, sign = logs.copy(), np.sign(found.strength)
+    first, best = logs.copy(), found
 
-    def motion(logs: Floats, theta: Floats) -> Floats:
-        shaped = _shaped(effect, names, logs)
-        return bench.added_motion(shaped, float(sign * np.exp(logs[0])), theta)
+    def at(logs: Floats) -> tuple[NonlinearEffect, float]:
+        return _shaped(effect, names, logs), sign * float(np.exp(logs[0]))
 
-    here, _, _ = search_box(bench.model)
-    # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
-    coupled = effect.place != MOTOR or not bench.held
-    before = np.inf
+    def tried(logs: Floats, theta: Floats) -> Point:
+        return bench.point(*at(logs), theta, rounds=2)
+
+    nudges = _nudges(bench)
     for _ in range(_ROUNDS):
-        extra = motion(logs, theta)
-        bench.remember(extra)
-        slopes = [
-            (motion(logs + _NUDGE * unit, theta) - extra) / _NUDGE for unit in np.eye(len(logs))
-        ]
-        if coupled:
-            phi = here.coordinate(theta[None])
-            moved = here.natural(phi + _SMALL * np.eye(len(theta)))
-            slopes += [(motion(logs, vector) - extra) / _SMALL for vector in moved]
-        _, windows = bench.without(extra, theta, slopes)
-        # The many slopes leave too little of a window to read its noise from.
-        noise = Likelihood(bench.model, bench.without(extra, theta)[1]).noise_variance
-        chosen = share(windows, FIT)
-        theta, step, cost = _joint_step(
-            bench, windows.part(chosen), noise[chosen], theta, logs - first
-        )
-        logs, gained, before = logs + step, before - cost, cost
-        if np.abs(step).max() < _ENOUGH and abs(gained) < _NO_GAIN:
+        theta, step = _joint_step(bench, at, logs, best.theta, logs - first, nudges)
+        share, point = 1.0, tried(logs + step, theta)
+        if point.gain_fit < best.gain_fit:
+            share, point = _BACK, tried(logs + _BACK * step, best.theta)
+        else:  # slopes of a motion that sticks are rough, and steps along a ridge too short
+            while share * np.abs(step).max() < _MOST / _ON:
+                further = tried(logs + _ON * share * step, point.theta)
+                if further.gain_fit < point.gain_fit + _NO_GAIN:
+                    break
+                share, point = _ON * share, further
+        gained = point.gain_fit - best.gain_fit
+        if gained > 0:
+            logs, best = logs + share * step, point
+        if gained < _NO_GAIN:
             break
-    best = bench.point(_shaped(effect, names, logs), float(sign * np.exp(logs[0])), theta, rounds=2)
-    return best if best.gain_fit > found.gain_fit else found
+    return best
 
 
 def _shaped(effect: NonlinearEffect, names: tuple[str, ...], logs: Floats) -> NonlinearEffect:
@@ -86,13 +81,52 @@ def _shaped(effect: NonlinearEffect, names: tuple[str, ...], logs: Floats) -> No
     return replace(effect, shape={**effect.shape, **values})
 
 
-def _joint_step(
-    bench: ForceBench, windows: Windows, noise: Floats, theta: Floats, moved: Floats
-) -> tuple[Floats, Floats, float]:
-    """Linear parameters, and the change of log strength and shape, that fit best together.
+def _nudges(bench: ForceBench) -> Floats:
+    """How far each linear parameter goes for the slopes of the motion: some standard deviations.
 
-    Also half the sum of squares that they leave.
+    Less would see how a sticking mass jumps, not where it goes; more would leave a resonance.
     """
+    fit = bench.state.fit
+    here, _, _ = search_box(bench.model)
+    relative = fit.sd / np.where(here.log, np.maximum(fit.theta, 1e-300), here.scale)
+    return np.clip(np.nan_to_num(_SDS * relative, nan=np.inf), _LEAST, _FARTHEST)
+
+
+def _joint_step(
+    bench: ForceBench,
+    at: Callable[[Floats], tuple[NonlinearEffect, float]],
+    logs: Floats,
+    theta: Floats,
+    moved: Floats,
+    nudges: Floats,
+) -> tuple[Floats, Floats]:
+    """Linear parameters, and the change of log strength and shape, that fit best together."""
+
+    def motion(logs: Floats, theta: Floats) -> Floats:
+        return bench.added_motion(*at(logs), theta)
+
+    extra = motion(logs, theta)
+    bench.remember(extra)
+    slopes = [(motion(logs + _NUDGE * unit, theta) - extra) / _NUDGE for unit in np.eye(len(logs))]
+    # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
+    if at(logs)[0].place != MOTOR or not bench.held:
+        here, _, _ = search_box(bench.model)
+        around = here.natural(here.coordinate(theta[None]) + np.diag(nudges))
+        slopes += [
+            (motion(logs, vector) - extra) / nudge
+            for vector, nudge in zip(around, nudges, strict=True)
+        ]
+    _, windows = bench.without(extra, theta, slopes)
+    # The many slopes leave too little of a window to read its noise from.
+    noise = Likelihood(bench.model, bench.without(extra, theta)[1]).noise_variance
+    chosen = share(windows, FIT)
+    return _solved(bench, windows.part(chosen), noise[chosen], theta, moved)
+
+
+def _solved(
+    bench: ForceBench, windows: Windows, noise: Floats, theta: Floats, moved: Floats
+) -> tuple[Floats, Floats]:
+    """The step from windows that have the slopes as further inputs."""
     here, low, high = search_box(bench.model)
     size, inputs = bench.model.size, len(moved)
     nodes = windows.frequency_hz.shape[1]
@@ -114,5 +148,5 @@ def _joint_step(
     start = np.concatenate([here.coordinate(theta[None])[0], np.zeros(inputs)])[None]
     low = np.concatenate([low, np.full(inputs, -_MOST)])
     high = np.concatenate([high, np.full(inputs, _MOST)])
-    phi, cost = minimise(residuals, start, low, high, 20, 1e-4)
-    return np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:], float(cost[0])
+    phi, _ = minimise(residuals, start, low, high, 20, 1e-4)
+    return np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:]
