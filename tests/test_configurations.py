@@ -20,7 +20,7 @@ from bayeshaptic.diagnosis.configuration_limits import configuration_limits
 from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
 from bayeshaptic.diagnosis.study_cases import study_cases
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.configurations import Configurations, _kept, infer_configurations
+from bayeshaptic.inference.configurations import Configurations, infer_configurations
 from bayeshaptic.inference.path import Path as Line
 from bayeshaptic.inference.population import prior_moments, study_coordinates
 from bayeshaptic.inference.posterior import Posterior
@@ -58,18 +58,69 @@ def inferred() -> Configurations:
     return infer_configurations(along(PLACES), PLACES, seed=1)
 
 
-def test_density_against_scipy(inferred: Configurations) -> None:
-    line = inferred._path
+def dense(line: Line, phi: Floats) -> tuple[Floats, Floats]:
+    """Covariance of all recordings' peaks, and of the path below them, built block by block."""
+    size = len(line.hand)
+    amplitude, scatter, length = np.exp(phi[:size]), np.exp(phi[size:-1]), np.exp(phi[-1])
+    middle, half = 0.5 * (min(line.coordinate) + max(line.coordinate)), 0.5 * line.range
+    count = len(line.coordinate)
+    path = np.zeros((count, size, count, size))
+    noise = np.zeros_like(path)
+    for r, one in enumerate(line.coordinate):
+        for q, other in enumerate(line.coordinate):
+            gap = np.sqrt(5) * abs(one - other) / line.range / length
+            bend = amplitude**2 * (1 + gap + gap**2 / 3) * np.exp(-gap)
+            slope = 0.3**2 * (one - middle) / half * (other - middle) / half
+            path[r, :, q] = np.diag(line.prior_sd**2 + slope + bend)
+        noise[r, :, r] = line.likelihoods[r].covariance + np.diag(scatter**2)
+    return tuple(part.reshape(count * size, -1) for part in (path + noise, path))  # type: ignore[return-value]
+
+
+@pytest.fixture(scope="module")
+def repeated() -> Line:
+    """Described recordings, several of them in one configuration."""
+    places = (0.0, 0.5, 0.5, 1.0, 0.5, 1.0)
+    line = infer_configurations(along(places), places, seed=1)._path
     assert isinstance(line, Line)
-    middle, width = line.guess()
+    return line
+
+
+def test_density_against_scipy(repeated: Line) -> None:
+    middle, width = repeated.guess()
     phi = middle + width * np.random.default_rng(1).standard_normal((4, len(middle)))
     expected = []
     for one in phi:
         prior = multivariate_normal(middle, np.diag(width**2)).logpdf(one)
-        whole = line._covariance(one[None])[0]
-        expected.append(prior + multivariate_normal(cov=whole).logpdf(line.seen))
-    found = line.log_density(phi)
+        whole, _ = dense(repeated, one)
+        expected.append(prior + multivariate_normal(cov=whole).logpdf(repeated.mean.ravel()))
+    found = repeated.log_density(phi)
     np.testing.assert_allclose(found - found[0], np.array(expected) - expected[0], atol=1e-6)
+
+
+def test_expected_recordings_against_conditioning(repeated: Line) -> None:
+    phi = repeated.guess()[0]
+    whole, path = dense(repeated, phi)
+    count, size = repeated.mean.shape
+    own = path + np.diag(np.tile(np.exp(phi[size:-1]) ** 2, count))  # of the recordings' devices
+    mean = own @ np.linalg.solve(whole, repeated.mean.ravel())
+    covariance = own - own @ np.linalg.solve(whole, own)
+    found, spread = repeated.expected(phi)
+    np.testing.assert_allclose(found - repeated.prior_mean, mean.reshape(count, size), atol=1e-9)
+    blocks = covariance.reshape(count, size, count, size)
+    for r in range(count):
+        np.testing.assert_allclose(spread[r], blocks[r, :, r], atol=1e-10)
+
+
+def test_drawn_paths_against_conditioning(repeated: Line) -> None:
+    phi = repeated.guess()[0]
+    whole, path = dense(repeated, phi)
+    size = len(repeated.hand)
+    mean = (path @ np.linalg.solve(whole, repeated.mean.ravel()))[:size] + repeated.prior_mean
+    left = (path - path @ np.linalg.solve(whole, path))[:size, :size]
+    sd = np.sqrt(np.diag(left) + np.exp(phi[size:-1]) ** 2)
+    drawn = repeated.draw(np.tile(phi, (4000, 1)), np.zeros(1), np.random.default_rng(3))[:, 0]
+    assert np.all(np.abs(drawn.mean(axis=0) - mean) < 4 * sd / np.sqrt(4000))
+    np.testing.assert_allclose(drawn.std(axis=0), sd, rtol=0.06)
 
 
 def test_between_measured_configurations(inferred: Configurations) -> None:
@@ -90,13 +141,6 @@ def test_two_configurations_are_not_a_path() -> None:
         infer_configurations(along((0.0, 1.0)), (0.0, 1.0))
     with pytest.raises(InputError, match="1 posteriors, but 2 configurations"):
         infer_configurations(along((0.0,)), (0.0, 1.0))
-
-
-def test_many_recordings_of_a_configuration_are_too_many() -> None:
-    places = np.repeat([0.0, 0.5, 1.0], 12)
-    kept = _kept(places, 11)
-    assert [int(np.sum(places[kept] == place)) for place in (0.0, 0.5, 1.0)] == [3, 3, 3]
-    assert _kept(np.arange(20.0), 11) == list(range(20))
 
 
 def test_the_worst_configuration() -> None:

@@ -59,7 +59,7 @@ def _draw(
     given = hierarchy.given(phi)
     order = np.concatenate([hierarchy.hand, *[hierarchy.device] * (int(hierarchy.place.max()) + 1)])
     low = (walls - hierarchy.prior_mean)[order]
-    beta = _walled(given.beta, inverse(given.precision), low, rng)
+    beta = walled(given.beta, inverse(given.precision), low, rng)
     people = given.draw_people(beta, rng)
     x = np.einsum("rip,bp->bri", hierarchy.design, beta)
     x[:, :, hierarchy.hand] += people[:, hierarchy.user]
@@ -73,7 +73,7 @@ def _draw(
     return beta + hierarchy.prior_mean[order], x + hierarchy.prior_mean
 
 
-def _walled(mean: Floats, covariance: Floats, low: Floats, rng: np.random.Generator) -> Floats:
+def walled(mean: Floats, covariance: Floats, low: Floats, rng: np.random.Generator) -> Floats:
     """A draw of each normal distribution, shapes (B, q), (B, q, q), with entries not below `low`.
 
     The entries with a wall by Gibbs sampling of their own distribution, then the others given them.

@@ -25,8 +25,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 FEWEST = 3  # configurations from which one is predicted between them
-_FIRST_STEPS = 60
-_MOST = 110  # parameters of all recordings together: the work grows with its cube
+_FIRST_STEPS = 200
 _BATCH, _ATTEMPTS = 500, 60
 
 
@@ -101,7 +100,6 @@ def infer_configurations(
     Returns
     -------
     Configurations
-        Of many recordings in one configuration only the first few are taken.
 
     Raises
     ------
@@ -120,8 +118,6 @@ def infer_configurations(
             f"them; record at least {FEWEST}."
         )
     model = common_model(posteriors)
-    kept = _kept(np.asarray(coordinate, float), model.size)
-    posteriors, coordinate = [posteriors[r] for r in kept], [coordinate[r] for r in kept]
     here = study_coordinates(model)
     mean, sd = prior_moments(model, here)
     path = Path(
@@ -147,13 +143,3 @@ def infer_configurations(
         )
         notices = (*notices, Notice("note", "configurations", text))
     return Configurations(measured, model, chains.resting(), notices, path, here)
-
-
-def _kept(coordinate: Floats, size: int) -> list[int]:
-    """The first recordings of each configuration, as many as can be taken together."""
-    each = max(1, _MOST // (size * len(np.unique(coordinate))))
-    return sorted(
-        int(r)
-        for place in np.unique(coordinate)
-        for r in np.flatnonzero(coordinate == place)[:each]
-    )

@@ -59,15 +59,18 @@ def exact_likelihood(posterior: Posterior, here: Coordinates, x: Floats) -> Floa
     """Log likelihood at points of shape (B, D), by the model; None without the measurement."""
     if posterior.windows is None:
         return None
-    return Likelihood(posterior.model, posterior.windows)(here.natural(x))
+    with np.errstate(all="ignore"):  # far-away points may overflow: they are refused
+        value = Likelihood(posterior.model, posterior.windows)(here.natural(x))
+    return np.where(np.isfinite(value), value, -np.inf)
 
 
 def linearised(
     posterior: Posterior, here: Coordinates, x: Floats, step: Floats
 ) -> GaussianLikelihood | None:
-    """The likelihood around one point, with the model linear there; None without the measurement.
+    """The likelihood around one point, with the model linear there.
 
-    Each window's curvature is exact but for second derivatives of the model, and never negative.
+    None without the measurement, and where there is no such model.  Each window's curvature is
+    exact but for second derivatives of the model, and never negative.
 
     Parameters
     ----------
@@ -80,7 +83,10 @@ def linearised(
         return None
     windows = posterior.windows
     around = np.concatenate([x[None], x + np.diag(step), x - np.diag(step)])
-    left = Likelihood(posterior.model, windows).deviations(here.natural(around))
+    with np.errstate(all="ignore"):
+        left = Likelihood(posterior.model, windows).deviations(here.natural(around))
+    if not np.isfinite(left).all():
+        return None
     size = len(x)
     slopes = (left[1 : size + 1] - left[size + 1 :]) / (2 * step[:, None, None])
     rows = np.concatenate([slopes.real, slopes.imag], axis=2)  # (D, W, 2 k)
@@ -95,7 +101,7 @@ def linearised(
     back = np.minimum(2 / total, 1 / np.maximum(power, 1e-300))
     curvature -= (along * (weight * back)) @ along.T
     value = float(-np.sum((windows.lines - 1) * np.log(total)))
-    return _at_peak(x, gradient, curvature, value, step / STEP, _LEAST)
+    return at_peak(x, gradient, curvature, value, step / STEP, _LEAST)
 
 
 def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
@@ -118,7 +124,7 @@ def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
     curvature = curvature + curvature.T
     slope = found[1 : size + 1]
     value = float(level + found[0])
-    own = _at_peak(np.zeros(size), slope, curvature, value, np.ones(size), _LEAST_OF_CLOUD)
+    own = at_peak(np.zeros(size), slope, curvature, value, np.ones(size), _LEAST_OF_CLOUD)
     out, back = vectors / width, (vectors * width).T
     return GaussianLikelihood(
         middle + own.mean @ back,
@@ -128,7 +134,7 @@ def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
     )
 
 
-def _at_peak(
+def at_peak(
     x: Floats, gradient: Floats, curvature: Floats, value: float, unit: Floats, least: float
 ) -> GaussianLikelihood:
     """The quadratic function around `x` written around its peak.

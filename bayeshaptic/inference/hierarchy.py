@@ -116,15 +116,29 @@ class Hierarchy:
             value[sane] = self.given(phi[sane]).log_density
         return value
 
-    def expected(self, phi: Floats) -> Floats:
-        """Mean of every recording's coordinates given one vector phi, shape (R, D)."""
+    def expected(self, phi: Floats) -> tuple[Floats, Floats]:
+        """Mean and covariance of recordings' coordinates given one phi, (R, D) and (R, D, D)."""
         given = self.given(phi[None])
-        own = (given.own_covariance @ given.own_score[..., None])[..., 0]
-        people = own[0] - given.gain[0] @ given.beta[0]
-        x = self.design @ given.beta[0]
-        x[:, self.hand] += people[self.user]
-        off = given.weight[0] @ (self.mean - x)[:, :, None]
-        return x + given.spread[0] * off[..., 0] + self.prior_mean
+        spread = given.spread[0]
+        means, covariances = [], []
+        for r, seen in enumerate(self.mean):
+            mean, covariance = (part[0] for part in self.before(given, r))
+            gain = spread[:, None] * given.weight[0, r]
+            kept = np.eye(len(spread)) - gain
+            means.append(mean + gain @ (seen - mean))
+            covariances.append(kept @ covariance @ kept.T + kept * spread)
+        return np.stack(means) + self.prior_mean, np.stack(covariances)
+
+    def before(self, given: Given, r: int) -> tuple[Floats, Floats]:
+        """Mean, less the prior's, and covariance of A_r beta + E v_u; shapes (B, D), (B, D, D)."""
+        own = given.own_covariance[:, self.user[r]]
+        slope = np.tile(self.design[r], (len(own), 1, 1))
+        slope[:, self.hand] -= given.gain[:, self.user[r]]
+        mean = np.einsum("bdq,bq->bd", slope, given.beta)
+        mean[:, self.hand] += np.einsum("bij,bj->bi", own, given.own_score[:, self.user[r]])
+        covariance = slope @ np.linalg.solve(given.precision, slope.transpose(0, 2, 1))
+        covariance[:, self.hand[:, None], self.hand] += own
+        return mean, covariance
 
     def given(self, phi: Floats) -> Given:
         """Everything below the hyperparameters phi of shape (B, Q)."""

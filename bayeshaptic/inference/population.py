@@ -16,7 +16,7 @@ from bayeshaptic.inference.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.hierarchy import Hierarchy
 from bayeshaptic.inference.population_sampler import LevelChains, sample_level
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.reweighting import Reweighted, inside, reweight
+from bayeshaptic.inference.reweighting import ALONE, Reweighted, inside, redescribed, reweight
 from bayeshaptic.inference.settling import settled
 from bayeshaptic.models import HalfNormal, Model
 from bayeshaptic.models.structures import HAND
@@ -27,9 +27,8 @@ Ints = NDArray[np.int_]
 Progress = Callable[[float, str], None]
 
 DRAWS = 2000
-_FIRST_STEPS = 60
-_POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
-_FEW, _FEWEST = 0.5, 100  # share and number of effective draws that are few
+_FIRST_STEPS = 200
+_FIRST_DRAWS = 1000
 
 
 @dataclass(frozen=True)
@@ -167,17 +166,22 @@ def infer_population(
         raise InputError(f"the {model.name} model has no hand: give posteriors of held devices.")
     here = study_coordinates(model)
     hierarchy, names, spots = _hierarchy(posteriors, users, places or [None] * len(users), here)
-    tune, run, rest = np.random.SeedSequence(seed).spawn(3)
+    tune, again, run, first, last, rest = np.random.SeedSequence(seed).spawn(6)
     rng = np.random.default_rng(rest)
     report(0.0, "population: first look")
     hierarchy = settled(hierarchy, posteriors, here, hierarchy.guess()[0])
     chains = sample_level(hierarchy, tune, steps=_FIRST_STEPS)
-    report(0.5, "population: sampling")
     hierarchy = settled(hierarchy, posteriors, here, np.median(chains.thinned(DRAWS, rng), axis=0))
+    chains = sample_level(hierarchy, again, chains, steps=_FIRST_STEPS)
+    report(0.3, "population: describing recordings")
+    phi = chains.thinned(_FIRST_DRAWS, rng)
+    hierarchy = redescribed(hierarchy, posteriors, users, phi, here, first)
+    report(0.5, "population: sampling")
     chains = sample_level(hierarchy, run, chains)
     report(0.8, "population: users")
-    draws = draw_below(hierarchy, chains.thinned(DRAWS, rng), here.low, rng)
-    own = reweight(posteriors, users, hierarchy, draws, here, rng)
+    phi = chains.thinned(DRAWS, rng)
+    draws = draw_below(hierarchy, phi, here.low, rng)
+    own = reweight(posteriors, users, hierarchy, draws, phi, here, last)
     root = draws.level.correlation_root
     return Population(
         tuple(name for name in model.names if name in HAND),
@@ -266,16 +270,13 @@ def _hierarchy(
 
 def _notices(recordings: Sequence[Reweighted], users: tuple[str, ...]) -> tuple[Notice, ...]:
     notices = []
-    # A heavy tail is harmless where all weights are nearly equal.
-    few = [one for one in recordings if one.effective < _FEW * len(one.draws)]
-    poor = [one for one in few if one.pareto_k > _POOR_K or one.effective < _FEWEST]
-    if poor:
-        worst = max(poor, key=lambda one: one.pareto_k)
+    alone = [one for one in recordings if one.how == ALONE]
+    if alone:
+        names = ", ".join(dict.fromkeys(one.user for one in alone))
         text = (
-            f"The weights of {len(poor)} of {len(recordings)} recordings are poor (Pareto k up to "
-            f"{worst.pareto_k:.2f}, {worst.effective:.0f} effective draws, user {worst.user}): "
-            "their likelihoods are far from Gaussian, and what the population says of them is "
-            "rough."
+            f"{len(alone)} of {len(recordings)} recordings (of {names}) could not be joined with "
+            "the others: their parameters given all people could not be sampled. They are shown "
+            "by themselves, and the population knows them only roughly."
         )
         notices.append(Notice("warning", "population", text))
     if len(users) < 4:

@@ -9,19 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import Notice
-from bayeshaptic.inference.diagnostics import Diagnostics, diagnose
-from bayeshaptic.inference.ensembles import Ensemble, refitted, warmed_up
+from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
+from bayeshaptic.inference.ensembles import (
+    ENSEMBLES,
+    WALKERS,
+    LogDensity,
+    refitted,
+    warmed_up,
+)
 from bayeshaptic.inference.importance import Adapted
 from bayeshaptic.inference.mixture import student
+from bayeshaptic.inference.population_walkers import EVERY, Walkers
 
 Floats = NDArray[np.float64]
 
 ESS = 500.0
-_RHAT = 1.03
+_REFITS = 4  # at most
 _AGAIN = 40  # steps to forget a description that has changed a little
 _FIRST_STEPS = 100
-_MOST_STEPS = 1000
-_TOLERABLE = 1.05  # R-hat up to which it is worth no warning
+_WARM_UP = 200
+_LEVEL_STEPS = 600
+_MOST_STEPS = 5000
+TOLERABLE = 1.02  # R-hat from which chains are not to be used
 
 
 class Level(Protocol):
@@ -42,13 +51,13 @@ class LevelChains:
     ----------
     chains : ndarray, shape (ensembles, steps, walkers, Q)
     diagnostics : Diagnostics
-    ensembles : tuple of Ensemble
+    walkers : tuple of Walkers
         Where they stand, to go on from.
     """
 
     chains: Floats = field(repr=False)
     diagnostics: Diagnostics
-    ensembles: tuple[Ensemble, ...] = field(repr=False)
+    walkers: tuple[Walkers, ...] = field(default=(), repr=False)
 
     def thinned(self, count: int, rng: np.random.Generator) -> Floats:
         """`count` draws, shape (count, Q), in random order."""
@@ -56,13 +65,13 @@ class LevelChains:
         return flat[rng.choice(len(flat), count, replace=len(flat) < count)]
 
     def resting(self) -> LevelChains:
-        """Without the ensembles: what can be sent to another process."""
-        return replace(self, ensembles=())
+        """Without the walkers: what can be sent to another process."""
+        return replace(self, walkers=())
 
     @property
     def notices(self) -> tuple[Notice, ...]:
         worst = float(self.diagnostics.rhat.max())
-        if worst < _TOLERABLE:
+        if worst < RHAT_LIMIT:
             return ()
         text = (
             f"The sampler of the population has not converged: R-hat is {worst:.3f} with "
@@ -86,42 +95,68 @@ def sample_level(
     before : LevelChains, optional
         Chains of nearly the same, to go on from.
     steps : int, optional
-        So many and no more; by default until R-hat is below 1.03 with 500 effective draws.
+        So many and no more; by default until R-hat is below 1.01 with 500 effective draws.
     """
     density = level.log_density
     if before is None:
-        ensembles = warmed_up(density, _begin(level, seed), seed)
+        walkers = [_begin(level, own) for own in seed.spawn(ENSEMBLES)]
+        for one in walkers:
+            one.advance(_WARM_UP)
     else:
-        ensembles = [replace(one, density=density) for one in before.ensembles]
-        for ensemble in ensembles:
-            ensemble.advance(_AGAIN)
-    joined, values = _advance(ensembles, _FIRST_STEPS if steps is None else steps)
+        walkers = [replace(one, density=density) for one in before.walkers]
+    for one in walkers:
+        one.advance(_AGAIN)
+    joined = _advance(walkers, _LEVEL_STEPS if steps is None else steps)
     diagnostics = diagnose(joined)
-    if steps is None and not _done(diagnostics):
-        rng = np.random.default_rng(seed.spawn(1)[0])
-        ensembles = refitted(ensembles, joined, values, rng)
-        joined, _ = _advance(ensembles, _FIRST_STEPS)
+    while steps is None and EVERY * joined.shape[1] < _MOST_STEPS and not _done(diagnostics):
+        gone = EVERY * joined.shape[1]
+        more = int(np.clip(gone * (1.1 * ESS / diagnostics.ess - 1), 0.3 * gone, gone))
+        joined = np.concatenate([joined, _advance(walkers, more)], axis=1)
         diagnostics = diagnose(joined)
-    while steps is None and joined.shape[1] < _MOST_STEPS and not _done(diagnostics):
-        more = int(np.clip(joined.shape[1] * (1.1 * ESS / diagnostics.ess - 1), 40, 320))
-        joined = np.concatenate([joined, _advance(ensembles, more)[0]], axis=1)
-        diagnostics = diagnose(joined)
-    return LevelChains(joined, diagnostics, tuple(ensembles))
+    return LevelChains(joined, diagnostics, tuple(walkers))
+
+
+def sample_density(
+    density: LogDensity, begin: Adapted, seed: np.random.SeedSequence, ess: float
+) -> LevelChains:
+    """Draws of a few parameters on ridges, from any log density of vectors of shape (B, P).
+
+    `begin` is a first proposal; one that is fitted to the draws is frozen before any is kept.
+    """
+    ensembles = warmed_up(density, begin, seed)
+    rng = np.random.default_rng(seed.spawn(1)[0])
+    steps = _FIRST_STEPS
+    for _ in range(_REFITS):
+        runs = [ensemble.advance(steps) for ensemble in ensembles]
+        chains = np.stack([chain for chain, _ in runs])
+        diagnostics = diagnose(chains)
+        if diagnostics.ess >= ess and diagnostics.rhat.max() < RHAT_LIMIT:
+            break
+        values = np.stack([value for _, value in runs])
+        ensembles = refitted(ensembles, chains, values, rng)
+        steps = int(np.clip(1.2 * steps * ess / diagnostics.ess, 2 * steps, 4 * steps))
+    return LevelChains(chains, diagnostics)
 
 
 def _done(diagnostics: Diagnostics) -> bool:
-    return bool(diagnostics.ess >= ESS and diagnostics.rhat.max() < _RHAT)
+    return bool(diagnostics.ess >= ESS and diagnostics.rhat.max() < RHAT_LIMIT)
 
 
-def _advance(ensembles: list[Ensemble], steps: int) -> tuple[Floats, Floats]:
-    """Positions and log densities of all ensembles, shapes (E, S, W, Q) and (E, S, W)."""
-    runs = [ensemble.advance(steps) for ensemble in ensembles]
-    return np.stack([chain for chain, _ in runs]), np.stack([values for _, values in runs])
+def _advance(walkers: list[Walkers], steps: int) -> Floats:
+    """Positions of all ensembles, shape (E, S, W, Q)."""
+    return np.stack([one.advance(steps) for one in walkers])
 
 
-def _begin(level: Level, seed: np.random.SeedSequence) -> Adapted:
-    """A wide proposal around the first guess."""
+def _begin(level: Level, seed: np.random.SeedSequence) -> Walkers:
+    """Walkers around the first guess, wider than what is expected to be found."""
     middle, width = level.guess()
     proposal = student(middle, np.diag(width**2), 8.0)
-    points = proposal.sample(np.random.default_rng(seed.spawn(1)[0]), 64)
-    return Adapted(proposal, points, np.full(64, 1 / 64), 0.0)
+    rng = np.random.default_rng(seed)
+    points = np.empty((0, len(middle)))
+    for shrink in 0.8 ** np.arange(40):
+        drawn = middle + shrink * (proposal.sample(rng, 4 * WALKERS) - middle)
+        points = np.concatenate([points, drawn[np.isfinite(level.log_density(drawn))]])
+        if len(points) >= WALKERS:
+            break
+    state = np.random.RandomState(np.random.MT19937(seed)).get_state()
+    return Walkers(level.log_density, points[:WALKERS], state)

@@ -1,21 +1,43 @@
-"""Every recording's parameters given the population, weighted by its exact likelihood."""
+"""Every recording's parameters given the whole study, by its exact likelihood.
+
+Three ways, the cheapest first; all of them lead to the same distribution, the recording's exact
+likelihood times what the others say (`population_cavity`):
+
+- draws of the levels, weighed by exact over described likelihood: where the study knows more than
+  the recording does, and the description is good;
+- the recording's own draws, weighed by what the others say over the recording's own prior, as in
+  Hogg, Myers and Bovy (2010): where the recording knows more than the study does;
+- sampling with emcee, with what the others say as the prior.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.below import Below
+from bayeshaptic.inference.below import Below, draw_below
 from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.gaussian_likelihood import exact_likelihood
 from bayeshaptic.inference.hierarchy import Hierarchy
+from bayeshaptic.inference.importance import adapt
+from bayeshaptic.inference.mixture import student
 from bayeshaptic.inference.pareto import pareto_k
+from bayeshaptic.inference.population_cavity import Cavity, cavity, described, flattened
+from bayeshaptic.inference.population_sampler import TOLERABLE, sample_density
 from bayeshaptic.inference.posterior import Posterior
 
 Floats = NDArray[np.float64]
+
+POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
+_FEW = 300  # effective draws that are too few
+_HARMLESS = 0.5  # share of effective draws from which a heavy tail is harmless
+_SAMPLED = 1000.0  # effective draws to sample
+_MOST_OWN = 20_000
+_START = 3000
+DESCRIBED, OWN, SAMPLED, ALONE = "described", "own", "sampled", "alone"
 
 
 @dataclass(frozen=True)
@@ -28,16 +50,28 @@ class Reweighted:
     draws : ndarray, shape (n, P)
         Natural values, equally weighted.
     effective : float
-        Kish's effective number of the weighted draws that these were chosen from.
+        Kish's effective number of the weighted draws that these were chosen from; of chains their
+        least effective number.
     pareto_k : float
-        Shape of the tail of the weights: above 0.7 they are not to be trusted; nan where the
-        measurement is not there to weigh with.
+        Shape of the tail of the weights: above 0.7 they are not to be trusted; nan without weights.
+    how : {"described", "own", "sampled", "alone"}
+        Draws of the levels weighed, the recording's own weighed, sampled; or the recording by
+        itself, where none of these came out.
     """
 
     user: str
     draws: Floats = field(repr=False)
     effective: float
     pareto_k: float
+    how: str = DESCRIBED
+
+    @property
+    def good(self) -> bool:
+        """Whether there are enough effective draws, with weights that can be trusted."""
+        if self.how in (SAMPLED, ALONE):
+            return self.how == SAMPLED
+        light = not self.pareto_k > POOR_K or self.effective > _HARMLESS * len(self.draws)
+        return light and self.effective >= min(_FEW, _HARMLESS * len(self.draws))
 
 
 def reweight(
@@ -45,38 +79,184 @@ def reweight(
     users: Sequence[str],
     hierarchy: Hierarchy,
     below: Below,
+    phi: Floats,
+    here: Coordinates,
+    seed: np.random.SeedSequence,
+) -> tuple[Reweighted, ...]:
+    """Draws of every recording given the study.
+
+    Parameters
+    ----------
+    posteriors : sequence of Posterior
+    users : sequence of str
+    hierarchy : Hierarchy
+    below : Below
+        Draws of what lies below the hyperparameters `phi`, shape (n, Q).
+    here : Coordinates
+    seed : numpy.random.SeedSequence
+    """
+    return tuple(
+        _one(posterior, user, r, hierarchy, below, phi, here, own)
+        for r, (posterior, user, own) in enumerate(
+            zip(posteriors, users, seed.spawn(len(users)), strict=True)
+        )
+    )
+
+
+def redescribed(
+    hierarchy: Hierarchy,
+    posteriors: Sequence[Posterior],
+    users: Sequence[str],
+    phi: Floats,
+    here: Coordinates,
+    seed: np.random.SeedSequence,
+) -> Hierarchy:
+    """The levels with a better description of each likelihood whose first one is poor.
+
+    That is the Gaussian function which, with what the others say, has the moments of the exact
+    distribution (one round of expectation propagation): near a wall, or on a ridge that is bent,
+    the model is not linear over the width of what is known.
+    """
+    first, last = seed.spawn(2)
+    below = draw_below(hierarchy, phi, here.low, np.random.default_rng(first))
+    found = list(hierarchy.likelihoods)
+    for r, own in enumerate(reweight(posteriors, users, hierarchy, below, phi, here, last)):
+        if posteriors[r].windows is not None and own.how in (OWN, SAMPLED):
+            rest = cavity(hierarchy, r, phi, np.random.default_rng(first))
+            found[r] = described(here.coordinate(own.draws), rest)
+    return replace(hierarchy, likelihoods=tuple(found))
+
+
+def _one(
+    posterior: Posterior,
+    user: str,
+    r: int,
+    hierarchy: Hierarchy,
+    below: Below,
+    phi: Floats,
+    here: Coordinates,
+    seed: np.random.SeedSequence,
+) -> Reweighted:
+    rng = np.random.default_rng(seed)
+    count = len(below.recordings)
+    first = _from_levels(posterior, user, r, hierarchy, below, here, rng)
+    if posterior.windows is None or (first is not None and first.good):
+        return first or _alone(posterior, user, count, rng)
+    rest = cavity(hierarchy, r, phi, rng)
+    second = _from_own(posterior, user, rest, here, count, rng)
+    if second.good:
+        return second
+    third = _sampled(posterior, user, rest, here, count, rng, seed.spawn(1)[0])
+    return third or _alone(posterior, user, count, rng)
+
+
+def _from_levels(
+    posterior: Posterior,
+    user: str,
+    r: int,
+    hierarchy: Hierarchy,
+    below: Below,
     here: Coordinates,
     rng: np.random.Generator,
-) -> tuple[Reweighted, ...]:
-    """Draws of every recording, resampled by exact over described likelihood."""
-    out = []
-    low = np.where(here.log, -np.inf, here.low)
-    for r, (posterior, likelihood) in enumerate(
-        zip(posteriors, hierarchy.likelihoods, strict=True)
-    ):
-        x = below.recordings[:, r]
-        x = x[np.all(x >= low, axis=1)]
-        exact = exact_likelihood(posterior, here, x)
-        log_weight = np.zeros(len(x)) if exact is None else exact - likelihood(x)
-        weight = np.exp(log_weight - log_weight.max())
-        weight /= weight.sum()
-        chosen = _resampled(weight, rng)
-        k = float("nan") if exact is None else pareto_k(log_weight)
-        effective = float(1 / np.sum(weight**2))
-        out.append(Reweighted(users[r], here.natural(x[chosen]), effective, k))
-    return tuple(out)
+) -> Reweighted | None:
+    """Draws of the levels inside the walls, weighed by exact over described likelihood."""
+    x = below.recordings[:, r]
+    x = x[np.all(x >= walls(here), axis=1)]
+    exact = exact_likelihood(posterior, here, x) if len(x) else None
+    if posterior.windows is not None and (exact is None or not np.isfinite(exact).any()):
+        return None
+    log_weight = np.zeros(len(x)) if exact is None else exact - hierarchy.likelihoods[r](x)
+    return _resampled(x, log_weight, user, here, len(below.recordings), rng, DESCRIBED)
 
 
-def _resampled(weight: Floats, rng: np.random.Generator) -> NDArray[np.int_]:
-    """As many indices as weights, each as often as its weight says (systematic resampling)."""
-    count = len(weight)
+def _from_own(
+    posterior: Posterior,
+    user: str,
+    rest: Cavity,
+    here: Coordinates,
+    count: int,
+    rng: np.random.Generator,
+) -> Reweighted:
+    """The recording's own draws, weighed by the cavity over its own prior."""
+    x = _own(posterior, here, _MOST_OWN)
+    return _resampled(x, _own_weight(posterior, rest, here, x), user, here, count, rng, OWN)
+
+
+def _own(posterior: Posterior, here: Coordinates, most: int) -> Floats:
+    every = -(-len(posterior.draws) // most)
+    return here.coordinate(posterior.draws[::every])
+
+
+def _own_weight(posterior: Posterior, rest: Cavity, here: Coordinates, x: Floats) -> Floats:
+    prior = posterior.model.log_prior(here.natural(x)) + here.log_jacobian(x)
+    return np.asarray(rest(x) - prior, float)
+
+
+def _resampled(
+    x: Floats,
+    log_weight: Floats,
+    user: str,
+    here: Coordinates,
+    count: int,
+    rng: np.random.Generator,
+    how: str,
+) -> Reweighted:
+    """`count` draws, each of `x` as often as its weight says (systematic resampling)."""
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
     steps = (np.arange(count) + rng.uniform()) / count
-    chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), count - 1)
-    return rng.permutation(chosen)
+    chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(x) - 1)
+    draws = here.natural(x[rng.permutation(chosen)])
+    k = pareto_k(log_weight[np.isfinite(log_weight)])
+    return Reweighted(user, draws, float(1 / np.sum(weight**2)), k, how)
+
+
+def _sampled(
+    posterior: Posterior,
+    user: str,
+    rest: Cavity,
+    here: Coordinates,
+    count: int,
+    rng: np.random.Generator,
+    seed: np.random.SeedSequence,
+) -> Reweighted | None:
+    """Draws from exact likelihood times cavity; None where the sampler does not converge."""
+    low = walls(here)
+
+    def density(x: Floats) -> Floats:
+        value = np.full(len(x), -np.inf)
+        inside = np.all((x >= low) & (np.abs(x) < 600), axis=1)
+        if inside.any():
+            exact = exact_likelihood(posterior, here, x[inside])
+            assert exact is not None
+            value[inside] = exact + rest(x[inside])
+        return value
+
+    x = _own(posterior, here, _START)
+    weight = flattened(_own_weight(posterior, rest, here, x), 0.05)
+    mean = weight @ x
+    off = x - mean
+    first = student(mean, (weight[:, None] * off).T @ off, 8.0)
+    chains = sample_density(density, adapt(density, first, rng), seed, _SAMPLED)
+    if chains.diagnostics.rhat.max() > TOLERABLE or chains.diagnostics.ess < _FEW:
+        return None
+    draws = here.natural(chains.thinned(count, rng))
+    return Reweighted(user, draws, chains.diagnostics.ess, float("nan"), SAMPLED)
+
+
+def _alone(posterior: Posterior, user: str, count: int, rng: np.random.Generator) -> Reweighted:
+    """The recording by itself."""
+    draws = posterior.draws[rng.choice(len(posterior.draws), count)]
+    return Reweighted(user, draws, float(count), float("nan"), ALONE)
+
+
+def walls(here: Coordinates) -> Floats:
+    """Lowest value of each coordinate; -inf where it is a logarithm."""
+    return np.where(here.log, -np.inf, here.low)
 
 
 def inside(x: Floats, here: Coordinates) -> Floats:
     """Mirrored at the walls, so that no damper is negative."""
-    low = np.where(here.log, -np.inf, here.low)
+    low = walls(here)
     with np.errstate(invalid="ignore"):
         return np.where(x < low, 2 * low - x, x)

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.inference.below import walled
 from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.gaussian_likelihood import STEP, linearised
 from bayeshaptic.inference.hierarchy import Hierarchy
@@ -19,6 +20,7 @@ Floats = NDArray[np.float64]
 L = TypeVar("L", Hierarchy, Path)
 _ROUNDS = 8
 _BEYOND = 2.0  # posterior standard deviations that an expectation may lie outside its own draws
+_DRAWS = 400
 _SETTLED = 0.02  # move, in posterior standard deviations, that is none
 
 
@@ -41,17 +43,35 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
     """
     own = [here.coordinate(one.draws) for one in posteriors]
     sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
-    low, high = low - _BEYOND * sd, high + _BEYOND * sd
-    x = np.clip(level.expected(phi), low, high)
+    walls = np.where(here.log, -np.inf, here.low)
+    low, high = np.maximum(low - _BEYOND * sd, walls), high + _BEYOND * sd
+    x = np.clip(_expected(level, phi, walls), low, high)
     for number in range(_ROUNDS):
         found = [
             linearised(one, here, x[r], STEP * sd[r]) or level.likelihoods[r]
             for r, one in enumerate(posteriors)
         ]
         level = replace(level, likelihoods=tuple(found))
-        move = np.clip(level.expected(phi), low, high) - x
+        move = np.clip(_expected(level, phi, walls), low, high) - x
         far = np.max(np.abs(move) / sd, axis=1, keepdims=True)
         if np.all(far < _SETTLED):
             break
         x = x + (0.5 if number % 2 else 1.0) * move / np.maximum(far, 1.0)
     return level
+
+
+def _expected(level: Hierarchy | Path, phi: Floats, walls: Floats) -> Floats:
+    """The expected coordinates of every recording where none is below its wall, shape (R, D).
+
+    Without the walls the point would run off to where there is no device, dampers below zero, and
+    all that goes with them along a ridge would follow.
+    """
+    mean, covariance = level.expected(phi)
+    if not np.isfinite(walls).any():
+        return mean
+    rng = np.random.default_rng(0)  # the same numbers in every round, which must come to rest
+    many = [
+        walled(np.tile(m, (_DRAWS, 1)), np.tile(c, (_DRAWS, 1, 1)), walls, rng).mean(axis=0)
+        for m, c in zip(mean, covariance, strict=True)
+    ]
+    return np.stack(many)
