@@ -30,6 +30,7 @@ _SIZES = np.geomspace(3e-4, 1.0, 12)
 _LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
 _BY_VELOCITY = {"sign(v)", "v|v|", "v^3"}
 _DAMPING_LEFT = 0.2  # of the damping, if most of it is friction that was fitted as damping
+_BEYOND = 1.25  # times a steady ramp
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -49,6 +50,10 @@ def with_discrepancy(
     spread = np.sqrt(sum(effect.limit_log_sd**2 for effect in traced.state.accepted))
     if spread > 0:
         factor = np.exp(spread * rng.standard_normal(len(limit.samples)))
+        limit = replace(limit, samples=limit.samples * factor)
+    fall = sum(effect.limit_log_fall for effect in traced.state.accepted)
+    if fall > 0:  # a step stays where it is, a ramp goes on; neither goes much further
+        factor = np.exp(-fall * rng.uniform(0.0, _BEYOND, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
     if traced.verdict != UNEXPLAINED:
         return limit

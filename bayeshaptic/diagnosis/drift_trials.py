@@ -1,6 +1,7 @@
 """Trying drift: the recording in parts, some of the parameters free to differ between them.
 
-The critical stiffness is then that of the worst part.
+The critical stiffness is then that of the worst part, and lower by what a drift that goes on does
+between the middle of that part and its end.
 """
 
 from __future__ import annotations
@@ -98,6 +99,7 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         f"log likelihood of windows it was not fitted to by {gains[1]:.0f}; the limit is that of "
         f"part {worst + 1}",
         estimates,
+        limit_log_fall=0.0 if kind is _GAIN else _fall(limits),
     )
     changed = state
     if gains[1] > 8 and kind is _GAIN:
@@ -106,6 +108,18 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         changed = _on_part(state, parts[worst], dict(zip(narrow.names, found[worst], strict=True)))
     changed = replace(changed, accepted=(*state.accepted, accepted))
     return Trial(accepted, changed, float(gains[0]), float(gains[1]), size)
+
+
+def _fall(limits: Floats) -> float:
+    """How much log K_CR falls from the middle of the worst part to the end of the recording.
+
+    That is half of a steady ramp's fall from the part beside it, if the worst is the first or last.
+    """
+    worst = int(np.argmin(limits))
+    if worst not in (0, len(limits) - 1) or limits[worst] <= 0:
+        return 0.0
+    beside = limits[1] if worst == 0 else limits[-2]
+    return 0.5 * float(np.log(beside / limits[worst]))
 
 
 def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> State:

@@ -56,6 +56,8 @@ class Accepted:
         The measurement that would.
     limit_log_sd : float
         What the uncertainty of the effect adds to log K_CR, as a standard deviation.
+    limit_log_fall : float
+        How much lower still log K_CR is if a drift goes on as it does between the parts.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Accepted:
     ties: tuple[str, ...] = ()
     told_apart_by: str = ""
     limit_log_sd: float = 0.0
+    limit_log_fall: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], None]
 
-_PEOPLE = 20  # that are drawn from each draw of the population
+_PEOPLE = 40_000  # at least, that are drawn from all draws of the population
 
 
 @dataclass(frozen=True)
@@ -165,10 +165,12 @@ def _new_person(population: Population, wider: Widening, seed: int) -> tuple[Cas
     cases = []
     for number, place in enumerate(population.places):
         rng = np.random.default_rng(np.random.SeedSequence([seed, number, 1]))
-        draws = population.new_person(rng, _PEOPLE, number)
-        # People from one draw of the population are not independent: each draw is a chain.
+        each = -(-_PEOPLE // len(population.log_mean))
+        draws = population.new_person(rng, each, number)
+        # People from one draw of the population, or from neighbours of one walker, are not
+        # independent.
         limit = critical_stiffness(population.model, draws)
-        limit = wider.apply(replace(limit, chains=len(population.log_mean)), rng)
+        limit = wider.apply(replace(limit, chains=population.walkers), rng)
         label = "a new person" + place_of(place)
         cases.append(Case(label, NEW_PERSON, population.model, draws, limit))
     return tuple(cases)

@@ -86,13 +86,20 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
             "The uncertainty of the effects that are not in the posterior adds "
             f"{pure(100 * spread, 2)} % (sd) to the limit."
         )
+    fall = sum(effect.limit_log_fall for effect in closed.effects)
+    if fall > 0:
+        found.append(
+            "The limit is that of the worst part of the recording, and up to "
+            f"{pure(100 * fall, 2)} % lower at its end if the drift is steady."
+        )
     if closed.verdict == "unexplained":
         found.append(
             "The limit is widened by what is left unexplained. Where the rest is linear, the "
             "response is multiplied by a random smooth deviation as large as the residual shows; "
             "where it is not, the limit is taken down as far as the rejected candidates and the "
-            "damping in doubt would take it. This is an estimate of what an unknown effect does, "
-            "not a bound."
+            "damping in doubt would take it, or, where an effect was found that leaves a rest, "
+            "either way by that share of what the effect has done to it. This is an estimate of "
+            "what an unknown effect does, not a bound."
         )
     return tuple(found)
 

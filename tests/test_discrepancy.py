@@ -1,0 +1,77 @@
+"""How far the limit is widened by drifts that go on, and by what is left unexplained."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_analysis import _tests, fake_closed
+
+from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.drift_trials import _fall
+from bayeshaptic.diagnosis.loop import Traced
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.stability.critical import critical_stiffness
+
+
+def log_ratios(closed: Closed, traced: Traced, base: Fit | None = None) -> np.ndarray:
+    """How the limit's draws are changed, in log stiffness."""
+    one = closed.analysis
+    wide = with_discrepancy(one.limit, one.posterior, base or one.fit, one.fit, traced)
+    return np.log(wide.samples / one.limit.samples)
+
+
+def with_effects(traced: Traced, **changes: float) -> Traced:
+    state = traced.state
+    effects = tuple(replace(effect, **changes) for effect in state.accepted)
+    return replace(traced, state=replace(state, accepted=effects))
+
+
+def test_a_steady_ramp_lies_within_the_fall() -> None:
+    closed = fake_closed("explained", "time-varying")
+    ratio = log_ratios(closed, with_effects(closed.traced, limit_log_fall=0.1))
+    low, high = np.quantile(ratio, [0.05, 0.95])
+    assert ratio.min() >= -0.125 and ratio.max() <= 0
+    assert low < -0.1 < high, "the ramp itself must be inside the 90 % interval"
+
+
+def test_the_fall_is_that_of_a_ramp_from_the_middle_of_a_part_to_its_end() -> None:
+    centres = np.array([1, 3, 5]) / 6
+    for slope in (0.4, -0.4):
+        limits = 100 * np.exp(slope * centres)
+        ends = 100 * np.exp(slope * np.array([0.0, 1.0]))
+        assert _fall(limits) == pytest.approx(np.log(limits.min() / ends.min()))
+    assert _fall(np.array([3.0, 1.0, 2.0])) == 0, "nothing goes on from the middle"
+
+
+def test_the_rest_of_an_effect_is_its_share_of_what_the_effect_did() -> None:
+    closed = fake_closed("explained", "nonlinear")
+    fit = closed.analysis.fit
+    # A base model that is far off.
+    theta = fit.theta.copy()
+    for name in ("b1", "bc", "b2"):
+        theta[fit.model.names.index(name)] *= 4
+    base = replace(fit, theta=theta)
+    moved = np.log(
+        critical_stiffness(base.model, theta).value / critical_stiffness(fit.model, fit.theta).value
+    )
+    left = replace(
+        with_effects(closed.traced, limit_log_sd=0.0),
+        verdict="unexplained",
+        before=_tests(90.0, "nonlinear"),
+        after=_tests(45.0, "nonlinear"),
+    )
+    ratio = log_ratios(closed, left, base)
+    width = 0.5 * abs(moved)
+    assert width > 0.12, "the least widening would hide it"
+    assert np.abs(ratio).max() <= width
+    # Uniform either way: 90 % lie within 0.9 of it (3200 draws: to 0.01 of the width).
+    assert np.quantile(ratio, [0.05, 0.95]) == pytest.approx([-0.9 * width, 0.9 * width], rel=0.05)
+
+
+def test_where_nothing_was_found_the_limit_only_falls() -> None:
+    closed = fake_closed("unexplained", "nonlinear")
+    ratio = log_ratios(closed, closed.traced)
+    assert ratio.max() <= 0 and ratio.min() < -0.1
