@@ -26,7 +26,8 @@ Progress = Callable[[float, str], None]
 
 FEWEST = 3  # configurations from which one is predicted between them
 _FIRST_STEPS = 200
-_BATCH, _ATTEMPTS = 500, 60
+_BATCH = 2000
+_RARE = 0.2
 
 
 @dataclass(frozen=True)
@@ -64,17 +65,16 @@ class Configurations:
         """
         assert self._path is not None and self._here is not None
         low = np.where(self._here.log, -np.inf, self._here.low)
-        found = np.empty((0, len(coordinate), self.model.size))
-        for attempt in range(_ATTEMPTS):
-            phi = self.chains.thinned(_BATCH, rng)
-            x = self._path.draw(phi, coordinate, rng)
-            # Paths on which no damper is negative; if there are hardly any, those mirrored at zero.
-            good = x[np.all(x >= low, axis=(1, 2))]
-            last = attempt == _ATTEMPTS - 1
-            found = np.concatenate([found, np.resize(x, (count, *x.shape[1:])) if last else good])
-            if len(found) >= count:
-                break
-        flat = inside(found[:count].reshape(-1, self.model.size), self._here)
+        parts: list[Floats] = []
+        mirrored = False
+        while sum(map(len, parts)) < count:
+            x = self._path.draw(self.chains.thinned(_BATCH, rng), coordinate, rng)
+            good = np.all(x >= low, axis=(1, 2))
+            # Paths on which no damper is negative; where there are hardly any, mirrored at zero.
+            mirrored = mirrored or (not parts and good.mean() < _RARE)
+            parts.append(x if mirrored else x[good])
+        found = np.concatenate(parts)[:count]
+        flat = inside(found.reshape(-1, self.model.size), self._here)
         return self._here.natural(flat).reshape(count, len(coordinate), -1)
 
 

@@ -37,7 +37,8 @@ def pareto_k(log_weight: Floats) -> float:
     b = b / (3 * excess[int(tail / 4 + 0.5) - 1]) + 1 / excess[-1]
     k = np.mean(np.log1p(-b[:, None] * excess), axis=1)
     level = tail * (np.log(-b / k) - k - 1)
-    share = 1 / np.sum(np.exp(level - level[:, None]), axis=1)
+    with np.errstate(over="ignore"):  # of a point without a share
+        share = 1 / np.sum(np.exp(level - level[:, None]), axis=1)
     shape = float(np.mean(np.log1p(-float(share @ b) * excess)))
     # Few points: towards 0.5, as ten points would.
     return (tail * shape + 10 * 0.5) / (tail + 10)

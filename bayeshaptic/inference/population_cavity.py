@@ -19,6 +19,8 @@ from bayeshaptic.inference.hierarchy import Hierarchy
 
 Floats = NDArray[np.float64]
 _COMPONENTS = 120  # draws of the hyperparameters that a cavity is a mixture over
+_CHUNK = 2000
+_LOOKED_AT = 2000
 _VAGUE = 1e3  # prior standard deviations of a recording that says nothing
 _LEAST = 0.02  # curvature of a description, in units of the tilted distribution's
 
@@ -39,11 +41,15 @@ class Cavity:
 
     def __call__(self, x: Floats) -> Floats:
         """Log density of points of shape (B, D); shape (B,)."""
+        parts = [self._density(x[start : start + _CHUNK]) for start in range(0, len(x), _CHUNK)]
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    def _density(self, x: Floats) -> Floats:
         white = x @ self.whitening.transpose(0, 2, 1)
         white -= (self.whitening @ self.means[:, :, None])[:, None, :, 0]
         scale = np.log(np.diagonal(self.whitening, axis1=1, axis2=2)).sum(axis=1)
         logs = scale[:, None] - 0.5 * np.einsum("kbd,kbd->kb", white, white)
-        return logsumexp(logs, axis=0) - np.log(len(logs))
+        return np.asarray(logsumexp(logs, axis=0) - np.log(len(logs)), float)
 
     def moments(self) -> tuple[Floats, Floats]:
         """Mean (D,) and covariance (D, D) of the mixture."""
@@ -63,10 +69,11 @@ def cavity(hierarchy: Hierarchy, r: int, phi: Floats, rng: np.random.Generator) 
     r : int
     phi : ndarray, shape (n, Q)
         Draws of the hyperparameters given all recordings: each is weighed by how little this
-        recording had to do with it.
+        recording had to do with it.  Of many some.
     rng : numpy.random.Generator
     """
     own, sd = hierarchy.likelihoods[r], hierarchy.prior_sd
+    phi = phi[:: -(-len(phi) // _LOOKED_AT)]
     nothing = replace(
         own,
         mean=hierarchy.prior_mean,

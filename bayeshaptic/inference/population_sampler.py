@@ -13,11 +13,9 @@ from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
 from bayeshaptic.inference.ensembles import (
     ENSEMBLES,
     WALKERS,
-    LogDensity,
+    Ensemble,
     refitted,
-    warmed_up,
 )
-from bayeshaptic.inference.importance import Adapted
 from bayeshaptic.inference.mixture import student
 from bayeshaptic.inference.population_walkers import EVERY, Walkers
 
@@ -63,6 +61,17 @@ class LevelChains:
         """`count` draws, shape (count, Q), in random order."""
         flat = self.chains.reshape(-1, self.chains.shape[-1])
         return flat[rng.choice(len(flat), count, replace=len(flat) < count)]
+
+    def in_order(self, count: int) -> tuple[Floats, int]:
+        """At most `count` draws, walker after walker, and the number of walkers.
+
+        Nothing is drawn twice, and how far neighbours are alike can still be seen.
+        """
+        ensembles, steps, walkers, size = self.chains.shape
+        kept = max(1, min(steps, count // (ensembles * walkers)))
+        pick = np.linspace(0, steps - 1, kept).astype(int)
+        by_walker = self.chains[:, pick].transpose(0, 2, 1, 3)
+        return by_walker.reshape(-1, size), ensembles * walkers
 
     def resting(self) -> LevelChains:
         """Without the walkers: what can be sent to another process."""
@@ -116,15 +125,11 @@ def sample_level(
     return LevelChains(joined, diagnostics, tuple(walkers))
 
 
-def sample_density(
-    density: LogDensity, begin: Adapted, seed: np.random.SeedSequence, ess: float
-) -> LevelChains:
-    """Draws of a few parameters on ridges, from any log density of vectors of shape (B, P).
+def run_ensembles(ensembles: list[Ensemble], rng: np.random.Generator, ess: float) -> LevelChains:
+    """Draws of a few parameters on ridges, from ensembles that are warmed up.
 
-    `begin` is a first proposal; one that is fitted to the draws is frozen before any is kept.
+    Their proposal is fitted again until one that is frozen gives `ess` effective draws.
     """
-    ensembles = warmed_up(density, begin, seed)
-    rng = np.random.default_rng(seed.spawn(1)[0])
     steps = _FIRST_STEPS
     for _ in range(_REFITS):
         runs = [ensemble.advance(steps) for ensemble in ensembles]

@@ -7,7 +7,8 @@ likelihood times what the others say (`population_cavity`):
   the recording does, and the description is good;
 - the recording's own draws, weighed by what the others say over the recording's own prior, as in
   Hogg, Myers and Bovy (2010): where the recording knows more than the study does;
-- sampling with emcee, with what the others say as the prior.
+- sampling with what the others say as the prior: a Student t mixture is fitted by emcee ensembles,
+  and its draws are weighed, or, where that is poor, the ensembles go on as for one recording.
 """
 
 from __future__ import annotations
@@ -20,22 +21,25 @@ from numpy.typing import NDArray
 
 from bayeshaptic.inference.below import Below, draw_below
 from bayeshaptic.inference.coordinates import Coordinates
+from bayeshaptic.inference.ensembles import warmed_up
 from bayeshaptic.inference.gaussian_likelihood import exact_likelihood
 from bayeshaptic.inference.hierarchy import Hierarchy
 from bayeshaptic.inference.importance import adapt
 from bayeshaptic.inference.mixture import student
 from bayeshaptic.inference.pareto import pareto_k
 from bayeshaptic.inference.population_cavity import Cavity, cavity, described, flattened
-from bayeshaptic.inference.population_sampler import TOLERABLE, sample_density
+from bayeshaptic.inference.population_sampler import TOLERABLE, run_ensembles
 from bayeshaptic.inference.posterior import Posterior
 
 Floats = NDArray[np.float64]
 
 POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
-_FEW = 300  # effective draws that are too few
+_FEW = 1000  # effective draws that are too few
 _HARMLESS = 0.5  # share of effective draws from which a heavy tail is harmless
-_SAMPLED = 1000.0  # effective draws to sample
-_MOST_OWN = 20_000
+_SAMPLED = 2000.0  # effective draws to sample
+_ENOUGH = 21_000
+_PROPOSED = 1.5
+_MOST_OWN = 40_000
 _START = 3000
 DESCRIBED, OWN, SAMPLED, ALONE = "described", "own", "sampled", "alone"
 
@@ -57,6 +61,8 @@ class Reweighted:
     how : {"described", "own", "sampled", "alone"}
         Draws of the levels weighed, the recording's own weighed, sampled; or the recording by
         itself, where none of these came out.
+    share : float
+        Effective number over that of the draws that were weighed.
     """
 
     user: str
@@ -64,14 +70,15 @@ class Reweighted:
     effective: float
     pareto_k: float
     how: str = DESCRIBED
+    share: float = 1.0
 
     @property
     def good(self) -> bool:
         """Whether there are enough effective draws, with weights that can be trusted."""
-        if self.how in (SAMPLED, ALONE):
-            return self.how == SAMPLED
-        light = not self.pareto_k > POOR_K or self.effective > _HARMLESS * len(self.draws)
-        return light and self.effective >= min(_FEW, _HARMLESS * len(self.draws))
+        if self.how == ALONE:
+            return False
+        light = not self.pareto_k > POOR_K or self.share > _HARMLESS
+        return light and (self.effective >= _FEW or self.share > _HARMLESS)
 
 
 def reweight(
@@ -119,12 +126,12 @@ def redescribed(
     """
     first, last = seed.spawn(2)
     below = draw_below(hierarchy, phi, here.low, np.random.default_rng(first))
-    found = list(hierarchy.likelihoods)
+    found, changed = list(hierarchy.likelihoods), False
     for r, own in enumerate(reweight(posteriors, users, hierarchy, below, phi, here, last)):
         if posteriors[r].windows is not None and own.how in (OWN, SAMPLED):
             rest = cavity(hierarchy, r, phi, np.random.default_rng(first))
-            found[r] = described(here.coordinate(own.draws), rest)
-    return replace(hierarchy, likelihoods=tuple(found))
+            found[r], changed = described(here.coordinate(own.draws), rest), True
+    return replace(hierarchy, likelihoods=tuple(found)) if changed else hierarchy
 
 
 def _one(
@@ -140,14 +147,20 @@ def _one(
     rng = np.random.default_rng(seed)
     count = len(below.recordings)
     first = _from_levels(posterior, user, r, hierarchy, below, here, rng)
-    if posterior.windows is None or (first is not None and first.good):
-        return first or _alone(posterior, user, count, rng)
+    if posterior.windows is None or (first is not None and _enough(first, count)):
+        return first or _alone(posterior, user, count)
     rest = cavity(hierarchy, r, phi, rng)
     second = _from_own(posterior, user, rest, here, count, rng)
-    if second.good:
+    if _enough(second, count):
         return second
     third = _sampled(posterior, user, rest, here, count, rng, seed.spawn(1)[0])
-    return third or _alone(posterior, user, count, rng)
+    good = [one for one in (first, second, third) if one is not None and one.good]
+    return max(good, key=lambda one: one.effective, default=_alone(posterior, user, count))
+
+
+def _enough(found: Reweighted, count: int) -> bool:
+    """Whether nothing better is worth looking for: 20 draws below 0.1 % risk are enough."""
+    return found.good and found.effective >= min(_ENOUGH, _HARMLESS * count)
 
 
 def _from_levels(
@@ -201,14 +214,17 @@ def _resampled(
     rng: np.random.Generator,
     how: str,
 ) -> Reweighted:
-    """`count` draws, each of `x` as often as its weight says (systematic resampling)."""
+    """Each of `x` as often as its weight says (systematic resampling)."""
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
+    effective = float(1 / np.sum(weight**2))
+    # No more than there are to choose from: draws that come again and again would count as many.
+    count = int(np.ceil(min(count, effective)))
     steps = (np.arange(count) + rng.uniform()) / count
     chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(x) - 1)
     draws = here.natural(x[rng.permutation(chosen)])
     k = pareto_k(log_weight[np.isfinite(log_weight)])
-    return Reweighted(user, draws, float(1 / np.sum(weight**2)), k, how)
+    return Reweighted(user, draws, effective, k, how, effective / len(x))
 
 
 def _sampled(
@@ -237,17 +253,26 @@ def _sampled(
     mean = weight @ x
     off = x - mean
     first = student(mean, (weight[:, None] * off).T @ off, 8.0)
-    chains = sample_density(density, adapt(density, first, rng), seed, _SAMPLED)
+    ensembles = warmed_up(density, adapt(density, first, rng), seed)
+    proposal = ensembles[0].proposal
+    y = proposal.mixture.sample(rng, int(_PROPOSED * count))
+    x = proposal.straightening.bent(y)
+    found = _resampled(
+        x, density(x) - proposal.mixture.log_density(y), user, here, count, rng, SAMPLED
+    )
+    if found.good:
+        return found
+    chains = run_ensembles(ensembles, np.random.default_rng(seed.spawn(1)[0]), _SAMPLED)
     if chains.diagnostics.rhat.max() > TOLERABLE or chains.diagnostics.ess < _FEW:
         return None
-    draws = here.natural(chains.thinned(count, rng))
+    draws = here.natural(chains.thinned(min(count, int(chains.diagnostics.ess)), rng))
     return Reweighted(user, draws, chains.diagnostics.ess, float("nan"), SAMPLED)
 
 
-def _alone(posterior: Posterior, user: str, count: int, rng: np.random.Generator) -> Reweighted:
+def _alone(posterior: Posterior, user: str, count: int) -> Reweighted:
     """The recording by itself."""
-    draws = posterior.draws[rng.choice(len(posterior.draws), count)]
-    return Reweighted(user, draws, float(count), float("nan"), ALONE)
+    draws = posterior.draws[:: -(-len(posterior.draws) // count)]
+    return Reweighted(user, draws, float(posterior.effective), float("nan"), ALONE)
 
 
 def walls(here: Coordinates) -> Floats:
