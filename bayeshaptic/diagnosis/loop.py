@@ -26,6 +26,7 @@ _LAW_REST = 3.0  # what one law may leave more than another, in thresholds
 _MENDED = 1.5  # factor on the thresholds of a recording that something was taken off
 _LINEAR_FIRST = 10.0  # reduced chi-square from which the linear misfit is mended first
 _RIVAL = 0.85  # share of the best score that a rival has at least
+_NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit
 _TIE = 6.0  # difference of scores that one recording does not decide
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 Tick = Callable[[str], None]
@@ -230,12 +231,12 @@ def _with_ties(chosen: Trial, trials: list[Trial]) -> State:
     rivals = [t for t in trials if t is not chosen and t.convincing and _ties(chosen, t)]
     *earlier, own = chosen.state.accepted
     spread = own.limit_log_sd
-    if own.family == "nonlinear" and rivals:
+    if rivals:
         here, *others = (
             critical_stiffness(t.state.model, t.state.fit.theta).value for t in (chosen, *rivals)
         )
         apart = max(abs(np.log(max(other, 1e-9) / max(here, 1e-9))) for other in others)
-        spread = float(np.hypot(spread, 0.5 * apart))
+        spread = float(np.hypot(spread, apart / _NINETY))
     names = tuple(dict.fromkeys((*own.ties, *(t.name for t in rivals))))
     own = replace(own, ties=names, limit_log_sd=spread)
     return replace(chosen.state, accepted=(*earlier, own))
