@@ -26,6 +26,7 @@ from bayeshaptic.inference.population import prior_moments, study_coordinates
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.report.population_json import population_json
+from bayeshaptic.report.study_words import people
 
 Floats = NDArray[np.float64]
 PLACES = (0.0, 0.2, 0.5, 0.7, 1.0)
@@ -251,6 +252,32 @@ def test_named_configurations_are_cases_and_nothing_between() -> None:
     numbers = json.loads(population_json(found))
     assert numbers["population"] is None and numbers["new_person"] is None
     assert [row["coordinate"] for row in numbers["configurations"]] == ["a", "b"]
+
+
+def test_a_new_person_is_where_most_people_were() -> None:
+    model = toy_model("kc", "kh")
+    mean, _ = prior_moments(model, study_coordinates(model))
+    found = whole_study(
+        [
+            analysed(
+                f"u-{n}",
+                toy_posterior(model, mean + 0.1 * n, 1e-4 * np.eye(2), n),
+                user=f"u{n}",
+                configuration=place,
+            )
+            for n, place in enumerate((0.0, 0.5, 0.5))
+        ]
+    )
+    labels = [case.label for case in found.new_person]
+    assert labels == ["a new person, configuration 0.5", "a new person, configuration 0"]
+    new = json.loads(population_json(found))["new_person"]
+    assert new["configuration"] == 0.5
+    assert [row["configuration"] for row in new["by_configuration"]] == [0.5, 0.0]
+    first = found.new_person[0].limit
+    assert new["critical_stiffness"]["q50"] == pytest.approx(first.quantile(0.5))
+    assert new["critical_stiffness"]["safe"]["0.01"] == pytest.approx(first.safe(0.01))
+    words = " ".join(people(found))
+    assert "(in configuration 0.5)" in words and "in configuration 0;" in words
 
 
 def test_nothing_left() -> None:

@@ -74,7 +74,8 @@ class StudyAnalysis:
     population : Population or None
         None where nobody holds the device.
     new_person : tuple of Case
-        A person not yet seen; one case for each configuration that people were measured in, a
+        A person not yet seen; one case for each configuration that people were measured in, that
+        of most people first: it stands for a new person's limit wherever there is one number.  A
         single one without configurations; empty without a population.
     users : tuple of Case
         K_CR of each user, shrunken towards the population.

@@ -13,7 +13,6 @@ import numpy as np
 
 from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits, configuration_limits
 from bayeshaptic.diagnosis.recorded_cases import (
-    Widening,
     place_of,
     posterior,
     recorded,
@@ -128,7 +127,7 @@ def _people(
             )
             notes.notices += found.notices
             report(0.5, "critical stiffness of people")
-            new_person = _new_person(found, widening(like), seed)
+            new_person = _new_person(found, like, seed)
             return found, new_person, _users(found, like, seed)
     return None, (), ()
 
@@ -160,10 +159,16 @@ def _odd_notice(odd: Sequence[Analysed], like: Sequence[Analysed]) -> list[Notic
     return [Notice("warning", "population", text)]
 
 
-def _new_person(population: Population, wider: Widening, seed: int) -> tuple[Case, ...]:
-    """People not yet seen, in every configuration that people were measured in."""
+def _new_person(population: Population, like: Sequence[Analysed], seed: int) -> tuple[Case, ...]:
+    """People not yet seen, in every configuration that people were measured in.
+
+    That in which most of them were measured comes first: it stands for a new person's limit.
+    """
+    wider = widening(like)
+    seen = Counter(one.entry.configuration for one in like)
     cases = []
-    for number, place in enumerate(population.places):
+    for number in sorted(range(len(population.places)), key=lambda n: -seen[population.places[n]]):
+        place = population.places[number]
         rng = np.random.default_rng(np.random.SeedSequence([seed, number, 1]))
         each = -(-_PEOPLE // len(population.log_mean))
         draws = population.new_person(rng, each, number)

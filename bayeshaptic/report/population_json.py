@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.recorded_cases import place_of
 from bayeshaptic.report.limits import RISKS
 from bayeshaptic.report.summary import QUANTILES, plain
 
@@ -32,8 +33,9 @@ def population_summary(study: StudyAnalysis) -> dict[str, Any]:
     -------
     dict
         SI units; None for what is missing, and for numbers that are infinite or not a number.
-        `recordings` is the number of recordings that could be used. Of a person not yet seen in
-        several configurations it is the one with the lowest limit.
+        `recordings` is the number of recordings that could be used. A person not yet seen holds
+        the device in the configuration in which most people were recorded, as on the page; the
+        limits in the others are in `by_configuration`.
     """
     population = study.population
     return plain(
@@ -43,7 +45,7 @@ def population_summary(study: StudyAnalysis) -> dict[str, Any]:
             "users": _users(study),
             "population": None if population is None else _population(population),
             "correlation": None if population is None else population.correlation.mean(axis=0),
-            "new_person": _new_person(study.new_person),
+            "new_person": _new_person(study),
             "configurations": _configurations(study),
             "device_limit": None if study.limit is None else _device_limit(study.limit),
         }
@@ -78,23 +80,35 @@ def _population(population: Population) -> dict[str, Any]:
     }
 
 
-def _new_person(cases: Sequence[Case]) -> dict[str, Any] | None:
-    if not cases:
+def _new_person(study: StudyAnalysis) -> dict[str, Any] | None:
+    if not study.new_person:
         return None
-    worst: CriticalStiffness = min(
-        (case.limit for case in cases), key=lambda one: one.quantile(0.01)
-    )
-    return {
-        "critical_stiffness": {
-            "unit": worst.unit,
-            **_quantiles(worst.samples),
-            "db": {name: worst.db(p) for name, p in QUANTILES.items()},
-            "safe": {f"{risk:g}": worst.safe(risk) for risk in RISKS},
-            "crossings": [
-                {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
-                for c in worst.crossings
-            ],
+    places = {place_of(e.configuration): e.configuration for e in study.study.entries}
+    rows = [
+        {
+            "configuration": next((p for end, p in places.items() if _ends(case, end)), None),
+            "critical_stiffness": _limit(case.limit),
         }
+        for case in study.new_person
+    ]
+    several = len(rows) > 1
+    return {**rows[0], "by_configuration": rows if several else None}
+
+
+def _ends(case: Case, ending: str) -> bool:
+    return bool(ending) and case.label.endswith(ending)
+
+
+def _limit(limit: CriticalStiffness) -> dict[str, Any]:
+    return {
+        "unit": limit.unit,
+        **_quantiles(limit.samples),
+        "db": {name: limit.db(p) for name, p in QUANTILES.items()},
+        "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
+        "crossings": [
+            {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
+            for c in limit.crossings
+        ],
     }
 
 

@@ -13,6 +13,7 @@ from bayeshaptic.report.quantities import interval, percent, pure, quantity, sca
 from bayeshaptic.report.study_words import spread_db
 from bayeshaptic.report.summary import QUANTILES
 from bayeshaptic.report.tables import Rows
+from bayeshaptic.stability.critical import ENOUGH_BELOW
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
@@ -86,14 +87,31 @@ def safe(study: StudyAnalysis) -> Rows:
     rows = []
     for risk in RISKS:
         value = study.limit.safe(risk)
-        row = [percent(risk), "too few draws to say" if value is None else _four(value, unit)]
+        row = [percent(risk), "not stated" if value is None else _four(value, unit)]
         row.append(_DASH if not value else f"{decibel(value):.2f}")
         if study.new_person:
-            values = [case.limit.safe(risk) for case in study.new_person]
-            known = [v for v in values if v is not None]
-            row.append(_four(min(known), unit) if len(known) == len(values) else _DASH)
+            person = study.new_person[0].limit.safe(risk)
+            row.append(_DASH if person is None else _four(person, unit))
         rows.append(tuple(row))
     return tuple(rows)
+
+
+def unstated(study: StudyAnalysis) -> str:
+    """Why there is no stiffness at some risk; empty where there is one at each."""
+    assert study.limit is not None
+    risk = next((risk for risk in RISKS if study.limit.safe(risk) is None), None)
+    if risk is None:
+        return ""
+    probable = {found.case for found in study.limit.binding if found.probability > 0}
+    binding = [case for case in study.cases if case.label in probable]
+    case = min(binding, key=lambda one: one.limit.effective_below(risk))
+    below = case.limit.effective_below(risk)
+    if below >= ENOUGH_BELOW:
+        return "Not stated where less than 20 effective draws of all cases together lie below."
+    return (
+        f"Not stated where less than {ENOUGH_BELOW} effective draws lie below: at {percent(risk)} "
+        f"there are {below:.0f} for {case.label}."
+    )
 
 
 def binding(study: StudyAnalysis) -> Rows:

@@ -14,8 +14,7 @@ from bayeshaptic.stability.cases import CONFIGURATION, FREE
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.study_analysis import StudyAnalysis
-    from bayeshaptic.report.study_bands import band_of
-from bayeshaptic.stability.cases import Case
+    from bayeshaptic.stability.cases import Case
 
 _HARDLY_DB = 0.15  # a spread of K_CR between people that nobody needs to care about
 _LITTLE_DB = 0.5
@@ -79,10 +78,29 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
     if len(branches) > 1:
         named = listed([f"{c.label} ({percent(c.probability)})" for c in branches])
         found.append(f"What limits it differs from person to person: {named}.")
+    elsewhere = _elsewhere(study)
+    if elsewhere:
+        found.append(elsewhere)
     apart = _between(study)
     if apart:
         found.append(apart)
     return tuple(found)
+
+
+def _elsewhere(study: StudyAnalysis) -> str:
+    """A new person in the other configurations."""
+    first, *others = study.new_person
+    if not others:
+        return ""
+    parts = []
+    for case in others:
+        low, middle, high = (decibel(case.limit.quantile(p)) for p in (0.05, 0.5, 0.95))
+        parts.append(f"{middle:.1f} dB ({low:.1f} to {high:.1f}) in configuration {_place(case)}")
+    return (
+        f"Most people were recorded in configuration {_place(first)}: wherever a new person's "
+        f"limit is one number, it is the limit there. Elsewhere it is {listed(parts)}; the limit "
+        "of the device counts all of them."
+    )
 
 
 def _between(study: StudyAnalysis) -> str:
