@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import kstest
 
 from bayeshaptic.inference import least_squares, sample
-from bayeshaptic.models import HalfNormal, LogNormal, Model, build_model, draw
+from bayeshaptic.models import HalfNormal, LogNormal, Model, NearZero, build_model, draw
 from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -188,7 +188,7 @@ def _prior_information(model: Model, name: str) -> float:
     prior = model.prior(name)
     if isinstance(prior, LogNormal):
         return prior.log_sd**-2
-    assert isinstance(prior, HalfNormal)
+    assert isinstance(prior, HalfNormal | NearZero)
     return prior.scale**-2
 
 

@@ -9,7 +9,7 @@ import bayeshaptic as bh
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.choose import choose_model
 from bayeshaptic.inference.mixture import fit_student_mixture, student
-from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, Normal, Uniform, draw
+from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform, draw
 from bayeshaptic.rig import Bench, simulate
 
 
@@ -73,9 +73,10 @@ def test_the_sampler_agrees_with_a_plain_stretch_run(held_phantom):
 
     from bayeshaptic.inference.coordinates import coordinates
     from bayeshaptic.inference.density import Density
+    from bayeshaptic.inference.near_zero import with_near_zero
 
     _, _, fit, posterior = held_phantom
-    here = coordinates(fit.model)
+    here = with_near_zero(coordinates(fit.model), fit)  # without it no stretch run sees all of b2
     density = Density(fit.likelihood, here)
     start = here.coordinate(posterior.draws[:: len(posterior.draws) // 64][:64])
     plain = emcee.EnsembleSampler(64, fit.model.size, density, vectorize=True)
@@ -147,6 +148,7 @@ def test_the_model_is_chosen_from_the_data(device, held, name):
     [
         LogNormal(0.2, 0.5),
         HalfNormal(3.0),
+        NearZero(3.0, 0.1),
         Normal(1.0, 2.0, low=0.0),
         Uniform(-1.0, 4.0),
         LogUniform(0.1, 20.0),

@@ -11,6 +11,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.models import (
     HalfNormal,
     LogNormal,
+    NearZero,
     Normal,
     Uniform,
     build_model,
@@ -90,7 +91,12 @@ def test_priors_around_the_device_file():
     values = load_device("phantom").parameters["grasped"]
     assert model.prior("kc") == LogNormal(values["kc"], 0.5)
     assert model.prior("ks") == LogNormal(values["ks"], 0.7)  # people differ more than devices
-    assert model.prior("b2") == HalfNormal(2 * (values["b1"] + values["b2"]))
+    scale = 2 * (values["b1"] + values["b2"])
+    assert model.prior("b1") == HalfNormal(scale)
+    # The file's b2 is zero: nothing was seen, and there may be as little as one pleases.
+    assert values["b2"] == 0.0
+    assert model.prior("b2") == NearZero(scale, 1e-6 * scale)
+    assert free("lhifam").prior("b1") == HalfNormal(2 * (0.1 + 6.8))
     assert np.array_equal(model.values, [values[name] for name in model.names])
     centre = np.array([[model.prior(name).quantile(0.5) for name in model.names]])
     assert np.isfinite(model.log_prior(centre)).all()

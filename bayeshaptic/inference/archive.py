@@ -8,11 +8,20 @@ from typing import Any
 from bayeshaptic.devices import Device
 from bayeshaptic.effects.registry import effect_class
 from bayeshaptic.errors import InputError
-from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, Model, Normal, Parameter, Uniform
+from bayeshaptic.models import (
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    Model,
+    NearZero,
+    Normal,
+    Parameter,
+    Uniform,
+)
 from bayeshaptic.models.structures import STRUCTURES
 
 _PRIORS: dict[str, type] = {
-    kind.__name__: kind for kind in (HalfNormal, LogNormal, LogUniform, Normal, Uniform)
+    kind.__name__: kind for kind in (HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform)
 }
 
 

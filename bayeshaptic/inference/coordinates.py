@@ -4,12 +4,13 @@ Positive parameters are known up to a factor and go in as logarithms.  Dampers t
 zero: they stay linear, with a wall at zero, because every coordinate that pushes the wall away to
 infinity mixes badly there.  Other dampers, and masses, too, are sampled as they are where they are
 known roughly: the data know their sums best, and only so the ridges along them are straight.
+Dampers that a device file gives as zero are a matter of their own: see `near_zero`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from bayeshaptic.models import Model
 
 Floats = NDArray[np.float64]
+_LARGEST = 100.0  # logarithm: what follows something as large as that is far outside anyway
 _SUMS = ("mass", "damping")  # quantities whose sums the data know best
 _KNOWN = 0.8  # log standard deviation, of prior and data together, below which one is known
 
@@ -34,6 +36,12 @@ class Coordinates:
         The support of the priors, in phi.
     walls : ndarray of bool, shape (P,)
         Which parameters have a wall at the low end that the posterior may lean on.
+    near_zero : tuple of int
+        Which of those in logarithms may be zero: phi = log(1 + theta / floor).
+    floor : ndarray, shape (len(near_zero),)
+    follow : ndarray, shape (P, len(near_zero))
+        How far the others move for each unit of these, along ridges that are straight in natural
+        values and would not be in logarithms: phi of the others is what is left.
     """
 
     log: NDArray[np.bool_]
@@ -41,21 +49,43 @@ class Coordinates:
     low: Floats
     high: Floats
     walls: NDArray[np.bool_]
+    near_zero: tuple[int, ...] = ()
+    floor: Floats = field(default_factory=lambda: np.zeros(0))
+    follow: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     def natural(self, phi: Floats) -> Floats:
-        return np.where(self.log, np.exp(np.where(self.log, phi, 0.0)), phi * self.scale)
+        own = self.own(phi)
+        theta = np.where(self.log, np.exp(np.where(self.log, own, 0.0)), own * self.scale)
+        if self.near_zero:
+            theta[..., self.near_zero] = self._small(phi)
+        return theta
 
     def coordinate(self, theta: Floats) -> Floats:
         positive = np.where(self.log, np.maximum(theta, 1e-300), 1.0)
-        return np.where(self.log, np.log(positive), theta / self.scale)
+        phi = np.where(self.log, np.log(positive), theta / self.scale)
+        if self.near_zero:
+            small = theta[..., self.near_zero]
+            phi[..., self.near_zero] = np.log1p(small / self.floor)
+            phi -= small @ self.follow.T
+        return phi
+
+    def _small(self, phi: Floats) -> Floats:
+        return self.floor * np.expm1(np.minimum(phi[..., self.near_zero], _LARGEST))
+
+    def own(self, phi: Floats) -> Floats:
+        """Of each parameter by itself: its logarithm, or its value over the scale."""
+        if not self.near_zero:
+            return phi
+        return phi + self._small(phi) @ self.follow.T
 
     def log_jacobian(self, phi: Floats) -> Floats:
         """log |d theta / d phi| up to a constant, shape (B,)."""
-        return np.sum(np.where(self.log, phi, 0.0), axis=-1)
+        return np.sum(np.where(self.log, self.own(phi), 0.0), axis=-1)
 
     def inside(self, phi: Floats) -> NDArray[np.bool_]:
         """Which vectors lie in the support of the priors, shape (B,)."""
-        return np.all((phi >= self.low) & (phi <= self.high), axis=-1)
+        own = self.own(phi)
+        return np.all((own >= self.low) & (own <= self.high), axis=-1)
 
 
 def coordinates(model: Model, linear: Collection[str] = ()) -> Coordinates:

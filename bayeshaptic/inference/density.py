@@ -23,7 +23,8 @@ class Density:
     def __call__(self, phi: Floats) -> Floats:
         phi = np.atleast_2d(phi)
         out = np.full(len(phi), -np.inf)
-        inside = self.coordinates.inside(phi) & np.all(np.abs(phi) < 600, axis=1)
+        inside = self.coordinates.inside(phi)
+        inside &= np.all(np.abs(self.coordinates.own(phi)) < 600, axis=1)
         if inside.any():
             out[inside] = self._log_prior(phi[inside])
             with np.errstate(all="ignore"):  # far-away proposals may overflow: they are refused
@@ -43,9 +44,12 @@ class Density:
         phi = np.atleast_2d(phi)
         low = self.coordinates.low
         walls = self.coordinates.walls
-        inner = np.where(walls & (phi < low), low, phi)
-        behind = np.where(walls, np.minimum(phi - low, 0.0), 0.0)
-        value = self._log_prior(inner)
+        own = self.coordinates.own(phi)
+        behind = np.where(walls, np.minimum(own - low, 0.0), 0.0)
+        inner = phi - behind
+        wall = np.where(walls, low * self.coordinates.scale, -np.inf)
+        theta = np.maximum(self.coordinates.natural(inner), wall)
+        value = self.likelihood.model.log_prior(theta) + self.coordinates.log_jacobian(inner)
         for index in np.flatnonzero(walls):
             if np.any(behind[:, index] < 0):
                 slope, bend = self._prior_at_wall(int(index))

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from bayeshaptic.inference.importance import Adapted
 from bayeshaptic.inference.mixture import StudentMixture, fit_student_mixture, student
+from bayeshaptic.inference.near_zero import Redraw
 from bayeshaptic.inference.straight import Straightening, nothing_to_straighten, straighten
 
 Floats = NDArray[np.float64]
 LogDensity = Callable[[Floats], Floats]
+_REDRAWN = 0.25  # of such moves, for each of the others
 ENSEMBLES = 4
 WALKERS = 64
 _WARM_UP = 80
@@ -54,6 +56,8 @@ class Ensemble:
     positions : ndarray, shape (walkers, P)
     state : tuple
         State of a `numpy.random.RandomState`.
+    redraw : callable, optional
+        A proposal of a few coordinates alone, for a fifth of the moves.
     """
 
     density: LogDensity
@@ -61,6 +65,7 @@ class Ensemble:
     share: float
     positions: Floats
     state: Any
+    redraw: Redraw | None = None
     sampler: Any = field(init=False)
 
     def __post_init__(self) -> None:
@@ -78,6 +83,15 @@ class Ensemble:
             (emcee.moves.MHMove(independence, ndim=size), self.share),
             (emcee.moves.DEMove(), 1 - self.share),
         ]
+        redraw = self.redraw
+        if redraw is not None:
+
+            def alone(coords: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
+                generator = np.random.default_rng(rng.randint(2**31))
+                drawn, factor = redraw(straightening.bent(coords), generator)
+                return straightening.straight(drawn), factor
+
+            moves.append((emcee.moves.MHMove(alone, ndim=size), _REDRAWN))
         self.sampler = emcee.EnsembleSampler(
             len(self.positions),
             size,
@@ -101,7 +115,11 @@ class Ensemble:
 
 
 def warmed_up(
-    density: LogDensity, adapted: Adapted, seed: np.random.SeedSequence, peak: Floats | None = None
+    density: LogDensity,
+    adapted: Adapted,
+    seed: np.random.SeedSequence,
+    peak: Floats | None = None,
+    redraw: Redraw | None = None,
 ) -> list[Ensemble]:
     """Ensembles that have forgotten their starts, with one proposal, refitted and frozen.
 
@@ -120,7 +138,7 @@ def warmed_up(
     ensembles = []
     for own in seeds[:ENSEMBLES]:
         start = _spread_start(density, adapted, peak, np.random.default_rng(own))
-        ensembles.append(Ensemble(density, proposal, 0.6, start, _state(own)))
+        ensembles.append(Ensemble(density, proposal, 0.6, start, _state(own), redraw))
     before, level = 0.0, -np.inf
     for _ in range(_ROUNDS):
         runs = [ensemble.advance(_WARM_UP) for ensemble in ensembles]
@@ -150,7 +168,9 @@ def refitted(
 
 
 def _with(ensemble: Ensemble, proposal: Proposal) -> Ensemble:
-    return Ensemble(ensemble.density, proposal, 0.75, ensemble.positions, ensemble.state)
+    return Ensemble(
+        ensemble.density, proposal, 0.75, ensemble.positions, ensemble.state, ensemble.redraw
+    )
 
 
 def _fitted(found: Floats, values: Floats, rng: np.random.Generator) -> Proposal:

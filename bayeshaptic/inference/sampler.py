@@ -16,6 +16,7 @@ from bayeshaptic.inference.ensembles import Ensemble, refitted, warmed_up
 from bayeshaptic.inference.importance import adapt
 from bayeshaptic.inference.laplace import laplace
 from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.near_zero import redrawing, start_of, with_near_zero
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.etfe import Etfe
@@ -90,15 +91,15 @@ def sample(
     report = progress or (lambda share, word: None)
     fit = start if start is not None else least_squares(model, etfe, seed=seed)
     report(0.02, "finding the peak")
-    here = sampling_coordinates(fit.model, fit.theta, fit.sd)
+    here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     density = Density(fit.likelihood, here)
     seeds = np.random.SeedSequence(seed)
     tune, run, refit = seeds.spawn(3)
-    peak, proposal = laplace(density, here.coordinate(fit.theta))
+    peak, proposal = laplace(density, start_of(here, fit))
     report(0.1, "adapting the proposal")
     adapted = adapt(density, proposal, np.random.default_rng(tune))
     report(0.2, "warming up")
-    ensembles = warmed_up(density, adapted, run, peak)
+    ensembles = warmed_up(density, adapted, run, peak, redrawing(here, fit))
     more = until or (lambda natural: natural.shape[1])
     chains, found = _run(
         ensembles,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.parameter import Parameter
-from bayeshaptic.models.prior import HalfNormal, LogNormal, Normal, Prior
+from bayeshaptic.models.prior import HalfNormal, LogNormal, NearZero, Normal, Prior
 from bayeshaptic.models.structures import (
     FREE,
     GRASPED,
@@ -30,6 +30,8 @@ DEVICE_LOG_SD = 0.5
 HAND_LOG_SD = 0.7
 # A damper to the ground may be zero: half-normal, at this multiple of the file's total.
 DAMPER_SCALE = 2.0
+# One that the file gives as zero was not seen: it may be as small as this share of that.
+DAMPER_FLOOR = 1e-6
 # A free delay lies within a few periods.
 FREE_DELAY_PERIODS = 2.0
 
@@ -106,12 +108,17 @@ def build_model(
 
 
 def device_priors(structure: Structure, values: Mapping[str, float]) -> dict[str, Prior]:
-    """Priors around a device file's `values`: log-normal, and half-normal for ground dampers."""
+    """Priors around a device file's `values`: log-normal, and half-normal for ground dampers.
+
+    A ground damper that the file gives as zero is `NearZero`.
+    """
     damping = sum(values[name] for name in structure.names if name in GROUND_DAMPERS)
     priors: dict[str, Prior] = {}
     for name in structure.names:
         if name in GROUND_DAMPERS and damping > 0:
-            priors[name] = HalfNormal(DAMPER_SCALE * damping)
+            scale = DAMPER_SCALE * damping
+            seen = values[name] > 0
+            priors[name] = HalfNormal(scale) if seen else NearZero(scale, DAMPER_FLOOR * scale)
         elif values[name] > 0:
             priors[name] = LogNormal(values[name], HAND_LOG_SD if name in HAND else DEVICE_LOG_SD)
         else:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -97,6 +98,57 @@ class HalfNormal(Prior):
 
     def describe(self, unit: str) -> str:
         return f"half-normal from zero, scale {self.scale:.4g} {unit}"
+
+
+@dataclass(frozen=True)
+class NearZero(Prior):
+    """Density proportional to exp(-x^2 / (2 scale^2)) / (x + floor): for dampers seen as zero.
+
+    A published zero says that nothing was seen, not how little there is.  Between `floor` and
+    `scale` every factor is alike, so that on whatever scale the data tell zero from something,
+    much of the probability lies next to zero; a half-normal is flat there and pushes away from it.
+    """
+
+    scale: float
+    floor: float
+    coordinate = "linear"
+    support = (0.0, np.inf)
+
+    def __post_init__(self) -> None:
+        if not 1e-12 * self.scale <= self.floor < self.scale:
+            raise InputError(
+                f"NearZero needs a floor below its scale, by a factor of 1e12 at most; got {self}."
+            )
+
+    def log_density(self, x: ArrayLike) -> Floats:
+        x = np.asarray(x, float)
+        area, _, _ = _near_zero(self.floor / self.scale)
+        safe = np.maximum(x, 0.0)
+        density = -0.5 * (safe / self.scale) ** 2 - np.log(safe + self.floor) - np.log(area)
+        return np.where(x >= 0, density, -np.inf)
+
+    def quantile(self, p: ArrayLike) -> Floats:
+        _, factors, below = _near_zero(self.floor / self.scale)
+        return self.floor * np.expm1(np.interp(np.asarray(p, float), below, factors))
+
+    def describe(self, unit: str) -> str:
+        return (
+            f"near zero: every factor from {self.floor:.3g} to {self.scale:.3g} {unit} alike, "
+            "zero included"
+        )
+
+
+@lru_cache(maxsize=64)
+def _near_zero(ratio: float) -> tuple[float, Floats, Floats]:
+    """The integral of a `NearZero` density; log(1 + x / floor) with the probability below it."""
+    from scipy.integrate import cumulative_simpson
+
+    factors = np.linspace(0.0, np.log1p(9.0 / ratio), 20_001)
+    below = cumulative_simpson(
+        np.exp(-0.5 * (ratio * np.expm1(factors)) ** 2), x=factors, initial=0.0
+    )
+    below = np.maximum.accumulate(below)
+    return float(below[-1]), factors, below / below[-1]
 
 
 @dataclass(frozen=True)
@@ -195,6 +247,7 @@ class LogUniform(Prior):
 _FORMS: dict[frozenset[str], type] = {
     frozenset({"median", "log_sd"}): LogNormal,
     frozenset({"scale"}): HalfNormal,
+    frozenset({"scale", "floor"}): NearZero,
     frozenset({"mean", "sd"}): Normal,
     frozenset({"mean", "sd", "low"}): Normal,
     frozenset({"low", "high"}): Uniform,
@@ -204,8 +257,9 @@ _FORMS: dict[frozenset[str], type] = {
 def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     """The prior that a ``[prior]`` table of a study declares for the parameter `name`.
 
-    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{mean, sd}`` (and ``low``)
-    normal, ``{low, high}`` uniform, and ``{low, high, log = true}`` log-uniform.
+    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{scale, floor}`` near zero,
+    ``{mean, sd}`` (and ``low``) normal, ``{low, high}`` uniform, and ``{low, high, log = true}``
+    log-uniform.
 
     Raises
     ------
@@ -218,7 +272,7 @@ def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     if form is None:
         raise InputError(
             f"prior of {name}: keys {sorted(table)} fit no prior; use {{median, log_sd}}, "
-            "{scale}, {mean, sd}, {low, high} or {low, high, log = true}."
+            "{scale}, {scale, floor}, {mean, sd}, {low, high} or {low, high, log = true}."
         )
     try:
         numbers = {key: float(value) for key, value in keys.items()}  # type: ignore[arg-type]

@@ -1,0 +1,147 @@
+"""Dampers that a device file gives as zero: their prior, their coordinates, and what they cost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bayeshaptic as bh
+from bayeshaptic.inference.coordinates import sampling_coordinates
+from bayeshaptic.inference.density import Density
+from bayeshaptic.inference.near_zero import redrawing, start_of, with_near_zero
+from bayeshaptic.rig import Bench, simulate
+
+
+def measured(seed: int) -> tuple[bh.Etfe, Bench]:
+    bench = Bench.from_device("phantom")
+    run = simulate(bench, seed=seed)
+    recording = bh.recording_from_arrays(
+        run.force, run.position, period_s=1e-3, force_unit="Nm", position_unit="rad"
+    )
+    return bh.estimate_etfe(recording), bench
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    etfe, bench = measured(73000)
+    fit = bh.least_squares(bh.free(device="phantom"), etfe)
+    plain = sampling_coordinates(fit.model, fit.theta, fit.sd)
+    return etfe, bench, fit, plain, with_near_zero(plain, fit)
+
+
+def test_the_area_is_the_known_integral():
+    """Goodwin and Staton's integral: -log r + (log 2 - Euler's constant) / 2 for small r."""
+    for ratio in (1e-4, 1e-6, 1e-8):
+        prior = bh.NearZero(3.0, 3.0 * ratio)
+        area = np.exp(-prior.log_density(0.0)) / prior.floor
+        assert area == pytest.approx(-np.log(ratio) + 0.5 * (np.log(2) - np.euler_gamma), abs=2e-3)
+
+
+def test_every_factor_is_alike():
+    prior = bh.NearZero(1.0, 1e-6)
+    decades = [1e-5, 1e-4, 1e-3, 1e-2]
+    share = [
+        np.mean((x := prior.quantile(np.linspace(0, 1, 20_001))) < 10 * d) - np.mean(x < d)
+        for d in decades
+    ]
+    assert share == pytest.approx([share[1]] * 4, rel=0.1)
+    assert prior.quantile(0.4) < 1e-3
+
+
+def test_a_zero_fit_is_at_a_bound_and_leaves_no_error_bar(fitted):
+    _, _, fit, _, _ = fitted
+    index = fit.model.names.index("b2")
+    assert fit.theta[index] == 0.0
+    assert fit.outcome["b2"] == "at a bound" and np.isnan(fit.sd[index])
+
+
+def test_coordinates_go_there_and_back_and_know_their_jacobian(fitted):
+    _, _, fit, _, here = fitted
+    index = fit.model.names.index("b2")
+    assert here.near_zero == (index,)
+    theta = np.tile(fit.theta, (5, 1))
+    theta[:, index] = [0.0, 1e-9, 1e-7, 1e-5, 1e-3]
+    phi = here.coordinate(theta)
+    assert here.natural(phi) == pytest.approx(theta, rel=1e-9, abs=1e-18)
+    assert here.inside(phi).all()
+    below = phi.copy()
+    below[:, index] = -1e-6
+    assert not here.inside(below).any()
+    logs = []
+    for point in phi[1:]:
+        step = np.diag(np.full(len(point), 1e-5))
+        slope = (here.natural(point + step) - here.natural(point - step)) / 2e-5
+        logs.append(np.linalg.slogdet(slope)[1])
+    change = here.log_jacobian(phi[1:])
+    assert logs - logs[0] == pytest.approx(change - change[0], abs=1e-5)
+
+
+def test_others_follow_so_that_ridges_stay_straight(fitted):
+    """Moving b2 alone costs hundreds of units of log likelihood, moving along next to none."""
+    _, _, fit, plain, here = fitted
+    index = fit.model.names.index("b2")
+    start = start_of(here, fit)
+    moved = start.copy()
+    moved[index] = np.log1p(2e-5 / here.floor[0])
+    along = fit.likelihood(here.natural(np.stack([start, moved])))
+    alone = plain.coordinate(fit.theta)
+    alone[index] += 2e-5 / plain.scale[index]
+    assert along[0] - along[1] < 3
+    assert along[0] - fit.likelihood(plain.natural(alone[None]))[0] > 300
+
+
+def test_densities_of_both_coordinates_agree(fitted):
+    """Up to a constant, once each density is one of the natural values."""
+    _, _, fit, plain, here = fitted
+    theta = here.natural(start_of(here, fit) + np.zeros((4, 1)))
+    theta[:, fit.model.names.index("b2")] = [1e-8, 1e-7, 1e-6, 1e-5]
+    values = []
+    for coordinates in (plain, here):
+        phi = coordinates.coordinate(theta)
+        values.append(Density(fit.likelihood, coordinates)(phi) - coordinates.log_jacobian(phi))
+    difference = values[0] - values[1]
+    assert difference == pytest.approx(np.full(4, difference[0]), abs=1e-4)
+
+
+def test_a_redraw_keeps_the_prior():
+    """Metropolis steps with it alone, for a density that is the prior: all are accepted."""
+    etfe, _ = measured(73001)
+    fit = bh.least_squares(bh.free(device="phantom"), etfe)
+    here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
+    propose = redrawing(here, fit)
+    phi = np.tile(start_of(here, fit), (500, 1))
+    drawn, factor = propose(phi, np.random.default_rng(0))
+    index = here.near_zero[0]
+    prior = fit.model.prior("b2")
+
+    def log_density(points):
+        return prior.log_density(here.natural(points)[:, index]) + points[:, index]
+
+    assert log_density(drawn) - log_density(phi) + factor == pytest.approx(0.0, abs=1e-9)
+    others = np.delete(np.arange(phi.shape[1]), index)
+    assert np.array_equal(drawn[:, others], phi[:, others])
+    below = np.mean(here.natural(drawn)[:, index] < prior.quantile(0.5))
+    assert below == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(500))
+
+
+def test_a_parameter_that_is_seen_is_sampled_as_it_is(fitted):
+    _, _, fit, plain, _ = fitted
+    model = fit.model.with_prior({"b1": bh.NearZero(1.0, 1e-6), "b2": bh.HalfNormal(1.0)})
+    seen = bh.least_squares(model, fitted[0], start=fit.theta)
+    there = sampling_coordinates(model, seen.theta, seen.sd)
+    assert with_near_zero(there, seen) is there
+    assert redrawing(there, seen) is None
+
+
+def test_the_limit_of_a_published_zero_is_not_pushed_up():
+    """A half-normal, flat next to zero, has the truth at ranks of 0.10, 0.01 and 0.13."""
+    ranks = []
+    for seed in range(73000, 73003):
+        etfe, bench = measured(seed)
+        posterior = bh.sample(bh.free(device="phantom"), etfe, ess=400, seed=seed)
+        assert posterior.converged
+        assert not posterior.prior_dominated["b2"]
+        limit = bh.critical_stiffness(posterior)
+        ranks.append(np.mean(limit.samples < bench.true_critical_stiffness()))
+    assert min(ranks) > 0.05 and max(ranks) < 0.95
+    assert np.mean(ranks) > 0.25
