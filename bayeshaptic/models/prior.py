@@ -133,8 +133,8 @@ class NearZero(Prior):
 
     def describe(self, unit: str) -> str:
         return (
-            f"near zero: every factor from {self.floor:.3g} to {self.scale:.3g} {unit} alike, "
-            "zero included"
+            f"near zero: log-uniform from {self.floor:.3g} to {self.scale:.3g} {unit} with soft "
+            "ends, zero included"
         )
 
 

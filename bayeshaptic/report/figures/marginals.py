@@ -54,7 +54,7 @@ def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
     density, edges = density / row.factor, edges * row.factor
     axes.stairs(density, edges, fill=True, color=style.MODEL, alpha=0.45, label="posterior")
     axes.stairs(density, edges, color=style.MODEL, linewidth=0.8)
-    x = np.linspace(low, high, 200)
+    x = 0.5 * (edges[1:] + edges[:-1]) / row.factor  # as coarse: a prior may be steep at zero
     prior = np.exp(model.prior(name).log_density(x)) / row.factor
     axes.plot(x * row.factor, prior, "--", color=style.PRIOR, linewidth=1.1, label="prior")
     axes.axvline(
