@@ -130,6 +130,7 @@ def _population(model: Model, people: int, spread: float, rng: Any) -> Any:
         places=(None,),
         model=model,
         notices=(),
+        chains=None,
     )
 
 

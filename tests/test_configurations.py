@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 PLACES = (0.0, 0.2, 0.5, 0.7, 1.0)
 KEYS = (
     "device", "recordings", "users", "population", "correlation", "new_person", "configurations",
-    "device_limit",
+    "device_limit", "sampling",
 )  # fmt: skip
 
 
@@ -234,6 +234,8 @@ def test_numbers_of_a_study(mixed: StudyAnalysis) -> None:
     assert new.keys() == {"unit", "q05", "q50", "q95", "db", "safe", "crossings"}
     assert new["q05"] < new["q50"] < new["q95"] and new["unit"] == "N m/rad"
     assert new["safe"].keys() == {"0.05", "0.01", "0.001"}
+    assert found["sampling"]["converged"] and found["sampling"]["rhat_max"] < 1.01
+    assert found["sampling"]["ess_min"] > 500 and found["sampling"]["not_pooled"] == []
     rows = found["configurations"]
     assert {row["coordinate"] for row in rows} >= set(PLACES) and not any(r["held"] for r in rows)
     assert found["device_limit"]["binding"][0].keys() == {"case", "probability"}

@@ -19,6 +19,8 @@ from bayeshaptic.inference.population import (
     prior_moments,
     study_coordinates,
 )
+from bayeshaptic.inference.population_cavity import Cavity, cavity, described
+from bayeshaptic.inference.population_sampler import sample_level
 
 Floats = NDArray[np.float64]
 
@@ -269,6 +271,81 @@ def test_models_must_agree_and_have_a_hand() -> None:
         infer_population([one], ["a", "b"])
     with pytest.raises(InputError, match="no recording"):
         infer_population([], [])
+
+
+def test_a_description_from_the_moments_of_both() -> None:
+    rng = np.random.default_rng(10)
+    own, wide = random_covariance(rng, 3, 0.1), random_covariance(rng, 3, 0.3)
+    peak, middle = 0.1 * rng.standard_normal(3), np.zeros(3)
+    rest = Cavity(middle[None], np.linalg.inv(np.linalg.cholesky(wide))[None])
+    both = np.linalg.inv(np.linalg.inv(own) + np.linalg.inv(wide))
+    mean = both @ np.linalg.solve(own, peak)
+    found = described(rng.multivariate_normal(mean, both, size=40_000), rest)
+    sd = np.sqrt(np.diag(own))
+    assert np.all(np.abs(found.mean - peak) < 0.05 * sd)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), sd, rtol=0.05)
+
+
+def test_the_rest_of_a_study_by_one_big_normal_density() -> None:
+    rng = np.random.default_rng(11)
+    size, user = 3, np.array([0, 1, 1])
+    levels = Hierarchy(
+        tuple(
+            quadratic(0.3 * rng.standard_normal(size), random_covariance(rng, size, 0.05), n)  # type: ignore[misc]
+            for n in range(3)
+        ),
+        user,
+        np.zeros(3, int),
+        np.array([0, 2]),
+        np.array([1]),
+        0.1 * rng.standard_normal(size),
+        np.array([0.5, 0.7, 0.5]),
+    )
+    phi = levels.guess()[0]
+    level = levels.layout.read(phi[None])
+    root = level.hand_sd[0][:, None] * level.correlation_root[0]
+    prior = np.zeros((3, size, 3, size))
+    for r in range(3):
+        for q in range(3):
+            prior[r, :, q] = levels.design[r] @ np.diag(levels.beta_sd**2) @ levels.design[q].T
+            if user[r] == user[q]:
+                prior[r, :, q][np.ix_(levels.hand, levels.hand)] += root @ root.T
+        prior[r, :, r] += np.diag(levels.spread(level)[0])
+    flat = prior.reshape(3 * size, 3 * size)
+    others = flat[size:, size:].copy()
+    for r in (1, 2):
+        own = slice((r - 1) * size, r * size)
+        others[own, own] += levels.likelihoods[r].covariance
+    gain = np.linalg.solve(others, flat[size:, :size]).T
+    mean = gain @ levels.mean[1:].ravel() + levels.prior_mean
+    covariance = flat[:size, :size] - gain @ flat[size:, :size]
+    found, spread = cavity(levels, 0, phi[None], rng).moments()
+    np.testing.assert_allclose(found, mean, atol=1e-4)
+    np.testing.assert_allclose(spread, covariance, rtol=1e-3, atol=1e-6)
+
+
+def test_walkers_find_a_shoulder() -> None:
+    class Level:
+        """A normal distribution, and a logarithm that is flat from -6 to 0."""
+
+        def log_density(self, phi: Floats) -> Floats:
+            flat = np.where(phi[:, 2] > 0, 0.5 * (phi[:, 2] / 0.1) ** 2, 0.0)
+            flat += np.where(phi[:, 2] < -6, 0.5 * ((phi[:, 2] + 6) / 0.1) ** 2, 0.0)
+            off = phi[:, :2] @ np.array([[1.0, 0.9], [0.0, 0.5]])
+            return np.asarray(-flat - 0.5 * np.sum(off**2, axis=1))
+
+        def guess(self) -> tuple[Floats, Floats]:
+            return np.zeros(3), np.ones(3)
+
+    found = sample_level(Level(), np.random.SeedSequence(1))
+    assert found.diagnostics.rhat.max() < 1.01 and found.diagnostics.ess >= 500
+    x = found.chains.reshape(-1, 3)
+    root = np.linalg.inv(np.array([[1.0, 0.9], [0.0, 0.5]]))
+    sd = np.append(np.sqrt(np.diag(root.T @ root)), 6 / np.sqrt(12))
+    np.testing.assert_allclose(x.std(axis=0), sd, rtol=0.1)
+    ordered, walkers = found.in_order(2000)
+    assert len(ordered) % walkers == 0 and 1000 < len(ordered) <= 2000
+    np.testing.assert_array_equal(ordered[0], found.chains[0, 0, 0])
 
 
 def test_tail_of_weights() -> None:

@@ -14,7 +14,9 @@ from bayeshaptic.inference.gaussian_likelihood import linearised
 from bayeshaptic.inference.hyperparameters import Layout
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.population import infer_population, prior_moments, study_coordinates
+from bayeshaptic.inference.population_cavity import cavity
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.reweighting import _from_own, _sampled
 from bayeshaptic.rig import Bench, simulate
 
 Floats = NDArray[np.float64]
@@ -121,3 +123,21 @@ def test_against_sampling_all_levels(posteriors: list[Posterior]) -> None:
         assert np.all(np.abs(x.mean(axis=0) - slow_own[:, r].mean(axis=0)) < 0.25 * spread)
         np.testing.assert_allclose(x.std(axis=0), spread, rtol=0.25)
         assert own.effective > 1000
+
+
+def test_all_ways_to_one_recording_agree(posteriors: list[Posterior]) -> None:
+    here = study_coordinates(posteriors[0].model)
+    found = infer_population(posteriors, ["ana", "ben", "eva"], seed=1)
+    assert found._hierarchy is not None and found.chains is not None
+    phi, _ = found.chains.in_order(2000)
+    rng = np.random.default_rng(5)
+    rest = cavity(found._hierarchy, 1, phi, rng)
+    ways = [found.recordings[1], _from_own(posteriors[1], "ben", rest, here, 4000, rng)]
+    sampled = _sampled(posteriors[1], "ben", rest, here, 4000, rng, np.random.SeedSequence(6))
+    assert sampled is not None and sampled.good
+    x = here.coordinate(sampled.draws)
+    for way in ways:
+        other = here.coordinate(way.draws)
+        # A thousand effective draws: 0.04 standard deviations of a difference of means.
+        assert np.all(np.abs(other.mean(axis=0) - x.mean(axis=0)) < 0.2 * x.std(axis=0))
+        np.testing.assert_allclose(other.std(axis=0), x.std(axis=0), rtol=0.2)

@@ -19,7 +19,7 @@ Ints = NDArray[np.int_]
 Progress = Callable[[float, str], None]
 
 _POINTS = 9
-_DRAWS = 24_000  # with them 20 lie below the stiffness of 0.1 % risk
+_DRAWS = 22_000  # with them 20 lie below the stiffness of 0.1 % risk
 
 
 @dataclass(frozen=True)

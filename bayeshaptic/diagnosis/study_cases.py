@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], None]
 
-_PEOPLE = 40_000  # at least, that are drawn from all draws of the population
+_PEOPLE = 25_000  # at least, that are drawn from all draws of the population
 
 
 @dataclass(frozen=True)

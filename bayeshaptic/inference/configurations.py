@@ -137,9 +137,10 @@ def infer_configurations(
     chains = sample_level(path, run, chains)
     notices = chains.notices
     if len(measured) < 5:
+        who = "held" if any(name in HAND for name in model.names) else "nobody holding it"
         text = (
-            f"{len(measured)} configurations say little about what is between them: how fast the "
-            "device changes is half belief."
+            f"{len(measured)} configurations ({who}) say little about what is between them: how "
+            "fast the device changes is half belief."
         )
         notices = (*notices, Notice("note", "configurations", text))
     return Configurations(measured, model, chains.resting(), notices, path, here)

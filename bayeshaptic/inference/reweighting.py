@@ -37,8 +37,8 @@ POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
 _FEW = 1000  # effective draws that are too few
 _HARMLESS = 0.5  # share of effective draws from which a heavy tail is harmless
 _SAMPLED = 2000.0  # effective draws to sample
-_ENOUGH = 21_000
-_PROPOSED = 1.5
+_ENOUGH, _MOST = 21_000, 22_000  # draws, for risks down to 0.1 %
+_PROPOSED = 2.0  # draws of a proposal for each that is wanted
 _MOST_OWN = 40_000
 _START = 3000
 DESCRIBED, OWN, SAMPLED, ALONE = "described", "own", "sampled", "alone"
@@ -160,7 +160,8 @@ def _one(
 
 def _enough(found: Reweighted, count: int) -> bool:
     """Whether nothing better is worth looking for: 20 draws below 0.1 % risk are enough."""
-    return found.good and found.effective >= min(_ENOUGH, _HARMLESS * count)
+    wanted = _ENOUGH if count > _ENOUGH else _HARMLESS * count
+    return found.good and found.effective >= wanted
 
 
 def _from_levels(
@@ -219,7 +220,7 @@ def _resampled(
     weight /= weight.sum()
     effective = float(1 / np.sum(weight**2))
     # No more than there are to choose from: draws that come again and again would count as many.
-    count = int(np.ceil(min(count, effective)))
+    count = int(np.ceil(min(count, effective, _MOST)))
     steps = (np.arange(count) + rng.uniform()) / count
     chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(x) - 1)
     draws = here.natural(x[rng.permutation(chosen)])

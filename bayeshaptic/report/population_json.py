@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.recorded_cases import place_of
+from bayeshaptic.inference.reweighting import ALONE
 from bayeshaptic.report.limits import RISKS
 from bayeshaptic.report.summary import QUANTILES, plain
 
@@ -48,6 +49,7 @@ def population_summary(study: StudyAnalysis) -> dict[str, Any]:
             "new_person": _new_person(study),
             "configurations": _configurations(study),
             "device_limit": None if study.limit is None else _device_limit(study.limit),
+            "sampling": None if population is None else _sampling(population),
         }
     )
 
@@ -77,6 +79,19 @@ def _population(population: Population) -> dict[str, Any]:
             "log_sd": _quantiles(population.log_sd[:, i]),
         }
         for i, name in enumerate(population.parameters)
+    }
+
+
+def _sampling(population: Population) -> dict[str, Any] | None:
+    """Whether the population's sampler has converged, and which recordings stand by themselves."""
+    if population.chains is None:
+        return None
+    found = population.chains.diagnostics
+    return {
+        "converged": not population.chains.notices,
+        "rhat_max": float(found.rhat.max()),
+        "ess_min": found.ess,
+        "not_pooled": sorted({one.user for one in population.recordings if one.how == ALONE}),
     }
 
 
