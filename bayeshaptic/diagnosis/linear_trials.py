@@ -68,8 +68,8 @@ def _base_log_likelihoods(state: State) -> tuple[float, float]:
 
 def _try(state: State, effect: LinearEffect, base: tuple[float, float]) -> Trial:
     model = state.model.with_effect(effect)
-    starts = _starts(state, model, effect)
-    theta, windows = _fit_part(model, state.etfe, state.fit.windows, starts)
+    starts, strata = _starts(state, model, effect)
+    theta, windows = _fit_part(model, state.etfe, state.fit.windows, starts, strata)
     gains = np.subtract(log_likelihoods(model, windows, theta), base)
     gain_fit, gain_choose = float(gains[0]), float(gains[1])
     accepted = Accepted(
@@ -85,10 +85,12 @@ def _try(state: State, effect: LinearEffect, base: tuple[float, float]) -> Trial
     return Trial(accepted, changed, gain_fit, gain_choose, len(effect.parameters))
 
 
-def _starts(state: State, model: Model, effect: LinearEffect) -> Floats:
+def _starts(state: State, model: Model, effect: LinearEffect) -> tuple[Floats, NDArray[np.int_]]:
     """The effect's own starting values beside the current parameters and the nominal ones.
 
-    From the current ones alone a fit may stay stuck where the base model bent to the data.
+    From the current ones alone a fit may stay stuck where the base model bent to the data.  Also
+    the stratum of each: alike are those with the same parameters and the same first value of the
+    effect, which is its frequency if it has one.
     """
     own = effect.starting_values(state.model, state.etfe)
     bases = [state.fit.theta]
@@ -103,11 +105,19 @@ def _starts(state: State, model: Model, effect: LinearEffect) -> Floats:
         for column, (name, source) in enumerate(zip(model.names, index, strict=True)):
             rows[:, column] = own[:, added.index(name)] if source < 0 else base[source]
         starts.append(rows)
-    return np.concatenate(starts)
+    values, stratum = np.unique(own[:, 0], return_inverse=True)
+    strata = [stratum + number * len(values) for number in range(len(bases))]
+    return np.concatenate(starts), np.concatenate(strata)
 
 
-def _fit_part(model: Model, etfe: Etfe, windows: Windows, starts: Floats) -> tuple[Floats, Windows]:
+def _fit_part(
+    model: Model,
+    etfe: Etfe,
+    windows: Windows,
+    starts: Floats,
+    strata: NDArray[np.int_] | None = None,
+) -> tuple[Floats, Windows]:
     """Fit the windows to fit by, twice: the second time compressed around the first fit."""
-    theta, _ = refine(model, windows.part(share(windows, FIT)), starts)
+    theta, _ = refine(model, windows.part(share(windows, FIT)), starts, strata)
     windows = compress(etfe, partial(model.response, theta))
     return polish(model, windows.part(share(windows, FIT)), theta), windows

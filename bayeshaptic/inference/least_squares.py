@@ -111,7 +111,9 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
     return summarise(model, windows, theta, agreeing)
 
 
-def refine(model: Model, windows: Windows, start: Floats) -> tuple[Floats, int]:
+def refine(
+    model: Model, windows: Windows, start: Floats, strata: NDArray[np.int_] | None = None
+) -> tuple[Floats, int]:
     """The best fit to `windows` from many starting vectors, shape (S, P).
 
     Of the optima found, that with the highest posterior density: masses may swap their parts in
@@ -130,7 +132,7 @@ def refine(model: Model, windows: Windows, start: Floats) -> tuple[Floats, int]:
     def penalty(phi: Floats) -> Floats:
         return -model.log_prior(here.natural(phi)) - here.log_jacobian(phi)
 
-    phi, cost = _best_of_many(residuals, penalty, phi, low, high)
+    phi, cost = _best_of_many(residuals, penalty, phi, low, high, strata)
     best = np.argmin(cost + penalty(phi))
     return here.natural(phi)[best], int(np.sum(cost < cost[best] + 0.5))
 
@@ -166,12 +168,19 @@ def _best_of_many(
     phi: Floats,
     low: Floats,
     high: Floats,
+    strata: NDArray[np.int_] | None,
 ) -> tuple[Floats, Floats]:
     """Sift the starting points, refine the better ones, converge the best."""
     with np.errstate(all="ignore"):
         cost = np.einsum("bn,bn->b", *(2 * [residuals(phi)]))
-    cost = np.where(np.isfinite(cost), cost, np.inf)
-    phi = phi[np.argsort(cost)[:_KEPT_STARTS]]
+    order = np.argsort(np.where(np.isfinite(cost), cost, np.inf))
+    if strata is not None:
+        # Far from the optimum the cost says little: each stratum has its chance of a few steps.
+        _, first = np.unique(strata[order], return_index=True)
+        phi = phi[order[np.sort(first)]]
+        phi, cost = minimise(residuals, phi, low, high, steps=5, tolerance=1e-2)
+        order = np.argsort(cost)
+    phi = phi[order[:_KEPT_STARTS]]
     phi, cost = minimise(residuals, phi, low, high, steps=15, tolerance=1e-2)
     phi = phi[np.argsort(cost + penalty(phi))[:6]]
     return minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
