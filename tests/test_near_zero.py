@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.density import Density
+from bayeshaptic.inference.laplace import _possible
 from bayeshaptic.inference.near_zero import redrawing, start_of, with_near_zero
 from bayeshaptic.rig import Bench, simulate
 
@@ -53,6 +56,25 @@ def test_a_zero_fit_is_at_a_bound_and_leaves_no_error_bar(fitted):
     index = fit.model.names.index("b2")
     assert fit.theta[index] == 0.0
     assert fit.outcome["b2"] == "at a bound" and np.isnan(fit.sd[index])
+
+
+def test_a_misfit_at_the_upper_bound_is_not_next_to_zero(fitted):
+    _, _, fit, plain, _ = fitted
+    index = fit.model.names.index("b2")
+    theta, covariance = fit.theta.copy(), fit.covariance.copy()
+    theta[index] = 0.09
+    covariance[index] = covariance[:, index] = np.nan
+    high = replace(fit, theta=theta, covariance=covariance)
+    assert with_near_zero(plain, high) is plain
+
+
+def test_a_start_replaces_a_peak_outside_the_support(fitted):
+    _, _, fit, _, here = fitted
+    density, start = Density(fit.likelihood, here), start_of(here, fit)
+    outside = start.copy()
+    outside[fit.model.names.index("b1")] = here.low[fit.model.names.index("b1")] - 1.0
+    assert _possible(density, outside, start) is start
+    assert _possible(density, start, outside) is start
 
 
 def test_coordinates_go_there_and_back_and_know_their_jacobian(fitted):

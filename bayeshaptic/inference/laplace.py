@@ -44,7 +44,7 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
     sd = np.sqrt(np.diag(covariance))
     leaning = here.walls & ((peak - here.low) < sd)
     if not leaning.any():
-        return peak, student(peak, covariance)
+        return _possible(density, peak, phi), student(peak, covariance)
 
     block = covariance[np.ix_(leaning, leaning)]
     mean, spread = _truncated_moments(peak[leaning], block, here.low[leaning])
@@ -64,7 +64,7 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
     full[np.ix_(others, leaning)] = slope @ spread
     full[np.ix_(leaning, others)] = (slope @ spread).T
     full[np.ix_(others, others)] = within + slope @ spread @ slope.T
-    return inside, student(inside, full)
+    return _possible(density, inside, phi), student(inside, full)
 
 
 def _conditional_widths(density: Density, phi: Floats) -> Floats:
@@ -72,6 +72,11 @@ def _conditional_widths(density: Density, phi: Floats) -> Floats:
     residuals = weighted_residuals(density.likelihood, density.coordinates)
     slope = jacobian(residuals, phi[None])[0]
     return 1 / np.sqrt(1 + np.sum(slope**2, axis=0))
+
+
+def _possible(density: Density, peak: Floats, start: Floats) -> Floats:
+    """`peak`, or `start` where walls that lean on each other have pushed it out of the support."""
+    return peak if np.isfinite(density(peak[None])[0]) else start
 
 
 def _within(density: Density, phi: Floats, widths: Floats) -> Floats:

@@ -31,8 +31,10 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
 
     How the others follow them is the direction in which the fit suffers least.
     """
-    seen = fit.theta > _SEEN * fit.sd  # not where the sd is nan, at a bound
     priors = [fit.model.prior(name) for name in fit.model.names]
+    # At the lower bound nothing is seen, at the upper one (a misfit's) too much.
+    middle = np.array([float(prior.quantile(0.5)) for prior in priors])
+    seen = np.where(np.isnan(fit.sd), fit.theta > middle, fit.theta > _SEEN * fit.sd)
     found = {i: p for i, p in enumerate(priors) if isinstance(p, NearZero) and not seen[i]}
     if not found:
         return here
