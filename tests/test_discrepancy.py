@@ -71,6 +71,24 @@ def test_the_rest_of_an_effect_is_its_share_of_what_the_effect_did() -> None:
     assert np.quantile(ratio, [0.05, 0.95]) == pytest.approx([-0.9 * width, 0.9 * width], rel=0.05)
 
 
+def test_a_law_that_leaves_what_would_pass_for_noise_is_not_quite_right_either() -> None:
+    closed = fake_closed("explained", "nonlinear")
+    fit = closed.analysis.fit
+    theta = fit.theta.copy()
+    for name in ("b1", "bc", "b2"):
+        theta[fit.model.names.index(name)] *= 4
+    found = replace(
+        with_effects(closed.traced, limit_log_sd=0.0),
+        before=_tests(90.0, "nonlinear"),
+        after=_tests(3.0, "nonlinear"),
+    )
+    ratio = log_ratios(closed, found, replace(fit, theta=theta))
+    before, after = (
+        critical_stiffness(fit.model, parameters).value for parameters in (theta, fit.theta)
+    )
+    assert 0 < np.abs(ratio).max() <= abs(np.log(before / after)) / 30
+
+
 def test_where_nothing_was_found_the_limit_only_falls() -> None:
     closed = fake_closed("unexplained", "nonlinear")
     ratio = log_ratios(closed, closed.traced)

@@ -14,6 +14,7 @@ from bayeshaptic.recordings.spectra import TableSpectra
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability import critical_stiffness, etfe_critical_stiffness
 from bayeshaptic.stability.from_etfe import _caveat, _runs
+from bayeshaptic.stability.local_fit import LocalFit
 
 T = 1e-3
 
@@ -152,3 +153,17 @@ def test_the_seed_decides_the_draws():
     first, again, other = (etfe_critical_stiffness(etfe, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.samples, again.samples)
     assert not np.array_equal(first.samples, other.samples)
+
+
+def test_draws_of_a_fit_whose_covariance_has_rounded_to_below_zero():
+    rng = np.random.default_rng(3)
+    root = rng.standard_normal((6, 3)) + 1j * rng.standard_normal((6, 3))
+    covariance = root @ root.conj().T - 1e-13 * np.eye(6)
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(covariance)
+    fit = LocalFit(10.0, 0.2, True, 8.0, 12.0, np.full(6, 50.0 + 0j), covariance)
+    count = 20_000
+    drawn = fit.draws(rng, count, np.array([10.0]))[:, 0]
+    wanted = covariance[0, 0].real
+    # The mean of the squares of complex normal numbers: relative standard deviation 1/sqrt(count).
+    assert np.mean(np.abs(drawn - 50) ** 2) == pytest.approx(wanted, rel=4 / np.sqrt(count))

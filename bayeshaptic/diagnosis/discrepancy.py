@@ -31,6 +31,7 @@ _LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
 _BY_VELOCITY = {"sign(v)", "v|v|", "v^3"}
 _DAMPING_LEFT = 0.2  # of the damping, if most of it is friction that was fitted as damping
 _BEYOND = 1.25  # times a steady ramp
+_FARTHEST = 2.3  # log stiffness: a factor of ten
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -55,15 +56,16 @@ def with_discrepancy(
     if fall > 0:  # a step stays where it is, a ramp goes on; neither goes much further
         factor = np.exp(-fall * rng.uniform(0.0, _BEYOND, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
-    if traced.verdict != UNEXPLAINED:
-        return limit
-    families = {test.family for test in traced.after if test.flagged}
-    if "linear" in families:
+    found = {effect.family for effect in traced.state.accepted}
+    flagged = {test.family for test in traced.after if test.flagged}
+    left = flagged if traced.verdict == UNEXPLAINED else set()
+    if "linear" in left:
         limit = _with_linear(limit, posterior, fit, rng)
-    for family in sorted(families - {"linear"}):
-        if any(effect.family == family for effect in traced.state.accepted):
+    # A law of a force is never quite right, even where what it leaves would pass for noise.
+    for family in sorted((found & {"nonlinear"}) | (left - {"linear"})):
+        if family in found:
             low, high = -1.0, 1.0
-            width = _rest(base, fit, traced, family)
+            width = max(_rest(base, fit, traced, family), _LEAST[family] * (family in left))
         else:
             low, high = -1.0, 0.0
             width = _downwards(fit, traced, family)
@@ -73,7 +75,10 @@ def with_discrepancy(
 
 
 def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
-    """How far, in log stiffness, the rest of an effect may take the limit either way."""
+    """How far, in log stiffness, the rest of an effect may take the limit either way.
+
+    What tests still see of it, as a share of what they saw, times how far it moved the limit.
+    """
     before, after = (
         max((test.statistic for test in tests if test.family == family), default=0.0)
         for tests in (traced.before, traced.after)
@@ -81,7 +86,7 @@ def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
     left = min(after / before, 1.0) if before > 0 else 1.0
     limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
     moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
-    return max(_LEAST[family], left * moved)
+    return left * min(moved, _FARTHEST)
 
 
 def _downwards(fit: Fit, traced: Traced, family: str) -> float:

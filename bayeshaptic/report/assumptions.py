@@ -86,6 +86,12 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
             "The uncertainty of the effects that are not in the posterior adds "
             f"{pure(100 * spread, 2)} % (sd) to the limit."
         )
+    if any(effect.family == "nonlinear" for effect in closed.effects):
+        found.append(
+            "A law of a force is never quite right: the limit is widened either way by what the "
+            "tests still see of it, as a share of what they saw before, times how far the force "
+            "moved the limit."
+        )
     fall = sum(effect.limit_log_fall for effect in closed.effects)
     if fall > 0:
         found.append(
@@ -97,9 +103,8 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
             "The limit is widened by what is left unexplained. Where the rest is linear, the "
             "response is multiplied by a random smooth deviation as large as the residual shows; "
             "where it is not, the limit is taken down as far as the rejected candidates and the "
-            "damping in doubt would take it, or, where an effect was found that leaves a rest, "
-            "either way by that share of what the effect has done to it. This is an estimate of "
-            "what an unknown effect does, not a bound."
+            "damping in doubt would take it, or, where an effect of the class was found, by what "
+            "is left of it. This is an estimate of what an unknown effect does, not a bound."
         )
     return tuple(found)
 

@@ -114,7 +114,9 @@ class LocalFit:
 
     def draws(self, rng: np.random.Generator, count: int, frequency_hz: Floats) -> Complexes:
         """1/G at frequencies (L,) for coefficients drawn from their covariance, (count, L)."""
-        half = np.linalg.cholesky(self.covariance / 2)
+        # Not Cholesky's factor: directions that the data hardly see round to below zero.
+        values, vectors = np.linalg.eigh(self.covariance / 2)
+        half = vectors * np.sqrt(np.maximum(values, 0.0))
         noise = rng.standard_normal((2, count, len(half)))
         coefficients = self.coefficients + (noise[0] + 1j * noise[1]) @ half.T
         value = coefficients @ _powers(frequency_hz, self.centre_hz, self.span, _RICHER).T
