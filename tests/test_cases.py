@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import bayeshaptic as bh
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import build_model
+from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability.cases import FREE, HELD, Case, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
 
@@ -85,3 +87,36 @@ def test_units_must_agree() -> None:
         device_limit([case("a", ones), case("b", ones, unit="N m/rad")])
     with pytest.raises(InputError, match="no case"):
         device_limit([])
+
+
+def recorded(device: str, held: bool) -> Case:
+    """A case from a simulated recording of 30 s."""
+    bench = Bench.from_device(device, held=held)
+    run = simulate(bench, seed=11)
+    recording = bh.recording_from_arrays(
+        run.force,
+        run.position,
+        period_s=bench.period_s,
+        force_unit=bench.force_unit,
+        position_unit=bench.position_unit,
+    )
+    model = build_model("grasped" if held else "free", device)
+    posterior = bh.sample(model, bh.estimate_etfe(recording), ess=300)
+    label, group = ("user ana", HELD) if held else ("nobody holds it", FREE)
+    return Case(label, group, model, posterior.draws, bh.critical_stiffness(posterior))
+
+
+@pytest.mark.parametrize(("device", "apart_db"), [("phantom", 18.5), ("lhifam", 0.05)])
+def test_free_or_held_whichever_is_worse(device: str, apart_db: float) -> None:
+    """Diaz and Gil (2010), Table III: the PHANToM is worst alone, the LHIfAM as bad when held."""
+    free, held = recorded(device, False), recorded(device, True)
+    found = device_limit([free, held])
+    low, middle, high = (20 * np.log10(free.limit.quantile(p)) for p in (0.005, 0.5, 0.995))
+    apart = 20 * np.log10(held.limit.quantile(0.5)) - middle
+    # Within the 99 % interval of the free device's limit, which is by far the wider one.
+    assert apart == pytest.approx(apart_db, abs=0.05 + high - low)
+    if device == "phantom":
+        assert found.by_group()[FREE] == 1.0 and found.by_group().get(HELD, 0.0) == 0.0
+    else:  # a toss: neither is safe to leave out
+        assert abs(apart) < 0.5
+        assert found.safe(0.05) <= min(free.limit.safe(0.05), held.limit.safe(0.05))
