@@ -31,6 +31,7 @@ _LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
 _BY_VELOCITY = {"sign(v)", "v|v|", "v^3"}
 _DAMPING_LEFT = 0.2  # of the damping, if most of it is friction that was fitted as damping
 _BEYOND = 1.25  # times a steady ramp
+_UP = 0.25  # of the least way down, and up as well: a remainder biases either way
 _FARTHEST = 2.3  # log stiffness: a factor of ten
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
@@ -67,11 +68,21 @@ def with_discrepancy(
             low, high = -1.0, 1.0
             width = max(_rest(base, fit, traced, family), _LEAST[family] * (family in left))
         else:
-            low, high = -1.0, 0.0
             width = _downwards(fit, traced, family)
+            low, high = -1.0, _upwards(limit, width) + _UP * _LEAST[family] / width
         factor = np.exp(width * rng.uniform(low, high, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
     return limit
+
+
+def _upwards(limit: CriticalStiffness, width: float) -> float:
+    """How far up a uniform factor must reach, over its reach down, to leave the 95 % point there.
+
+    Of a uniform variable from -1 to a, 5 % lie above a - 0.05 (1 + a).
+    """
+    q50, q95 = limit.quantile(np.array([0.5, 0.95]))
+    reach = float(np.log(q95 / q50)) / width if 0 < q50 < np.inf else 0.0
+    return (min(reach, 1.0) + 0.05) / 0.95
 
 
 def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:

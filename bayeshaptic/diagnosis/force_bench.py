@@ -16,7 +16,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.diagnosis.columns import line_transform
 from bayeshaptic.diagnosis.state import CHOOSE, FIT, State, share
-from bayeshaptic.effects.internal_force import CONNECTION, MOTOR, Place, forced_motion
+from bayeshaptic.effects.internal_force import CONNECTION, LOAD, MOTOR, Place, forced_motion
 from bayeshaptic.effects.nonlinear import CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.likelihood import Likelihood
@@ -83,17 +83,19 @@ class ForceBench:
         period = self.recording.period_s
         x, v = linear_motion(system, self.force, period, 0, SUBSTEPS)
         found = {}
-        if CONNECTION in places and len(system.mechanism.masses) > 1:
-            x2, v2 = linear_motion(system, self.force, period, 1, SUBSTEPS)
-            found[CONNECTION] = Motion(x - x2, v - v2, self.force)
-        if MOTOR in places:
+        along: Floats | float = 0.0
+        if {MOTOR, LOAD} & set(places):
             # The measured position has what a hand does, and where the device stands.
             measured = self.recording.position
             grid, samples = np.arange(len(x)) / SUBSTEPS, np.arange(len(measured))
             besides = measured - x[::SUBSTEPS] - self._extra
             slow = self._hand(besides) if self.held else self._drift(besides, theta)
-            v = v + np.interp(grid, samples, slow)
-            found[MOTOR] = Motion(np.interp(grid, samples, measured), v, self.force)
+            along = np.interp(grid, samples, slow)
+            found[MOTOR] = Motion(np.interp(grid, samples, measured), v + along, self.force)
+        if {CONNECTION, LOAD} & set(places) and len(system.mechanism.masses) > 1:
+            x2, v2 = linear_motion(system, self.force, period, 1, SUBSTEPS)
+            found[CONNECTION] = Motion(x - x2, v - v2, self.force)
+            found[LOAD] = Motion(x2, v2 + along, self.force)  # what is slow moves both masses
         return found
 
     def _hand(self, besides: Floats) -> Floats:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bayeshaptic.diagnosis.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.force_fit import fit_force
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
-from bayeshaptic.effects.internal_force import CONNECTION, MOTOR, Place
+from bayeshaptic.effects.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear import CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.effects.registry import effects
 from bayeshaptic.inference.least_squares import Fit, polish, summarise
@@ -50,7 +50,7 @@ def nonlinear_trials(
     if recording is None:
         return []
     bench = ForceBench(state, recording)
-    motion = bench.motions(state.fit.theta, (MOTOR, CONNECTION))
+    motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     found: list[Point] = []
     known: dict[str, Point] = {}  # by the name of the strength: laws of friction have similar ones
     for kind in effects("nonlinear"):
@@ -170,4 +170,4 @@ def _with_points(etfe: Etfe, fit: Fit) -> Etfe:
 def _where(effect: NonlinearEffect) -> str:
     if isinstance(effect, CommandEffect):
         return ""
-    return " in the connection" if effect.place == CONNECTION else " at the motor"
+    return {CONNECTION: " in the connection", LOAD: " at the load"}.get(effect.place, " at the motor")

@@ -1,4 +1,4 @@
-"""Actuators that do not give what is commanded: saturation, and a dead zone."""
+"""Actuators that do not give what is commanded: saturation, hard or gradual, and a dead zone."""
 
 from __future__ import annotations
 
@@ -32,6 +32,38 @@ class ActuatorSaturation(CommandEffect):
 
     def lost(self, strength: float, command: Floats) -> Floats:
         return command - np.clip(command, -strength, strength)
+
+
+@register
+class SoftSaturation(CommandEffect):
+    """The actuator's force approaches its limit L gradually: u / (1 + |u/L|^p)^(1/p).
+
+    C. Rapp, 2nd European Conf. on Satellite Communications, 1991. The larger the sharpness p, the
+    harder the limit; u is given in full where it is small.
+    """
+
+    name = "soft_saturation"
+    title = "gradual saturation of the actuator"
+    columns = ("u^3",)
+    strength = ("force_limit", "force")
+    dimensions = {"sharpness": "number"}
+    tuned = ("sharpness",)
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        return (cls(shape={"sharpness": 2.5}),)
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return np.abs(motion.command).max() * np.array([2.0, 1.0, 0.6, 0.35])
+
+    def lost(self, strength: float, command: Floats) -> Floats:
+        sharpness = self.shape["sharpness"]
+        # log(1 + r^p)/p without overflow for a sharp limit.
+        with np.errstate(divide="ignore"):
+            bend = np.logaddexp(0.0, sharpness * np.log(np.abs(command) / strength)) / sharpness
+        return command * -np.expm1(-bend)
 
 
 @register

@@ -1,12 +1,13 @@
-"""Dry friction at the motor: Coulomb's law, Stribeck's, Dahl's; and drag."""
+"""Dry friction: Coulomb's law, Stribeck's, Dahl's; and forces with a power of the velocity."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
-from bayeshaptic.effects.internal_force import MOTOR, Law, Place, Step
+from bayeshaptic.effects.internal_force import LOAD, MOTOR, Law, Place, Step
 from bayeshaptic.effects.nonlinear import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
@@ -34,7 +35,7 @@ class CoulombFriction(NonlinearEffect):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        return (cls(),)
+        return tuple(cls(place) for place in (MOTOR, LOAD) if place in motion)
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return _force_scale(model, theta, motion) * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
@@ -126,14 +127,11 @@ class DahlFriction(NonlinearEffect):
         return force
 
 
-@register
-class Drag(NonlinearEffect):
-    """A force against the motion that grows with the square of the velocity."""
+class _PowerOfVelocity(NonlinearEffect):
+    """A force against the motion that grows with a power of the velocity."""
 
-    name = "drag"
-    title = "drag that grows with the square of the velocity"
     columns = _BY_VELOCITY
-    strength = ("drag_coefficient", "drag")
+    power: ClassVar[int]
 
     @classmethod
     def candidates(
@@ -142,13 +140,33 @@ class Drag(NonlinearEffect):
         return (cls(),)
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        scale = _force_scale(model, theta, motion) / motion.velocity.std() ** 2
+        scale = _force_scale(model, theta, motion) / motion.velocity.std() ** self.power
         return scale * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         def force(step: Step) -> Floats:
-            resistance = strength * np.abs(step.velocity)
+            resistance = strength * np.abs(step.velocity) ** (self.power - 1)
             # Implicit, so that it never reverses the motion.
             return -resistance * step.velocity / (1 + 0.5 * resistance * step.gain)
 
         return force
+
+
+@register
+class Drag(_PowerOfVelocity):
+    """A force -c v |v|, as of a turbulent fluid."""
+
+    name = "drag"
+    title = "drag that grows with the square of the velocity"
+    strength = ("drag_coefficient", "drag")
+    power = 2
+
+
+@register
+class CubicDamping(_PowerOfVelocity):
+    """A force -c v^3."""
+
+    name = "cubic_damping"
+    title = "damping that grows with the cube of the velocity"
+    strength = ("cubic_damping", "cubic_damping")
+    power = 3

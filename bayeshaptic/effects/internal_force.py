@@ -70,6 +70,7 @@ class Place:
 
 
 MOTOR = Place(0, None)
+LOAD = Place(1, None)
 CONNECTION = Place(0, 1)
 
 

@@ -24,8 +24,8 @@ def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
     ----------
     dimension : str
         "mass", "damping", "stiffness", "force", "position", "time", "frequency", "number",
-        "velocity", "cubic_stiffness" (force over position cubed), or "drag" (force over velocity
-        squared).
+        "velocity", "cubic_stiffness" (force over position cubed), "drag" (force over velocity
+        squared), or "cubic_damping" (force over velocity cubed).
     force_unit : {"N", "Nm", "A"}
         Without a torque constant a force is in amperes, and so a mass is in A s^2/rad.
     position_unit : {"m", "rad"}
@@ -44,6 +44,7 @@ def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
         "cubic_stiffness": f"{force}/{position_unit}^3",
         "velocity": f"{position_unit}/s",
         "drag": f"{force} s^2/{position_unit}^2",
+        "cubic_damping": f"{force} s^3/{position_unit}^3",
         "force": force,
     }[dimension]
 
