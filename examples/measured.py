@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import argparse
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from bayeshaptic.diagnosis.inverse_dynamics import InverseDynamics, inverse_dyna
 from bayeshaptic.diagnosis.periodic import FLOOR, PeriodicLoop, close_periodic
 from bayeshaptic.diagnosis.state import REPORT, share
 from bayeshaptic.diagnosis.steady_motion import LOAD, Period, one_period, with_floor
+from bayeshaptic.effects.nonlinear import Motion
+from bayeshaptic.recordings.spectra import PeriodicSpectra
 from bayeshaptic.recordings.windows import Windows, compress
 from bayeshaptic.report.figures.style import CYCLE, DATA, MODEL, OTHER, new_figure, panel
 
@@ -33,6 +36,8 @@ BENCH_COLUMNS = "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"
 WITNESS_COLUMNS = "time=time*1e-6,force=iq_refx[A],position=theta_my*-1[rad]"
 SERVO_COLUMNS = "time=t,force=vir*35.15[N],position=qm[m]"
 _LOAD_HZ = 120.0  # above it the load's encoder shows little but noise
+_FEWER = 10  # periods, to see what their number matters
+_BANDS_HZ = (11, 40, 70, 100, 150, 251)
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class Bench:
     ----------
     loop : PeriodicLoop
     windows : Windows
-        With the noise of a line at least `FLOOR` of its response.
+        With the noise of a line at least `FLOOR` of its response; they weigh the fit.
     held_out : ndarray of bool
         Lines that took part neither in fitting nor in choosing.
     steps : tuple of Balanced
@@ -62,11 +67,17 @@ class Bench:
     def names(self) -> list[str]:
         return ["base model", *(a.title for a in self.loop.chosen)]
 
+    @property
+    def noise(self) -> Floats:
+        """Standard deviation of a line over its response, shape (L,)."""
+        windows = self.windows
+        variance = windows.scatter / (windows.lines - 2)
+        return np.asarray(np.sqrt(variance) / np.abs(windows.target[:, 0]))
+
     def ratio(self, step: Balanced) -> NDArray[np.complex128]:
         """Model over measurement at every line."""
-        noise = np.sqrt(self.windows.scatter / (self.windows.lines - 2))
         measured = self.windows.target[:, 0]
-        return np.asarray(1 - step.residual * noise / measured)
+        return np.asarray(1 - step.residual * self.noise * np.abs(measured) / measured)
 
     def phase_deg(self, step: Balanced, lines: NDArray[np.bool_]) -> float:
         """Rms error of the phase over lines."""
@@ -81,22 +92,76 @@ class Bench:
         return np.asarray(np.abs(predicted / measured - 1)[excited])
 
 
-def bench(path: Path) -> Bench:
-    """Close the loop on the two-mass bench, and predict what was not fitted."""
-    etfe = bh.estimate_etfe(bh.read_recording(path, columns=BENCH_COLUMNS))
+def bench(path: Path) -> dict[str, Bench]:
+    """Close the loop on the two-mass bench, and predict what was not fitted.
+
+    Returns
+    -------
+    dict
+        Where the noise of a line is taken from, to the models fitted with that noise. The first
+        is the noise that chose them.
+    """
+    recording = bh.read_recording(path, columns=BENCH_COLUMNS)
+    etfe = bh.estimate_etfe(recording)
+    assert isinstance(etfe.spectra, PeriodicSpectra)
     witness = bh.read_recording(path, columns=WITNESS_COLUMNS)
     fit = bh.least_squares(bh.free(), etfe)
     loop = close_periodic(etfe, fit)
     windows, period = compress(with_floor(etfe, FLOOR)), one_period(etfe)
-    held_out = share(windows, REPORT)
+    held_out, load = share(windows, REPORT), one_period(etfe, witness.position)
     stages = [
         balance(fit.model, windows, period, (), fit.theta),
         *(a.balanced for a in loop.chosen),
     ]
-    steps = tuple(
-        balance(s.model, windows, period, s.forces, s.theta, s.strength, ~held_out) for s in stages
-    )
-    return Bench(loop, windows, held_out, steps, one_period(etfe, witness.position))
+    # The recording ends with its last period.
+    kept = recording.position[-etfe.spectra.periods * period.samples :].reshape(-1, period.samples)
+    noises = {"beside the line": windows} | {
+        f"between the last {count} periods": between_periods(windows, period, kept[-count:])
+        for count in (len(kept), _FEWER)
+    }
+    found = {}
+    for source, weighed in noises.items():
+        steps = tuple(_refit(stage, weighed, period, ~held_out) for stage in stages)
+        found[source] = Bench(loop, weighed, held_out, steps, load)
+    return found
+
+
+def _refit(step: Balanced, windows: Windows, period: Period, fitted: NDArray[np.bool_]) -> Balanced:
+    """A step fitted to some of the lines."""
+    # Without forces a balance is one fit, and its motions are those it started from.
+    for _ in range(1 if step.forces else 2):
+        step = balance(step.model, windows, period, step.forces, step.theta, step.strength, fitted)
+    return step
+
+
+def close_again(path: Path, windows: Windows) -> PeriodicLoop:
+    """The loop on the two-mass bench with another noise from the start, that of `windows`."""
+    etfe = bh.estimate_etfe(bh.read_recording(path, columns=BENCH_COLUMNS))
+    assert isinstance(etfe.spectra, PeriodicSpectra)
+    own = replace(etfe, spectra=replace(etfe.spectra, scatter=windows.scatter))
+    return close_periodic(own, bh.least_squares(bh.free(), own), floor=0.0)
+
+
+def between_periods(windows: Windows, period: Period, kept: Floats) -> Windows:
+    """The same lines; their noise is that of the mean of the periods, from the periods' scatter.
+
+    Parameters
+    ----------
+    windows : Windows
+    period : Period
+    kept : ndarray, shape (M, N)
+        Position, one period a row.
+
+    Returns
+    -------
+    Windows
+        With the noise of a line at least `FLOOR` of its response.
+    """
+    lines = np.fft.rfft(kept, axis=1)[:, period.excited]
+    sd = np.sqrt(np.var(lines, axis=0, ddof=1) / len(kept))
+    relative = np.maximum(sd / np.abs(lines.mean(axis=0)), FLOOR)
+    variance = (relative * np.abs(windows.target[:, 0])) ** 2
+    return replace(windows, scatter=(windows.lines - 2) * variance)
 
 
 def servo(path: Path) -> tuple[InverseDynamics, InverseDynamics]:
@@ -111,7 +176,6 @@ def draw_bench(found: Bench, folder: Path) -> None:
     hertz = found.windows.frequency_hz[:, 0]
     figure = new_figure(4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    noise = np.sqrt(found.windows.scatter / (found.windows.lines - 2))
     for step, colour, name in ((first, OTHER, "base model"), (last, MODEL, "with what was found")):
         size = 100 * np.abs(1 - found.ratio(step))
         upper.semilogy(hertz, size, color=colour, lw=0.7)
@@ -119,8 +183,7 @@ def draw_bench(found: Bench, folder: Path) -> None:
             hertz[found.held_out], size[found.held_out], "o", ms=3, color=colour, label=name
         )
         lower.plot(hertz, np.degrees(np.angle(found.ratio(step))), color=colour, lw=0.8)
-    relative = 100 * noise / np.abs(found.windows.target[:, 0])
-    upper.semilogy(hertz, relative, color=DATA, lw=0.6, ls=":", label="noise")
+    upper.semilogy(hertz, 100 * found.noise, color=DATA, lw=0.6, ls=":", label="noise")
     panel(upper, "", "error, % of response", title="Two-mass bench; dots: lines not fitted")
     upper.legend(fontsize=7, frameon=False)
     panel(lower, "frequency, Hz", "phase error, degrees")
@@ -151,9 +214,7 @@ def draw_bench(found: Bench, folder: Path) -> None:
     speed = last.motions[LOAD].velocity
     for basis, strength in zip(last.forces, last.strength, strict=True):
         if basis.place == LOAD and basis.name == "drag":
-            from bayeshaptic.effects.nonlinear import Motion
-
-            force = strength * basis.force(Motion(0 * velocity, velocity))
+            force = strength * basis.force(Motion(0 * velocity, velocity, 0 * velocity))
             axes.plot(velocity, force, color=MODEL, label=basis.title)
     damper = dict(zip(last.model.names, last.theta, strict=True))["b2"]
     axes.plot(velocity, -damper * velocity, color=DATA, ls="--", label="damper b2")
@@ -196,27 +257,49 @@ def main() -> None:
     given.output.mkdir(parents=True, exist_ok=True)
     published, further = servo(given.folder / SERVO)
     draw_servo(published, further, given.output)
-    for found in (published, further):
-        for term in found.terms:
-            print(f"{term.title}: %.4g +- %.2g {term.unit}" % found[term.name])
-        print(f"relative error {100 * found.relative_error:.2f} %, {found.rms:.2f} N rms")
+    for fitted in (published, further):
+        for term in fitted.terms:
+            print(f"{term.title}: %.4g +- %.2g {term.unit}" % fitted[term.name])
+        print(f"relative error {100 * fitted.relative_error:.2f} %, {fitted.rms:.2f} N rms")
     for added in further.steps:
         print(f"{added.term}: {added.held_out_rms:.2f} N on the half not fitted")
-    result = bench(given.folder / BENCH)
-    draw_bench(result, given.output)
+    benches = bench(given.folder / BENCH)
+    for source, found in benches.items():
+        print(f"noise {source}, median {100 * np.median(found.noise):.2f} % of the response")
+        print_steps(found)
+    result, between, _ = benches.values()
+    out = result.held_out
     for name, step in zip(result.names, result.steps, strict=True):
-        out = result.held_out
-        load = result.load_error(step)
-        print(
-            f"{name}: weighted rms {step.rms(~out):.2f} fitted, {step.rms(out):.2f} held out; "
-            f"phase {result.phase_deg(step, out):.2f} degrees held out, "
-            f"{result.phase_deg(step, out | ~out):.2f} all; load off by "
-            f"{100 * np.median(load):.2f} % (median), {100 * np.sqrt(np.mean(load**2)):.2f} % (rms)"
-        )
+        left = np.abs(1 - result.ratio(step)[out]) / between.noise[out]
+        print(f"{name}, as fitted first: {np.sqrt(np.mean(left**2)):.2f} of the second noise")
+    again = close_again(given.folder / BENCH, between.windows)
+    print("accepted with the second noise from the start:", *(a.title for a in again.chosen))
+    for attempt in again.history[-1][:3]:
+        gains = f"{attempt.gain_fit:.1f} where fitted, {attempt.gain_choose:.1f} where judged"
+        print(f"{attempt.title}, not accepted: gain {gains}")
+    draw_bench(result, given.output)
     final = result.steps[-1]
     for basis, value, sd in zip(final.forces, final.strength, final.strength_sd, strict=True):
         print(f"{basis.title}: {value:.4g} +- {sd * final.rms():.2g} {basis.unit}")
     print(dict(zip(final.model.names, np.round(final.theta, 7), strict=True)))
+
+
+def print_steps(found: Bench) -> None:
+    """Error of every step on the lines and on the load's encoder."""
+    out, every = found.held_out, np.full(len(found.held_out), True)
+    for name, step in zip(found.names, found.steps, strict=True):
+        load = found.load_error(step)
+        print(
+            f"{name}: weighted rms {step.rms(~out):.2f} fitted, {step.rms(out):.2f} held out; "
+            f"phase {found.phase_deg(step, out):.2f} degrees held out, "
+            f"{found.phase_deg(step, every):.2f} all; load off by "
+            f"{100 * np.median(load):.2f} % (median), {100 * np.sqrt(np.mean(load**2)):.2f} % (rms)"
+        )
+    hertz = found.windows.frequency_hz[:, 0]
+    size = 100 * np.abs(1 - found.ratio(found.steps[-1]))
+    for low, high in pairwise(_BANDS_HZ):
+        inside = out & (hertz >= low) & (hertz < high)
+        print(f"{low} to {high} Hz: {np.median(size[inside]):.1f} % off, held out (median)")
 
 
 if __name__ == "__main__":

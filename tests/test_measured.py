@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_examples import EXAMPLES, load
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.harmonic_balance import Basis, balance
@@ -217,3 +218,38 @@ def test_drag_predicts_lines_and_a_load_that_were_not_fitted(measured: Find) -> 
         return float(np.median(np.abs(predicted / load.transform(load.position)[inside] - 1)))
 
     assert load_error(found.motions) < 0.9 * load_error(base.motions)
+
+
+def test_the_noise_between_periods_is_that_of_their_mean(dragged: Recording) -> None:
+    example = load(EXAMPLES / "measured.py")
+    etfe = bh.estimate_etfe(dragged)
+    windows, period = compress(etfe), one_period(etfe)
+    rng = np.random.default_rng(5)
+    periods = rng.standard_normal((400, period.samples)) * 1e-4 + period.position
+    noisy = example.between_periods(windows, period, periods)
+    found = np.sqrt(noisy.scatter / (noisy.lines - 2)) / np.abs(windows.target[:, 0])
+    line = np.abs(np.fft.rfft(period.position)[period.excited])
+    expected = 1e-4 * np.sqrt(period.samples / 400) / line
+    above = (expected > 1.3 * example.FLOOR) & (expected < 0.05)
+    assert np.any(above) and np.any(expected < 0.7 * example.FLOOR)
+    assert found[above] == pytest.approx(expected[above], rel=0.2)
+    assert np.min(found) == pytest.approx(example.FLOOR)
+
+
+def test_the_figures_of_the_bench_on_lines_that_were_not_fitted(
+    measured: Find, tmp_path: Path
+) -> None:
+    example = load(EXAMPLES / "measured.py")
+    benches = example.bench(measured("two_mass_bench/MultisineTypeA.mat"))
+    result, between, _ = benches.values()
+    out = result.held_out
+    assert result.steps[0].rms(out) == pytest.approx(18.0, abs=0.5)
+    assert result.steps[-1].rms(out) < 7.2
+    assert between.steps[0].rms(out) == pytest.approx(15.0, abs=0.5)
+    assert between.steps[-1].rms(out) < 5.3
+    assert result.phase_deg(result.steps[-1], out) < 1.5
+    assert between.phase_deg(between.steps[-1], out) < 1.25
+    for found in (result, between):
+        assert np.median(found.load_error(found.steps[-1])) < 0.022
+    example.draw_bench(result, tmp_path)
+    assert len(list(tmp_path.iterdir())) == 3
