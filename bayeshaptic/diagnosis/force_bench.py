@@ -146,6 +146,21 @@ class ForceBench:
             self._extra = self.added_motion(effect, strength, theta)
             etfe, windows = self.without(self._extra, theta)
             theta = polish(self.model, windows.part(share(windows, FIT)), theta)
+        return self._valued(effect, strength, theta, etfe, windows)
+
+    def as_it_is(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Point:
+        """Simulate and take off, the linear parameters as given."""
+        self._extra = self.added_motion(effect, strength, theta)
+        return self._valued(effect, strength, theta, *self.without(self._extra, theta))
+
+    def _valued(
+        self,
+        effect: NonlinearEffect,
+        strength: float,
+        theta: Floats,
+        etfe: Etfe,
+        windows: Windows,
+    ) -> Point:
         own = replace(self.recording, position=self.recording.position - self._extra)
         gains = self._likelihoods(theta, windows) - self._base
         return Point(

@@ -48,31 +48,48 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     effect = found.effect
     names, sign = effect.tuned, float(np.sign(found.strength))
     logs = np.log([abs(found.strength), *(effect.shape[name] for name in names)])
+    highest = np.log([np.inf, *(effect.most.get(name, np.inf) for name in names)])
+    here, low, high = search_box(bench.model)
     first, best = logs.copy(), found
 
     def at(logs: Floats) -> tuple[NonlinearEffect, float]:
         return _shaped(effect, names, logs), sign * float(np.exp(logs[0]))
 
-    def tried(logs: Floats, theta: Floats) -> Point:
-        return bench.point(*at(logs), theta, rounds=2)
-
-    nudges = _nudges(bench)
+    nudges, near, failed = _nudges(bench), 1.0, False
     for _ in range(_ROUNDS):
-        theta, step = _joint_step(bench, at, logs, best.theta, logs - first, nudges)
-        share, point = 1.0, tried(logs + step, theta)
+        towards, step = _joint_step(bench, at, logs, best.theta, logs - first, near * nudges, highest, near)
+        start, end = here.coordinate(np.stack([best.theta, towards]))
+
+        def tried(
+            share: float, logs: Floats = logs, step: Floats = step, ends: Floats = (start, end)
+        ) -> Point:
+            phi = np.clip(ends[0] + share * (ends[1] - ends[0]), low, high)
+            moved = np.minimum(logs + share * step, highest)
+            return bench.as_it_is(*at(moved), here.natural(phi[None])[0])
+
+        share, point = 1.0, tried(1.0)
         if point.gain_fit < best.gain_fit:
-            share, point = _BACK, tried(logs + _BACK * step, best.theta)
+            share = _BACK
+            held = bench.point(*at(logs + _BACK * step), best.theta, rounds=2)
+            point = max(tried(_BACK), held, key=lambda point: point.gain_fit)
         else:  # slopes of a motion that sticks are rough, and steps along a ridge too short
             while share * np.abs(step).max() < _MOST / _ON:
-                further = tried(logs + _ON * share * step, point.theta)
+                further = tried(_ON * share)
                 if further.gain_fit < point.gain_fit + _NO_GAIN:
                     break
                 share, point = _ON * share, further
+            held = bench.point(point.effect, point.strength, point.theta)
+            point = max(point, held, key=lambda point: point.gain_fit)
         gained = point.gain_fit - best.gain_fit
         if gained > 0:
-            logs, best = logs + share * step, point
-        if gained < _NO_GAIN:
+            logs, best = np.minimum(logs + share * step, highest), point
+        if gained < _NO_GAIN and failed:
             break
+        failed = gained < _NO_GAIN
+        if failed:
+            near = min(_ON*near,1.0) if near < 0.5 else _BACK
+        else:
+            near = float(np.clip(share * np.abs(step).max() / _NUDGE, 0.1, 1.0))
     return best
 
 
@@ -99,6 +116,8 @@ def _joint_step(
     theta: Floats,
     moved: Floats,
     nudges: Floats,
+    highest: Floats,
+    near: float,
 ) -> tuple[Floats, Floats]:
     """Linear parameters, and the change of log strength and shape, that fit best together."""
 
@@ -107,7 +126,11 @@ def _joint_step(
 
     extra = motion(logs, theta)
     bench.remember(extra)
-    slopes = [(motion(logs + _NUDGE * unit, theta) - extra) / _NUDGE for unit in np.eye(len(logs))]
+    sides = near * np.where(np.isfinite(highest), -_NUDGE, _NUDGE)  # away from a bound
+    slopes = [
+        (motion(logs + side * unit, theta) - extra) / side
+        for side, unit in zip(sides, np.eye(len(logs)), strict=True)
+    ]
     # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
     if at(logs)[0].place != MOTOR or not bench.held:
         here, _, _ = search_box(bench.model)
@@ -120,11 +143,16 @@ def _joint_step(
     # The many slopes leave too little of a window to read its noise from.
     noise = Likelihood(bench.model, bench.without(extra, theta)[1]).noise_variance
     chosen = share(windows, FIT)
-    return _solved(bench, windows.part(chosen), noise[chosen], theta, moved)
+    return _solved(bench, windows.part(chosen), noise[chosen], theta, moved, highest - logs)
 
 
 def _solved(
-    bench: ForceBench, windows: Windows, noise: Floats, theta: Floats, moved: Floats
+    bench: ForceBench,
+    windows: Windows,
+    noise: Floats,
+    theta: Floats,
+    moved: Floats,
+    room: Floats,
 ) -> tuple[Floats, Floats]:
     """The step from windows that have the slopes as further inputs."""
     here, low, high = search_box(bench.model)
@@ -147,6 +175,6 @@ def _solved(
 
     start = np.concatenate([here.coordinate(theta[None])[0], np.zeros(inputs)])[None]
     low = np.concatenate([low, np.full(inputs, -_MOST)])
-    high = np.concatenate([high, np.full(inputs, _MOST)])
+    high = np.concatenate([high, np.minimum(room, _MOST)])
     phi, _ = minimise(residuals, start, low, high, 20, 1e-4)
     return np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:]

@@ -59,6 +59,8 @@ class NonlinearEffect(ABC):
     """Whether the strength may be negative."""
     tuned: ClassVar[tuple[str, ...]] = ()
     """The shape's parameters that are fitted from the grid on; all above zero."""
+    most: ClassVar[Mapping[str, float]] = {}
+    """The largest values of those that have one."""
     ties: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -62,6 +63,7 @@ class Backlash(NonlinearEffect):
     strength = ("half_gap", "position")
     dimensions = {"damping_in_gap": "number"}
     tuned = ("damping_in_gap",)
+    most: ClassVar[Mapping[str, float]] = {"damping_in_gap": 1.0}
 
     @classmethod
     def candidates(
@@ -69,7 +71,7 @@ class Backlash(NonlinearEffect):
     ) -> tuple[NonlinearEffect, ...]:
         if CONNECTION not in motion:
             return ()
-        return (cls(CONNECTION, {"damping_in_gap": 0.5}),)
+        return (cls(CONNECTION, {"damping_in_gap": 0.9}),)
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return float(motion.position.std()) * np.array([0.05, 0.1, 0.2, 0.3])
