@@ -62,10 +62,17 @@ def test_the_watch_asks_for_more_until_twenty_lie_below():
 
 def test_the_watch_does_not_ask_for_more_than_can_be_afforded(monkeypatch):
     whole = independent(30)
-    monkeypatch.setattr(tail, "MOST_DRAWS", 35 * 16)
+    monkeypatch.setattr(tail, "most_draws", lambda *_: 35 * 16)
     assert TailWatch(whole.model, risk=1e-4).steps_wanted(whole.chains) == 35
-    monkeypatch.setattr(tail, "MOST_DRAWS", 30 * 16)
+    monkeypatch.setattr(tail, "most_draws", lambda *_: 30 * 16)
     assert TailWatch(whole.model, risk=1e-4).steps_wanted(whole.chains) == 30
+
+
+def test_what_was_found_of_all_draws_is_not_taken_for_what_a_thinned_run_holds():
+    whole = independent(40)
+    half = critical_stiffness(Chains(whole.model, whole.chains[:, :20]))
+    fresh, resumed = (critical_stiffness(whole, max_draws=320, before=b) for b in (None, half))
+    assert np.array_equal(fresh.samples, resumed.samples)
 
 
 @pytest.fixture(scope="module")

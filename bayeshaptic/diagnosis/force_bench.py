@@ -149,7 +149,7 @@ class ForceBench:
         return self._valued(effect, strength, theta, etfe, windows)
 
     def as_it_is(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Point:
-        """Simulate and take off, the linear parameters as given."""
+        """Simulate and take off, with the linear parameters as given."""
         self._extra = self.added_motion(effect, strength, theta)
         return self._valued(effect, strength, theta, *self.without(self._extra, theta))
 

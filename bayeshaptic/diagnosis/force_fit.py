@@ -6,8 +6,7 @@ simulated, enter the likelihood as further inputs, and one Gauss-Newton fit move
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +23,51 @@ from bayeshaptic.recordings.windows import Windows
 Floats = NDArray[np.float64]
 
 _ROUNDS = 12
-_NO_GAIN = 0.5  # of the log likelihood
-_ON, _BACK = 3.0, 0.3  # factors on a step that goes well, and on one that does not
-_NUDGE = 0.1  # relative, of strength and shape for the slopes
+_NO_GAIN, _SHARE = 0.5, 1e-3  # of the log likelihood, and of what the force gains in all
+_ON, _BACK = 2.0, 0.3  # factors on a step that goes well, and on one that does not
+_NUDGE = 0.1  # relative, of strength and shape for the slopes; and the least share of it
+_NEAREST, _NEAR = 0.1, 0.5
 _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
 _MOST = 0.8  # log change a round
 _SHAPE_SD = 1.0  # log; how far a shape may be from the grid's
+
+
+@dataclass(frozen=True)
+class _Form:
+    """What of a force is fitted: the logarithms of its strength and of its tuned shape."""
+
+    effect: NonlinearEffect
+    sign: float
+    highest: Floats
+    """The largest logarithms, shape (1 + shape,)."""
+
+    @classmethod
+    def of(cls, found: Point) -> _Form:
+        bounds = [found.effect.most.get(name, np.inf) for name in found.effect.tuned]
+        return cls(found.effect, float(np.sign(found.strength)), np.log([np.inf, *bounds]))
+
+    def logs(self, found: Point) -> Floats:
+        shape = [found.effect.shape[name] for name in self.effect.tuned]
+        return np.asarray(np.log([abs(found.strength), *shape]))
+
+    def at(self, logs: Floats) -> tuple[NonlinearEffect, float]:
+        """The effect and its strength."""
+        logs = np.minimum(logs, self.highest)
+        tuned = zip(self.effect.tuned, np.exp(logs[1:]).tolist(), strict=True)
+        shaped = replace(self.effect, shape={**self.effect.shape, **dict(tuned)})
+        return shaped, self.sign * float(np.exp(logs[0]))
+
+
+@dataclass(frozen=True)
+class _Step:
+    """Where to go: the linear parameters there, and the change of the logarithms."""
+
+    theta: Floats
+    logs: Floats
+
+    @property
+    def size(self) -> float:
+        return float(np.abs(self.logs).max())
 
 
 def fit_force(bench: ForceBench, found: Point) -> Point:
@@ -45,57 +83,48 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     -------
     Point
     """
-    effect = found.effect
-    names, sign = effect.tuned, float(np.sign(found.strength))
-    logs = np.log([abs(found.strength), *(effect.shape[name] for name in names)])
-    highest = np.log([np.inf, *(effect.most.get(name, np.inf) for name in names)])
-    here, low, high = search_box(bench.model)
-    first, best = logs.copy(), found
-
-    def at(logs: Floats) -> tuple[NonlinearEffect, float]:
-        return _shaped(effect, names, logs), sign * float(np.exp(logs[0]))
-
+    form = _Form.of(found)
+    first, best = form.logs(found), found
     nudges, near, failed = _nudges(bench), 1.0, False
     for _ in range(_ROUNDS):
-        towards, step = _joint_step(bench, at, logs, best.theta, logs - first, near * nudges, highest, near)
-        start, end = here.coordinate(np.stack([best.theta, towards]))
-
-        def tried(
-            share: float, logs: Floats = logs, step: Floats = step, ends: Floats = (start, end)
-        ) -> Point:
-            phi = np.clip(ends[0] + share * (ends[1] - ends[0]), low, high)
-            moved = np.minimum(logs + share * step, highest)
-            return bench.as_it_is(*at(moved), here.natural(phi[None])[0])
-
-        share, point = 1.0, tried(1.0)
-        if point.gain_fit < best.gain_fit:
-            share = _BACK
-            held = bench.point(*at(logs + _BACK * step), best.theta, rounds=2)
-            point = max(tried(_BACK), held, key=lambda point: point.gain_fit)
-        else:  # slopes of a motion that sticks are rough, and steps along a ridge too short
-            while share * np.abs(step).max() < _MOST / _ON:
-                further = tried(_ON * share)
-                if further.gain_fit < point.gain_fit + _NO_GAIN:
-                    break
-                share, point = _ON * share, further
-            held = bench.point(point.effect, point.strength, point.theta)
-            point = max(point, held, key=lambda point: point.gain_fit)
+        logs = form.logs(best)
+        step = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near)
+        factor, point = _advanced(bench, form, best, step)
         gained = point.gain_fit - best.gain_fit
-        if gained > 0:
-            logs, best = np.minimum(logs + share * step, highest), point
-        if gained < _NO_GAIN and failed:
+        best = point if gained > 0 else best
+        enough = max(_NO_GAIN, _SHARE * best.gain_fit)
+        if gained < enough and failed:
             break
-        failed = gained < _NO_GAIN
-        if failed:
-            near = min(_ON*near,1.0) if near < 0.5 else _BACK
-        else:
-            near = float(np.clip(share * np.abs(step).max() / _NUDGE, 0.1, 1.0))
+        failed = gained < enough
+        if failed:  # once more, with slopes over another distance
+            near = min(_ON * near, 1.0) if near < _NEAR else _BACK
+        else:  # slopes over no more than what is still to go
+            near = float(np.clip(factor * step.size / _NUDGE, _NEAREST, 1.0))
     return best
 
 
-def _shaped(effect: NonlinearEffect, names: tuple[str, ...], logs: Floats) -> NonlinearEffect:
-    values = {name: float(np.exp(log)) for name, log in zip(names, logs[1:], strict=True)}
-    return replace(effect, shape={**effect.shape, **values})
+def _advanced(bench: ForceBench, form: _Form, best: Point, step: _Step) -> tuple[float, Point]:
+    """The best point found along `step` from `best`, and how many steps away it is."""
+    here, low, high = search_box(bench.model)
+    start, end = here.coordinate(np.stack([best.theta, step.theta]))
+    logs = form.logs(best)
+
+    def along(factor: float) -> Point:
+        phi = np.clip(start + factor * (end - start), low, high)
+        return bench.as_it_is(*form.at(logs + factor * step.logs), here.natural(phi[None])[0])
+
+    factor, point = 1.0, along(1.0)
+    if point.gain_fit < best.gain_fit:
+        polished = bench.point(*form.at(logs + _BACK * step.logs), best.theta, rounds=2)
+        return _BACK, max(along(_BACK), polished, key=lambda point: point.gain_fit)
+    # Slopes of a motion that sticks are rough, and steps along a ridge too short.
+    while factor * step.size < _MOST / _ON:
+        further = along(_ON * factor)
+        if further.gain_fit < point.gain_fit + _NO_GAIN:
+            break
+        factor, point = _ON * factor, further
+    polished = bench.point(point.effect, point.strength, point.theta)
+    return factor, max(point, polished, key=lambda point: point.gain_fit)
 
 
 def _nudges(bench: ForceBench) -> Floats:
@@ -111,29 +140,32 @@ def _nudges(bench: ForceBench) -> Floats:
 
 def _joint_step(
     bench: ForceBench,
-    at: Callable[[Floats], tuple[NonlinearEffect, float]],
+    form: _Form,
     logs: Floats,
     theta: Floats,
     moved: Floats,
     nudges: Floats,
-    highest: Floats,
     near: float,
-) -> tuple[Floats, Floats]:
-    """Linear parameters, and the change of log strength and shape, that fit best together."""
+) -> _Step:
+    """To the linear parameters, strength and shape that fit best together.
+
+    `near` is the share of the usual distances to take the slopes over.
+    """
 
     def motion(logs: Floats, theta: Floats) -> Floats:
-        return bench.added_motion(*at(logs), theta)
+        return bench.added_motion(*form.at(logs), theta)
 
     extra = motion(logs, theta)
     bench.remember(extra)
-    sides = near * np.where(np.isfinite(highest), -_NUDGE, _NUDGE)  # away from a bound
+    sides = near * np.where(np.isfinite(form.highest), -_NUDGE, _NUDGE)  # away from a bound
     slopes = [
         (motion(logs + side * unit, theta) - extra) / side
         for side, unit in zip(sides, np.eye(len(logs)), strict=True)
     ]
     # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
-    if at(logs)[0].place != MOTOR or not bench.held:
+    if form.effect.place != MOTOR or not bench.held:
         here, _, _ = search_box(bench.model)
+        nudges = near * nudges
         around = here.natural(here.coordinate(theta[None]) + np.diag(nudges))
         slopes += [
             (motion(logs, vector) - extra) / nudge
@@ -143,7 +175,7 @@ def _joint_step(
     # The many slopes leave too little of a window to read its noise from.
     noise = Likelihood(bench.model, bench.without(extra, theta)[1]).noise_variance
     chosen = share(windows, FIT)
-    return _solved(bench, windows.part(chosen), noise[chosen], theta, moved, highest - logs)
+    return _solved(bench, windows.part(chosen), noise[chosen], theta, moved, form.highest - logs)
 
 
 def _solved(
@@ -153,8 +185,11 @@ def _solved(
     theta: Floats,
     moved: Floats,
     room: Floats,
-) -> tuple[Floats, Floats]:
-    """The step from windows that have the slopes as further inputs."""
+) -> _Step:
+    """The step from windows that have the slopes as further inputs.
+
+    Strength and shape have moved by the logarithms `moved` so far, and may by up to `room`.
+    """
     here, low, high = search_box(bench.model)
     size, inputs = bench.model.size, len(moved)
     nodes = windows.frequency_hz.shape[1]
@@ -177,4 +212,4 @@ def _solved(
     low = np.concatenate([low, np.full(inputs, -_MOST)])
     high = np.concatenate([high, np.minimum(room, _MOST)])
     phi, _ = minimise(residuals, start, low, high, 20, 1e-4)
-    return np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:]
+    return _Step(np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:])

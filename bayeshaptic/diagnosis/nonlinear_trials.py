@@ -6,7 +6,7 @@ parameters fitted anew: a profile.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from bayeshaptic.recordings.random_excitation import points as points_of
 from bayeshaptic.stability.critical import critical_stiffness
 
 Floats = NDArray[np.float64]
+_Called = list[NonlinearEffect]  # variants of one effect
 
 _LAW_SD = 0.03  # relative; how well a law and its shape are known at best
 _HOPELESS = 0.3  # share of the best gain so far below which a scan is not followed up
@@ -51,33 +52,45 @@ def nonlinear_trials(
         return []
     bench = ForceBench(state, recording)
     motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
-    found: list[Point] = []
-    known: dict[str, Point] = {}  # by the name of the strength: laws of friction have similar ones
+    firsts: dict[str, _Called] = {}  # by the name of the strength: laws of friction share one
+    others: list[_Called] = []
     for kind in effects("nonlinear"):
         if kind.name in {a.name for a in state.accepted}:
             continue
         called = [e for e in kind.candidates(state.model, motion) if e.called_for(raised)]
-        if not called:
+        if called and kind.strength[0] in firsts:
+            others.append(called)
+        elif called:
+            firsts[kind.strength[0]] = called
+    found = _fitted(bench, [_search(bench, called, motion, tick) for called in firsts.values()])
+    known = {point.effect.strength[0]: point for point in found}
+    nearby = [
+        _search(bench, called, motion, tick, known.get(called[0].strength[0])) for called in others
+    ]
+    return [_trial(bench, point) for point in _fitted(bench, nearby, found)]
+
+
+def _fitted(bench: ForceBench, points: list[Point], before: Sequence[Point] = ()) -> list[Point]:
+    """The points fitted, the most promising first; the hopeless as they are, the faint left out."""
+    found = list(before)
+    for point in sorted(points, key=lambda point: -point.gain_fit):
+        if point.gain_fit < _FAINT:
             continue
-        if tick:
-            tick(kind.title)
-        best = _search(bench, called, motion, known.get(kind.strength[0]))
-        if best.gain_fit < _FAINT:
-            continue
-        if best.gain_fit > _HOPELESS * max((point.gain_fit for point in found), default=0.0):
-            best = fit_force(bench, best)
-            known.setdefault(kind.strength[0], best)
-        found.append(best)
-    return [_trial(bench, point) for point in found]
+        best = max((other.gain_fit for other in found), default=0.0)
+        found.append(fit_force(bench, point) if point.gain_fit > _HOPELESS * best else point)
+    return found
 
 
 def _search(
     bench: ForceBench,
-    variants: list[NonlinearEffect],
+    variants: _Called,
     motion: dict[Place, Motion],
-    known: Point | None,
+    tick: Callable[[str], None] | None = None,
+    known: Point | None = None,
 ) -> Point:
     """The best variant on a coarse scan of strengths, or beside the strength of a known force."""
+    if tick:
+        tick(variants[0].title)
     theta = bench.state.fit.theta
     points: list[Point] = []
     for effect in variants:
@@ -170,4 +183,6 @@ def _with_points(etfe: Etfe, fit: Fit) -> Etfe:
 def _where(effect: NonlinearEffect) -> str:
     if isinstance(effect, CommandEffect):
         return ""
-    return {CONNECTION: " in the connection", LOAD: " at the load"}.get(effect.place, " at the motor")
+    return {CONNECTION: " in the connection", LOAD: " at the load"}.get(
+        effect.place, " at the motor"
+    )

@@ -111,12 +111,15 @@ def sampling_coordinates(model: Model, theta: Floats, sd: Floats) -> Coordinates
         sums = (*_SUMS, "stiffness")
     known = set()
     for name, value, error in zip(model.names, theta, sd, strict=True):
-        prior = model.prior(name)
-        if prior.coordinate == "log" and model.parameter(name).dimension in sums:
-            believed = 0.5 * float(np.log(prior.quantile(0.84) / prior.quantile(0.16)))
-            # A fit at a bound, where the error is nan, says nothing of where the peak is.
-            if error > 0 and np.hypot(1 / believed, value / error) > 1 / _KNOWN:
-                known.add(name)
+        prior, dimension = model.prior(name), model.parameter(name).dimension
+        if prior.coordinate != "log" or dimension not in sums:
+            continue
+        believed = 0.5 * float(np.log(prior.quantile(0.84) / prior.quantile(0.16)))
+        # A fit at a bound, where the error is nan, says nothing of where the peak is; but where
+        # it leaves one of two springs side by side nothing, the ridge between them is straight.
+        left_out = dimension == "stiffness" and not error > 0
+        if left_out or (error > 0 and np.hypot(1 / believed, value / error) > 1 / _KNOWN):
+            known.add(name)
     return coordinates(model, known)
 
 

@@ -21,6 +21,7 @@ Ints = NDArray[np.int_]
 
 ENOUGH_BELOW = 20  # effective draws below a stiffness that is called safe
 MOST_DRAWS = 150_000  # 0.1 % risk needs 20,000 effective draws
+MOST_SEARCHED = 30_000  # of a loop without a finite set of poles, whose search is slow
 _CHUNK = 4096
 _CHECKED = 64
 
@@ -128,7 +129,7 @@ def critical_stiffness(
     source: Any,
     theta: ArrayLike | None = None,
     approximation: str = "exact",
-    max_draws: int = MOST_DRAWS,
+    max_draws: int | None = None,
     before: CriticalStiffness | None = None,
 ) -> CriticalStiffness:
     """Critical stiffness of a model at its own values, of a fit, or of every draw of a posterior.
@@ -140,10 +141,12 @@ def critical_stiffness(
         With a model: the parameter vectors to use instead of its device file's.
     approximation : {"exact", "continuous"}
         "continuous" is the paper's P(s) e^{-s (td + T/2)}; it is not the truth of a sampled loop.
-    max_draws : int
-        A longer posterior is thinned, every so many steps of each chain.
+    max_draws : int, optional
+        A longer posterior is thinned, every so many steps of each chain; by default one of more
+        than 150,000 draws, 30,000 where the loop has no finite set of poles.
     before : CriticalStiffness, optional
-        Of this posterior while its chains were shorter: what has been found is not searched again.
+        Of all draws of this posterior while its chains were shorter: what has been found is not
+        searched again.
 
     Returns
     -------
@@ -166,17 +169,24 @@ def critical_stiffness(
     vectors, chains = _vectors(source, theta, max_draws)
     if model.period_s is None:
         raise InputError("the model has no sampling period: give period_s, or a device.")
+    if before is not None and len(vectors) < np.asarray(source.chains)[..., 0].size:
+        before = None  # thinned: other draws than those
     limit = _limits(model, vectors, chains, approximation, before)
     checkable = approximation == "exact" and rational(model.system(vectors[:1]))
     return _checked(limit, model, vectors) if checkable else limit
 
 
-def draws_of(posterior: Any, max_draws: int = MOST_DRAWS) -> Floats:
+def draws_of(posterior: Any, max_draws: int | None = None) -> Floats:
     """The draws of a posterior in the order of the samples of its `critical_stiffness`."""
     return _vectors(posterior, None, max_draws)[0]
 
 
-def _vectors(source: Any, theta: ArrayLike | None, max_draws: int) -> tuple[Floats, int]:
+def most_draws(model: Model, vector: Floats) -> int:
+    """How many draws `critical_stiffness` looks at, for parameters like `vector`, shape (P,)."""
+    return MOST_DRAWS if rational(model.system(vector[None])) else MOST_SEARCHED
+
+
+def _vectors(source: Any, theta: ArrayLike | None, max_draws: int | None) -> tuple[Floats, int]:
     """Parameter vectors, chain after chain, and the number of chains."""
     chains = getattr(source, "chains", None)
     if theta is not None or chains is None:
@@ -185,7 +195,8 @@ def _vectors(source: Any, theta: ArrayLike | None, max_draws: int) -> tuple[Floa
         vectors = np.atleast_2d(np.asarray(theta, float))
         return vectors, len(vectors)
     chains = np.asarray(chains)  # (E, S, W, P)
-    every = min(-(-chains[..., 0].size // max_draws), chains.shape[1])
+    most = max_draws or most_draws(source.model, chains[0, 0, 0])
+    every = min(-(-chains[..., 0].size // most), chains.shape[1])
     kept = np.swapaxes(chains[:, every - 1 :: every], 1, 2)
     return kept.reshape(-1, kept.shape[-1]), kept.shape[0] * kept.shape[1]
 

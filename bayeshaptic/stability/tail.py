@@ -11,18 +11,16 @@ from numpy.typing import NDArray
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.critical import (
     ENOUGH_BELOW,
-    MOST_DRAWS,
     CriticalStiffness,
     critical_stiffness,
+    most_draws,
 )
-from bayeshaptic.stability.crossings import rational
 
 Floats = NDArray[np.float64]
 
 LEAST_RISK = 0.001
 _MARGIN = 1.1
 _FEWEST = 2.0  # effective draws in the tail, below which the forecast takes that many
-_EVALUATED = 30_000  # draws of a loop without a finite set of poles, whose search is slow
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class TailWatch:
         """
         steps, draws = chains.shape[1], chains[..., 0].size
         model = self.model
-        most = MOST_DRAWS if rational(model.system(chains[0, 0, :1])) else _EVALUATED
+        most = most_draws(model, chains[0, 0, 0])
         if draws >= most:
             return steps
         self.limit = critical_stiffness(_Chains(model, chains), before=self.limit)
