@@ -1,11 +1,14 @@
 """Closing the loop on recordings it has never seen: names, classes, and the truth of K_CR.
 
-    python benchmarks/blind.py [--each N] [--clean N] [--pairs N] [--seed S] [--workers W]
+    python benchmarks/blind.py [--each N] [--others N] [--clean N] [--pairs N] [--seed S]
 
 Recordings come from the virtual bench, which shares no code with the models.  The base model is
-the device as declared, without the effect.  Printed for every effect: how often the class and the
-name (or a declared tie that holds it) are right, the error of K_CR's median in dB, and how often
-its 90 % interval covers the truth before and after the loop is closed.
+the device as declared, without the effect.  Strengths are the bench's typical ones, fixed by the
+device's motion.  Printed for every effect: "clear", the largest test of the base model's residual
+over its threshold, in the recording where that is least (of clean ones: where it is most; an effect
+is clear from three times that on); how often the class and the name (or a declared tie that holds
+it) are right; the error of K_CR's median in dB; how often its 90 % interval covers the truth before
+and after the loop is closed; and the largest error of the effect's own size.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ CASES = {
     "PHANToM free": ("phantom", False),
     "PHANToM held": ("phantom", True),
 }
+UNKNOWN = "unexplained"
 # Effect on the bench, fields unlike its typical strength, class, and the names that are right.
 SINGLE: dict[str, tuple[dict[str, Any], str, set[str]]] = {
     "second_mode": ({}, "linear", {"second_mode"}),
@@ -49,9 +53,19 @@ SINGLE: dict[str, tuple[dict[str, Any], str, set[str]]] = {
     "drag": ({}, "nonlinear", {"drag"}),
     "actuator_saturation": ({}, "nonlinear", {"actuator_saturation"}),
     "gain_drift": ({}, "time-varying", {"gain_drift"}),
-    "force_ripple": ({}, "nonlinear", {"force_ripple"}),
+    "force_ripple": ({}, "nonlinear", {UNKNOWN}),
     "position_clipping": ({}, "measurement", {"position_clipping"}),
+    # Outside the bench's own effects as well: see foreign.py. UNKNOWN: there is no law for it.
+    "tanh_saturation": ({}, "nonlinear", {"soft_saturation"}),
+    "velocity_cubed": ({}, "nonlinear", {"cubic_damping"}),
+    "load_friction": ({}, "nonlinear", {"coulomb_friction"}),
+    "lopsided_friction": ({}, "nonlinear", {"coulomb_friction", UNKNOWN}),
+    "asymmetric_gain": ({}, "nonlinear", {UNKNOWN}),
+    "coarse_command": ({}, "nonlinear", {UNKNOWN}),
+    "eccentric_encoder": ({}, "nonlinear", {UNKNOWN}),
+    "end_stops": ({}, "nonlinear", {UNKNOWN}),
 }
+LISTED = 15  # the first of them are those that the library promises
 PAIRS = (
     ("extra_delay", "coulomb_friction"),
     ("second_mode", "coulomb_friction"),
@@ -65,6 +79,16 @@ PAIRS = (
     ("backlash", "extra_delay"),
 )
 NEEDS_A_HAND = {"reflex", "grip_drift"}
+PAIR = "pair: "
+HIDDEN_BY_A_HAND = {"centring_stiffness"}  # the hand's own spring takes it up
+# What the effect's size is called on the bench and in the library.
+SIZES = {
+    "coulomb_friction": ("force", "friction_force"),
+    "load_friction": ("force", "friction_force"),
+    "second_mode": ("frequency_hz", "mode_hz"),
+    "backlash": ("gap", "half_gap"),
+    "drag": ("coefficient", "drag_coefficient"),
+}
 
 
 @dataclass(frozen=True)
@@ -92,10 +116,14 @@ class Outcome:
     before_db: float
     held_out: float
     seconds: float
+    clear: float
+    size_error: float | None
 
 
 def run(job: Job) -> Outcome:
     """Simulate, close the loop, compare."""
+    import foreign  # noqa: F401  (importing registers)
+
     from bayeshaptic.diagnosis.closed import close_loop
     from bayeshaptic.models import build_model
     from bayeshaptic.recordings import recording_from_arrays
@@ -136,7 +164,19 @@ def run(job: Job) -> Outcome:
         _db(before["q50"], truth),
         closed.after["held_out_weighted_rms"],
         took,
+        max(test.excess for test in closed.traced.before),
+        _size_error(bench, closed),
     )
+
+
+def _size_error(bench: Any, closed: Any) -> float | None:
+    """Relative error of the size of the first effect on the bench, where it was named."""
+    for effect in bench.effects:
+        there, here = SIZES.get(effect.name, ("", ""))
+        for found in closed.diagnosis["effects"]:
+            if here in found["parameters"]:
+                return float(found["parameters"][here]["q50"] / getattr(effect, there) - 1)
+    return None
 
 
 def _db(value: float, truth: float) -> float:
@@ -145,7 +185,11 @@ def _db(value: float, truth: float) -> float:
 
 def jobs_for(effects: tuple[str, ...], count: int, seed: int) -> list[Job]:
     """`count` recordings dealt out over the devices on which the effects make sense."""
-    cases = [c for c in CASES if CASES[c][1] or not NEEDS_A_HAND & set(effects)]
+    cases = [
+        case
+        for case, (_, held) in CASES.items()
+        if not (NEEDS_A_HAND if not held else HIDDEN_BY_A_HAND) & set(effects)
+    ]
     return [Job(cases[i % len(cases)], effects, seed + i) for i in range(count)]
 
 
@@ -153,6 +197,7 @@ def main() -> None:
     """Run everything and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--each", type=int, default=10)
+    parser.add_argument("--others", type=int, default=4)
     parser.add_argument("--clean", type=int, default=100)
     parser.add_argument("--pairs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=90_000)
@@ -160,26 +205,38 @@ def main() -> None:
     chosen = parser.parse_args()
     groups: dict[str, list[Job]] = {"clean": jobs_for((), chosen.clean, chosen.seed)}
     for number, effect in enumerate(SINGLE, start=1):
-        groups[effect] = jobs_for((effect,), chosen.each, chosen.seed + 1000 * number)
+        count = chosen.each if number <= LISTED else chosen.others
+        groups[effect] = jobs_for((effect,), count, chosen.seed + 1000 * number)
     for i in range(chosen.pairs):
         pair = PAIRS[i % len(PAIRS)]
-        name = " + ".join(pair)
-        groups.setdefault(name, []).extend(
-            jobs_for(pair, 4, chosen.seed + 50_000 + 10 * i)[i // len(PAIRS) :][:1]
-        )
+        turn = i + i // len(PAIRS)  # the same pair comes on another device
+        jobs = jobs_for(pair, 4, chosen.seed + 50_000 + 10 * i)
+        groups.setdefault(PAIR + " + ".join(pair), []).append(jobs[turn % len(jobs)])
     print(
-        f"{'effect':32s} {'n':>3s} {'class':>6s} {'name':>6s} {'expl.':>6s} {'K dB, worst':>12s} "
-        f"{'covers before':>14s} {'after':>6s} {'held-out':>9s} {'CPU s':>6s}"
+        f"{'effect':36s} {'n':>3s} {'clear':>6s} {'class':>6s} {'name':>6s} {'expl.':>6s} "
+        f"{'K dB, worst':>12s} {'covers before':>14s} {'after':>6s} {'held-out':>9s} {'size':>7s} "
+        f"{'CPU s':>6s}"
     )
     every: list[Outcome] = []
+    sums: dict[str, list[Outcome]] = {"listed": [], "others": [], "pairs": []}
     with ProcessPoolExecutor(chosen.workers) as pool:
         flat = [job for jobs in groups.values() for job in jobs]
         results = iter(pool.map(run, flat))  # rows are printed as their recordings are done
         for name, jobs in groups.items():
             outcomes = [next(results) for _ in jobs]
-            every += outcomes if name != "clean" else []
+            if not outcomes:
+                continue
             print(_row(name, outcomes), flush=True)
-    print(_row("all but clean", every))
+            if name == "clean":
+                continue
+            every += outcomes
+            listed = "listed" if name in list(SINGLE)[:LISTED] else "others"
+            sums["pairs" if name.startswith(PAIR) else listed] += outcomes
+    for name, outcomes in sums.items():
+        if outcomes:
+            print(_row(f"all {name}", outcomes))
+    if every:
+        print(_row("all but clean", every))
     missed = [o for o in every if not (_class_right(o) and _name_right(o))]
     print(f"class or name missed: {len(missed)} of {len(every)}")
     for o in missed:
@@ -199,14 +256,19 @@ def _row(name: str, outcomes: list[Outcome]) -> str:
     def share(values: list[bool]) -> str:
         return f"{100 * np.mean(values):.0f} %"
 
-    worst = max((o.error_db for o in outcomes), key=abs, default=0.0)
+    worst = max((o.error_db for o in outcomes), key=abs)
+    sizes = [o.size_error for o in outcomes if o.size_error is not None]
+    clear = [o.clear for o in outcomes]
+    least = min(clear) if outcomes[0].job.effects else max(clear)
+    size = f"{100 * max(sizes, key=abs):+.1f} %" if sizes else ""
     return (
-        f"{name:32s} {len(outcomes):3d} {share([_class_right(o) for o in outcomes]):>6s} "
+        f"{name.removeprefix(PAIR):36s} {len(outcomes):3d} {least:6.1f} "
+        f"{share([_class_right(o) for o in outcomes]):>6s} "
         f"{share([_name_right(o) for o in outcomes]):>6s} "
         f"{share([o.verdict == 'explained' for o in outcomes]):>6s} {worst:+12.2f} "
         f"{share([o.before_covers for o in outcomes]):>14s} "
         f"{share([o.after_covers for o in outcomes]):>6s} "
-        f"{np.median([o.held_out for o in outcomes]):9.2f} "
+        f"{np.median([o.held_out for o in outcomes]):9.2f} {size:>7s} "
         f"{np.median([o.seconds for o in outcomes]):6.1f}"
     )
 
@@ -220,7 +282,7 @@ def _class_right(outcome: Outcome) -> bool:
 
 
 def _name_right(outcome: Outcome) -> bool:
-    said = set(outcome.found) | set(outcome.ties)
+    said = set(outcome.found) | set(outcome.ties) | {outcome.verdict} & {UNKNOWN}
     if not outcome.job.effects:
         return not said
     return all(SINGLE[e][2] & said for e in outcome.job.effects)

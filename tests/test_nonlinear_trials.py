@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -17,6 +18,9 @@ from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig.effects.effect import Effect as BenchEffect
+from bayeshaptic.rig.laws import DryFriction, SmoothLaw
+from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
 from bayeshaptic.stability import critical_stiffness
 
 LHIFAM = Bench.from_device("lhifam")
@@ -36,11 +40,15 @@ def state_of(bench: Bench) -> State:
     return State(etfe, least_squares(build_model("free", "lhifam"), etfe))
 
 
+def only(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
+    """Some laws of the library: each takes seconds, and the benchmarks try them all."""
+    kinds = [kind for kind in effects("nonlinear") if kind.name in names]
+    monkeypatch.setattr(tried, "effects", lambda family: kinds)
+
+
 @pytest.fixture(autouse=True)
 def only_coulomb(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One law of the library: each takes seconds, and the benchmarks try them all."""
-    kinds = [kind for kind in effects("nonlinear") if kind.name == "coulomb_friction"]
-    monkeypatch.setattr(tried, "effects", lambda family: kinds)
+    only(monkeypatch, "coulomb_friction")
 
 
 @cache
@@ -122,3 +130,89 @@ def test_without_a_recording_there_is_nothing_to_simulate() -> None:
     state, _ = rubbed(0.5)
     bare: Any = replace(state.etfe, recording=None)
     assert nonlinear_trials(replace(state, etfe=bare), {"sign(v)"}) == []
+
+
+@dataclass(frozen=True)
+class _Made(BenchEffect):
+    """Something that the bench does not have by itself."""
+
+    name: ClassVar[str] = "made"
+    size: float = 0.0
+
+    def build(self, structure: Structure) -> None:
+        self.attach(structure)
+
+    def attach(self, structure: Structure) -> None:
+        pass
+
+
+@dataclass(frozen=True)
+class _Load(_Made):
+    """Dry friction on m2."""
+
+    def attach(self, structure: Structure) -> None:
+        structure.laws.append(NodeLaw("m2", FRAME, DryFriction(self.size, self.size)))
+
+
+@dataclass(frozen=True)
+class _Cubed(SmoothLaw):
+    coefficient: float
+
+    def force(self, q: float, v: float, before: float, dq: float) -> float:
+        return -self.coefficient * v**3
+
+
+@dataclass(frozen=True)
+class _CubicDamping(_Made):
+    """-size v^3 on the motor."""
+
+    def attach(self, structure: Structure) -> None:
+        structure.laws.append(NodeLaw("m1", FRAME, _Cubed(self.size)))
+
+
+@dataclass(frozen=True)
+class _Tanh(_Made):
+    """An actuator that gives size tanh(u / size)."""
+
+    def command(self, force: np.ndarray, progress: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+        return self.size * np.tanh(force / self.size)
+
+
+def best_of(effect: BenchEffect | str, raised: str) -> Trial:
+    trials = nonlinear_trials(state_of(LHIFAM.with_effect(effect)), {raised})
+    best = max(trials, key=lambda trial: trial.score)
+    assert best.convincing
+    # Ten seconds know K_CR to about a decibel.
+    truth = 20 * np.log10(LHIFAM.true_critical_stiffness())
+    assert limit_db(best.state) == pytest.approx(truth, abs=2.0)
+    return best
+
+
+def test_friction_on_the_other_mass_is_put_there() -> None:
+    best = best_of(_Load(0.5), "sign(v)")
+    assert best.accepted.title.endswith("at the load")
+    assert best.accepted.estimates["friction_force"].mean == pytest.approx(0.5, rel=0.1)
+
+
+def test_damping_by_the_cube_is_told_from_drag(monkeypatch: pytest.MonkeyPatch) -> None:
+    only(monkeypatch, "drag", "cubic_damping")
+    best = best_of(_CubicDamping(100.0), "v^3")
+    assert best.name == "cubic_damping"
+    found = best.accepted.estimates["cubic_damping"]
+    assert found.mean == pytest.approx(100.0, rel=0.1) and found.unit == "N s^3/m^3"
+
+
+def test_a_gradual_saturation_is_told_from_a_hard_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    only(monkeypatch, "actuator_saturation", "soft_saturation")
+    # The tanh is none of the family's curves, but near that of a sharpness of 2.5.
+    assert best_of(_Tanh(8.0), "u^3").name == "soft_saturation"
+    assert best_of("actuator_saturation", "u^3").name == "actuator_saturation"
+
+
+def test_a_gap_is_followed_to_its_sharp_peak(monkeypatch: pytest.MonkeyPatch) -> None:
+    only(monkeypatch, "backlash")
+    bench = LHIFAM.with_effect("backlash")
+    best = best_of(bench.effects[0], "clipped stretch")
+    # Two per cent off the true gap half of the likelihood's gain is gone.
+    assert best.accepted.estimates["half_gap"].mean == pytest.approx(bench.effects[0].gap, rel=0.02)
+    assert best.accepted.estimates["damping_in_gap"].mean <= 1.0

@@ -143,15 +143,41 @@ class ForceBench:
     ) -> Point:
         """Simulate, take off, fit; several times over, because the fit changes the motion."""
         for _ in range(rounds):
-            self._extra = self.added_motion(effect, strength, theta)
-            etfe, windows = self.without(self._extra, theta)
+            etfe, windows = self._simulated(effect, strength, theta)
             theta = polish(self.model, windows.part(share(windows, FIT)), theta)
         return self._valued(effect, strength, theta, etfe, windows)
 
     def as_it_is(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Point:
         """Simulate and take off, with the linear parameters as given."""
-        self._extra = self.added_motion(effect, strength, theta)
-        return self._valued(effect, strength, theta, *self.without(self._extra, theta))
+        etfe, windows = self._simulated(effect, strength, theta)
+        return self._valued(effect, strength, theta, etfe, windows)
+
+    def without(self, effect: NonlinearEffect, strength: float, extra: Floats) -> Etfe:
+        """The measurement without what a force does: the motion `extra`, or of the command less."""
+        own, spectra = self.recording, self.state.etfe.spectra
+        if isinstance(effect, CommandEffect):
+            lost = effect.lost(strength, self.force)
+            force = spectra.force - self._transform(lost)  # type: ignore[attr-defined]
+            own = replace(own, force=own.force - lost)
+            spectra = replace(spectra, force=force)  # type: ignore[call-arg, type-var]
+        else:
+            position = spectra.position - self._transform(extra)  # type: ignore[attr-defined]
+            own = replace(own, position=own.position - extra)
+            spectra = replace(spectra, position=position)  # type: ignore[call-arg, type-var]
+        return replace(self.state.etfe, spectra=spectra, recording=own)
+
+    def windows(self, etfe: Etfe, theta: Floats, columns: list[Floats] | None = None) -> Windows:
+        """Windows of a measurement, with motions as further inputs."""
+        inputs = np.stack([self._transform(column) for column in columns]) if columns else None
+        return compress(etfe, partial(self.model.response, theta), inputs)
+
+    def _simulated(
+        self, effect: NonlinearEffect, strength: float, theta: Floats
+    ) -> tuple[Etfe, Windows]:
+        if not isinstance(effect, CommandEffect):  # that adds no motion
+            self._extra = self.added_motion(effect, strength, theta)
+        etfe = self.without(effect, strength, self._extra)
+        return etfe, self.windows(etfe, theta)
 
     def _valued(
         self,
@@ -161,27 +187,8 @@ class ForceBench:
         etfe: Etfe,
         windows: Windows,
     ) -> Point:
-        own = replace(self.recording, position=self.recording.position - self._extra)
         gains = self._likelihoods(theta, windows) - self._base
-        return Point(
-            effect,
-            strength,
-            theta,
-            replace(etfe, recording=own),
-            windows,
-            float(gains[0]),
-            float(gains[1]),
-        )
-
-    def without(
-        self, extra: Floats, theta: Floats, columns: list[Floats] | None = None
-    ) -> tuple[Etfe, Windows]:
-        """The measurement less a motion, and its windows, with motions as further inputs."""
-        spectra = self.state.etfe.spectra
-        corrected = replace(spectra, position=spectra.position - self._transform(extra))  # type: ignore
-        etfe = replace(self.state.etfe, spectra=corrected)
-        inputs = np.stack([self._transform(column) for column in columns]) if columns else None
-        return etfe, compress(etfe, partial(self.model.response, theta), inputs)
+        return Point(effect, strength, theta, etfe, windows, float(gains[0]), float(gains[1]))
 
     def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
         pointwise = Likelihood(self.model, windows).pointwise(theta[None])[0]

@@ -115,8 +115,12 @@ def _advanced(bench: ForceBench, form: _Form, best: Point, step: _Step) -> tuple
 
     factor, point = 1.0, along(1.0)
     if point.gain_fit < best.gain_fit:
-        polished = bench.point(*form.at(logs + _BACK * step.logs), best.theta, rounds=2)
-        return _BACK, max(along(_BACK), polished, key=lambda point: point.gain_fit)
+        for factor in (_BACK, _BACK**2):
+            polished = bench.point(*form.at(logs + factor * step.logs), best.theta, rounds=2)
+            point = max(along(factor), polished, key=lambda point: point.gain_fit)
+            if point.gain_fit > best.gain_fit:
+                break
+        return factor, point
     # Slopes of a motion that sticks are rough, and steps along a ridge too short.
     while factor * step.size < _MOST / _ON:
         further = along(_ON * factor)
@@ -171,9 +175,10 @@ def _joint_step(
             (motion(logs, vector) - extra) / nudge
             for vector, nudge in zip(around, nudges, strict=True)
         ]
-    _, windows = bench.without(extra, theta, slopes)
+    etfe = bench.without(*form.at(logs), extra)
+    windows = bench.windows(etfe, theta, slopes)
     # The many slopes leave too little of a window to read its noise from.
-    noise = Likelihood(bench.model, bench.without(extra, theta)[1]).noise_variance
+    noise = Likelihood(bench.model, bench.windows(etfe, theta)).noise_variance
     chosen = share(windows, FIT)
     return _solved(bench, windows.part(chosen), noise[chosen], theta, moved, form.highest - logs)
 

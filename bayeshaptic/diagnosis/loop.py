@@ -114,19 +114,20 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
         from bayeshaptic.diagnosis.periodic_trace import trace_periodic
 
         return trace_periodic(etfe, fit, tick)
-    before = tests = residual_tests(fit, etfe)
+    before = tests = seen = residual_tests(fit, etfe)
     state = repair_measurement(State(etfe, fit))
     candidates = [
         Candidate(e.name, e.title, _score_of(e.name, before), True, 0) for e in state.accepted
     ]
     if state.accepted:
-        tests = _remaining_tests(state, before)
+        tests = _remaining_tests(state, seen)
     rejected: tuple[Trial, ...] = ()
     for number in range(1, ROUNDS + 1):
         if not any(test.flagged for test in tests):
             break
+        seen = (*seen, *tests)
         trials = _trials(state, tests, tick)
-        chosen = _choose(trials, before)
+        chosen = _choose(trials, seen)
         candidates += [
             Candidate(t.name, t.accepted.title, t.score, t is chosen, number) for t in trials
         ]
@@ -134,7 +135,7 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
         if chosen is None:
             break
         state = _with_ties(chosen, trials)
-        tests = _remaining_tests(state, before)
+        tests = _remaining_tests(state, seen)
     verdict, residual_class = verdict_of(state, tests)
     return Traced(verdict, residual_class, state, before, tests, tuple(candidates), rejected)
 
@@ -144,8 +145,8 @@ def _score_of(name: str, tests: tuple[Test, ...]) -> float:
     return max((test.statistic for test in tests if test.name == name), default=0.0)
 
 
-def _remaining_tests(state: State, before: tuple[Test, ...]) -> tuple[Test, ...]:
-    """The tests of what is left, and how much of it counts.
+def _remaining_tests(state: State, seen: tuple[Test, ...]) -> tuple[Test, ...]:
+    """The tests of what is left, and how much of it counts, after those `seen` so far.
 
     Where the response drifts the limit is that of the worst part; that the part drifts a little
     too is no news.  A law of friction is an approximation: a fifth of what it explained may
@@ -160,7 +161,7 @@ def _remaining_tests(state: State, before: tuple[Test, ...]) -> tuple[Test, ...]
         tests = tuple(test for test in tests if test.family != "time-varying")
     explained = 0.0
     if "nonlinear" in families:
-        explained = max((t.statistic for t in before if t.family == "nonlinear"), default=0.0)
+        explained = max((t.statistic for t in seen if t.family == "nonlinear"), default=0.0)
     if families & {"nonlinear", "measurement"}:
         tests = tuple(_allowing(test, explained) for test in tests)
     return tests
@@ -190,7 +191,7 @@ def _trials(state: State, tests: tuple[Test, ...], tick: Tick | None) -> list[Tr
     return sorted(trials, key=lambda trial: -trial.score)
 
 
-def _choose(trials: list[Trial], before: tuple[Test, ...]) -> Trial | None:
+def _choose(trials: list[Trial], seen: tuple[Test, ...]) -> Trial | None:
     """The convincing trial that leaves least; of those that leave nothing, the best.
 
     A wrong effect can gain nearly as much as the right one and then need another to mend it: an
@@ -200,7 +201,7 @@ def _choose(trials: list[Trial], before: tuple[Test, ...]) -> Trial | None:
     if not good:
         return None
     rivals = [trial for trial in good if trial.score > _RIVAL * good[0].score]
-    left = [_left(_remaining_tests(trial.state, before)) for trial in rivals]
+    left = [_left(_remaining_tests(trial.state, seen)) for trial in rivals]
     least = min(left)
     # Laws of one force differ in what they leave by chance; linear effects do not.
     more = _LAW_REST if good[0].accepted.family == "nonlinear" else 0.0

@@ -55,7 +55,7 @@ def nonlinear_trials(
     firsts: dict[str, _Called] = {}  # by the name of the strength: laws of friction share one
     others: list[_Called] = []
     for kind in effects("nonlinear"):
-        if kind.name in {a.name for a in state.accepted}:
+        if _there(kind, state):
             continue
         called = [e for e in kind.candidates(state.model, motion) if e.called_for(raised)]
         if called and kind.strength[0] in firsts:
@@ -68,6 +68,19 @@ def nonlinear_trials(
         _search(bench, called, motion, tick, known.get(called[0].strength[0])) for called in others
     ]
     return [_trial(bench, point) for point in _fitted(bench, nearby, found)]
+
+
+def _there(kind: type[NonlinearEffect], state: State) -> bool:
+    """Whether the state has the effect, or another law of the same thing.
+
+    One mass has one friction, and one actuator one characteristic: a second law on top of the
+    first would only mend it.
+    """
+    if any(kind.strength[0] in accepted.estimates for accepted in state.accepted):
+        return True
+    names = {accepted.name for accepted in state.accepted}
+    actuators = {k.name for k in effects("nonlinear") if issubclass(k, CommandEffect)}
+    return kind.name in (names | actuators if names & actuators else names)
 
 
 def _fitted(bench: ForceBench, points: list[Point], before: Sequence[Point] = ()) -> list[Point]:

@@ -1,0 +1,170 @@
+"""Effects for the bench that neither it nor the library has: what nobody thought of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.rig.effects.effect import Effect, Samples, Scales, register
+from bayeshaptic.rig.laws import DryFriction, SmoothLaw
+from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
+
+Floats = NDArray[np.float64]
+
+
+@register
+@dataclass(frozen=True)
+class TanhSaturation(Effect):
+    """An actuator that gives limit tanh(u / limit)."""
+
+    name: ClassVar[str] = "tanh_saturation"
+    limit: float = 8.0
+
+    @classmethod
+    def typical(cls, scales: Scales) -> TanhSaturation:
+        return cls(2.0 * scales.force)
+
+    def command(self, force: Floats, progress: Floats, time_s: Floats) -> Floats:
+        return np.asarray(self.limit * np.tanh(force / self.limit))
+
+
+@register
+@dataclass(frozen=True)
+class AsymmetricGain(Effect):
+    """An actuator that pushes more than it pulls."""
+
+    name: ClassVar[str] = "asymmetric_gain"
+    share: float = 0.15
+
+    def command(self, force: Floats, progress: Floats, time_s: Floats) -> Floats:
+        return np.asarray(force * (1 + self.share * np.sign(force)))
+
+
+@register
+@dataclass(frozen=True)
+class CoarseCommand(Effect):
+    """An actuator that knows only multiples of a step."""
+
+    name: ClassVar[str] = "coarse_command"
+    step: float = 2.0
+
+    @classmethod
+    def typical(cls, scales: Scales) -> CoarseCommand:
+        return cls(0.5 * scales.force)
+
+    def command(self, force: Floats, progress: Floats, time_s: Floats) -> Floats:
+        return np.asarray(np.round(force / self.step) * self.step)
+
+
+@register
+@dataclass(frozen=True)
+class EccentricEncoder(Effect):
+    """An encoder disc off its centre: a reading that waves along the position."""
+
+    name: ClassVar[str] = "eccentric_encoder"
+    amplitude: float = 1e-4
+    pitch: float = 1e-2
+
+    @classmethod
+    def typical(cls, scales: Scales) -> EccentricEncoder:
+        return cls(0.03 * scales.position, 0.7 * scales.position)
+
+    def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
+        wave = self.amplitude * np.sin(2 * np.pi * samples.position / self.pitch)
+        return replace(samples, position=samples.position + wave)
+
+
+@dataclass(frozen=True)
+class _Cube(SmoothLaw):
+    coefficient: float
+
+    def force(self, q: float, v: float, before: float, dq: float) -> float:
+        return -self.coefficient * v**3
+
+
+@dataclass(frozen=True)
+class _Lopsided(SmoothLaw):
+    level: float
+    velocity: float
+
+    def force(self, q: float, v: float, before: float, dq: float) -> float:
+        return -self.level * math.tanh(v / self.velocity) * (1.4 if v > 0 else 0.6)
+
+
+@dataclass(frozen=True)
+class _Stops(SmoothLaw):
+    stiffness: float
+    free: float
+
+    def force(self, q: float, v: float, before: float, dq: float) -> float:
+        return -self.stiffness * (max(q - self.free, 0.0) + min(q + self.free, 0.0))
+
+
+@register
+@dataclass(frozen=True)
+class VelocityCubed(Effect):
+    """A damper whose force grows with the cube of the velocity."""
+
+    name: ClassVar[str] = "velocity_cubed"
+    coefficient: float = 100.0
+
+    @classmethod
+    def typical(cls, scales: Scales) -> VelocityCubed:
+        return cls(0.2 * scales.force / (15**0.5 * scales.velocity**3))
+
+    def build(self, structure: Structure) -> None:
+        structure.laws.append(NodeLaw("m1", FRAME, _Cube(self.coefficient)))
+
+
+@register
+@dataclass(frozen=True)
+class LoadFriction(Effect):
+    """Dry friction on the far mass."""
+
+    name: ClassVar[str] = "load_friction"
+    force: float = 0.6
+
+    @classmethod
+    def typical(cls, scales: Scales) -> LoadFriction:
+        return cls(0.15 * scales.force)
+
+    def build(self, structure: Structure) -> None:
+        structure.laws.append(NodeLaw("m2", FRAME, DryFriction(self.force, self.force)))
+
+
+@register
+@dataclass(frozen=True)
+class LopsidedFriction(Effect):
+    """Friction that is larger one way, and that does not stick."""
+
+    name: ClassVar[str] = "lopsided_friction"
+    force: float = 0.5
+    velocity: float = 3e-3
+
+    @classmethod
+    def typical(cls, scales: Scales) -> LopsidedFriction:
+        return cls(0.12 * scales.force, 0.03 * scales.velocity)
+
+    def build(self, structure: Structure) -> None:
+        structure.laws.append(NodeLaw("m1", FRAME, _Lopsided(self.force, self.velocity)))
+
+
+@register
+@dataclass(frozen=True)
+class EndStops(Effect):
+    """Soft stops that the motion runs into now and then."""
+
+    name: ClassVar[str] = "end_stops"
+    stiffness: float = 1e4
+    free: float = 1e-2
+
+    @classmethod
+    def typical(cls, scales: Scales) -> EndStops:
+        return cls(5 * scales.force / scales.position, 1.3 * scales.position)
+
+    def build(self, structure: Structure) -> None:
+        structure.laws.append(NodeLaw("m1", FRAME, _Stops(self.stiffness, self.free)))
