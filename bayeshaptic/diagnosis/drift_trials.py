@@ -103,7 +103,8 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
     )
     changed = state
     if gains[1] > 8 and kind is _GAIN:
-        changed = _with_steady_gain(state, narrow, start)
+        changed, spread = _with_steady_gain(state, narrow, start)
+        accepted = replace(accepted, limit_log_sd=spread)
     elif gains[1] > 8:
         changed = _on_part(state, parts[worst], dict(zip(narrow.names, found[worst], strict=True)))
     changed = replace(changed, accepted=(*state.accepted, accepted))
@@ -122,11 +123,12 @@ def _fall(limits: Floats) -> float:
     return 0.5 * float(np.log(beside / limits[worst]))
 
 
-def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> State:
-    """The recording with its command scaled by the gain found over time.
+def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> tuple[State, float]:
+    """The recording with its command scaled by the gain found over time, and log K_CR's spread.
 
     The gain is set to one where it is largest: there the loop is nearest to instability, and the
-    critical stiffness in units of the command is lowest.
+    critical stiffness in units of the command is lowest.  How well that is known the roughness of
+    the course tells.
     """
     recording = state.etfe.recording
     assert recording is not None
@@ -145,7 +147,15 @@ def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> S
     gain = np.interp(np.arange(recording.samples), times, [ends[0], *gains, ends[1]])
     steady = replace(recording, force=recording.force * gain / gain.max())
     etfe = estimate_etfe(steady, state.etfe.band_hz)
-    return replace(state, etfe=etfe, fit=least_squares(state.model, etfe, start=state.fit.theta))
+    fit = least_squares(state.model, etfe, start=state.fit.theta)
+    return replace(state, etfe=etfe, fit=fit), _edge_error(np.array(gains)) / float(gain.max())
+
+
+def _edge_error(gains: Floats) -> float:
+    """Standard deviation of a course's end, from what neighbours do not share with each other."""
+    # Second differences of independent errors have six times their variance, half a step beyond
+    # the last of them, 1.5 g0 - 0.5 g1, two and a half times.
+    return float(np.sqrt(np.mean(np.diff(gains, 2) ** 2) / 6 * 2.5))
 
 
 def _on_part(state: State, part: Etfe, found: dict[str, float]) -> State:

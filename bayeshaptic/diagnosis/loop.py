@@ -150,7 +150,7 @@ def _remaining_tests(state: State, seen: tuple[Test, ...]) -> tuple[Test, ...]:
 
     Where the response drifts the limit is that of the worst part; that the part drifts a little
     too is no news.  A law of friction is an approximation: a fifth of what it explained may
-    remain; and a mended recording is not as good as a sound one.
+    remain; and a recording that was mended, or goes on in part, is not as good as a sound one.
     """
     known = {effect.name for effect in state.accepted if effect.family == "measurement"}
     tests = tuple(t for t in residual_tests(state.fit, state.etfe) if t.name not in known)
@@ -162,7 +162,7 @@ def _remaining_tests(state: State, seen: tuple[Test, ...]) -> tuple[Test, ...]:
     explained = 0.0
     if "nonlinear" in families:
         explained = max((t.statistic for t in seen if t.family == "nonlinear"), default=0.0)
-    if families & {"nonlinear", "measurement"}:
+    if families & {"nonlinear", "measurement", "time-varying"}:
         tests = tuple(_allowing(test, explained) for test in tests)
     return tests
 
