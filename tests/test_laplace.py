@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import bayeshaptic as bh
+from bayeshaptic.effects.registry import effect_class
 from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.density import Density
 from bayeshaptic.inference.ensembles import _spread_start
@@ -72,3 +75,17 @@ def test_a_fit_at_the_end_of_a_prior_still_finds_the_peak(on_a_ridge):
             drawn = proposal.sample(np.random.default_rng(0), 2000)
             assert np.isfinite(density(drawn)).mean() > 0.1
             assert adapt(density, proposal, np.random.default_rng(1)).efficiency > 0.2
+
+
+def test_of_two_springs_side_by_side_none_is_a_logarithm() -> None:
+    """The data know their sum: a fit may leave one of them nothing, and its error is then nan."""
+    plain = bh.grasped(device="lhifam")
+    reflex = effect_class("reflex")
+    etfe = SimpleNamespace(band_hz=(0.5, 300.0), period_s=1e-3, force_unit="N", position_unit="m")
+    springy = plain.with_effect(reflex.candidates(plain, etfe)[0])
+    for model, log in ((plain, True), (springy, False)):
+        theta = np.array([model.prior(name).quantile(0.5) for name in model.names], float)
+        sd = 0.01 * theta
+        at = model.names.index("kh")
+        theta[at], sd[at] = 2.0, np.nan
+        assert sampling_coordinates(model, theta, sd).log[at] == log

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, ClassVar
 
@@ -108,6 +108,20 @@ def test_a_test_that_calls_for_nothing_tries_nothing() -> None:
     assert nonlinear_trials(state, set()) == []
 
 
+def test_one_mass_gets_one_law_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
+    state, trials = rubbed(0.5)
+    only(monkeypatch, "coulomb_friction", "stribeck_friction", "dahl_friction")
+    known = replace(state, accepted=(trials[0].accepted,))
+    assert nonlinear_trials(known, {"sign(v)"}) == []
+
+
+def test_one_actuator_has_one_characteristic(monkeypatch: pytest.MonkeyPatch) -> None:
+    state, trials = rubbed(0.5)
+    only(monkeypatch, "actuator_saturation", "soft_saturation", "dead_zone")
+    zone = replace(trials[0].accepted, name="dead_zone", estimates={})
+    assert nonlinear_trials(replace(state, accepted=(zone,)), {"u^3"}) == []
+
+
 def test_candidates_are_announced_by_their_titles() -> None:
     state, _ = rubbed(0.5)
     titles: list[str] = []
@@ -125,8 +139,6 @@ def test_candidates_are_announced_by_their_titles() -> None:
 
 
 def test_without_a_recording_there_is_nothing_to_simulate() -> None:
-    from dataclasses import replace
-
     state, _ = rubbed(0.5)
     bare: Any = replace(state.etfe, recording=None)
     assert nonlinear_trials(replace(state, etfe=bare), {"sign(v)"}) == []
