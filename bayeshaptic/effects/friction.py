@@ -97,7 +97,8 @@ class DahlFriction(NonlinearEffect):
 
     name = "dahl_friction"
     title = "dry friction that begins as a spring (Dahl)"
-    columns = (*_BY_VELOCITY, "x^3", "stretch^3", "clipped stretch")  # as it may look like one
+    # It may look like a spring, or like nothing but noise.
+    columns = (*_BY_VELOCITY, "x^3", "stretch^3", "clipped stretch", "excess noise")
     strength = ("friction_force", "force")
     dimensions = {"presliding_distance": "position"}
     tuned = ("presliding_distance",)
