@@ -141,14 +141,15 @@ def balance(
         if change < _SETTLED or not forces:
             converged = True
             break
-    columns = joint.columns(theta)
+    # Of the parameters found: without forces those of the start were the only ones so far.
+    motions, _ = _settle(model.system(theta), period, forces, strength, applied)
     return Balanced(
         model,
         theta,
         forces,
         strength,
         joint.sds(theta),
-        columns,
+        joint.columns(theta),
         motions,
         joint.residual(theta, strength),
         converged,
