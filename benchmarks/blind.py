@@ -193,10 +193,21 @@ def jobs_for(effects: tuple[str, ...], count: int, seed: int) -> list[Job]:
     return [Job(cases[i % len(cases)], effects, seed + i) for i in range(count)]
 
 
+def attempt(job: Job) -> Outcome | str:
+    """The outcome, or why the recording was refused."""
+    from bayeshaptic.errors import InputError
+
+    try:
+        return run(job)
+    except InputError as error:
+        return f"  {job.case}, {', '.join(job.effects)}, seed {job.seed}: refused: {error}"
+
+
 def main() -> None:
     """Run everything and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--each", type=int, default=10)
+    parser.add_argument("--only", nargs="*", help="these effects alone")
     parser.add_argument("--others", type=int, default=4)
     parser.add_argument("--clean", type=int, default=100)
     parser.add_argument("--pairs", type=int, default=20)
@@ -206,6 +217,8 @@ def main() -> None:
     groups: dict[str, list[Job]] = {"clean": jobs_for((), chosen.clean, chosen.seed)}
     for number, effect in enumerate(SINGLE, start=1):
         count = chosen.each if number <= LISTED else chosen.others
+        if chosen.only is not None and effect not in chosen.only:
+            count = 0
         groups[effect] = jobs_for((effect,), count, chosen.seed + 1000 * number)
     for i in range(chosen.pairs):
         pair = PAIRS[i % len(PAIRS)]
@@ -218,12 +231,15 @@ def main() -> None:
         f"{'CPU s':>6s}"
     )
     every: list[Outcome] = []
+    refused: list[str] = []
     sums: dict[str, list[Outcome]] = {"listed": [], "others": [], "pairs": []}
     with ProcessPoolExecutor(chosen.workers) as pool:
         flat = [job for jobs in groups.values() for job in jobs]
-        results = iter(pool.map(run, flat))  # rows are printed as their recordings are done
+        results = iter(pool.map(attempt, flat))  # rows are printed as their recordings are done
         for name, jobs in groups.items():
-            outcomes = [next(results) for _ in jobs]
+            answers = [next(results) for _ in jobs]
+            refused += [answer for answer in answers if isinstance(answer, str)]
+            outcomes = [answer for answer in answers if isinstance(answer, Outcome)]
             if not outcomes:
                 continue
             print(_row(name, outcomes), flush=True)
@@ -237,6 +253,7 @@ def main() -> None:
             print(_row(f"all {name}", outcomes))
     if every:
         print(_row("all but clean", every))
+    print(f"refused: {len(refused)}", *refused, sep="\n")
     missed = [o for o in every if not (_class_right(o) and _name_right(o))]
     print(f"class or name missed: {len(missed)} of {len(every)}")
     for o in missed:

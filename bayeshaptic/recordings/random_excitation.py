@@ -12,6 +12,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.band import NO_POWER, choose_band
 from bayeshaptic.recordings.local_polynomial import window_edges
 from bayeshaptic.recordings.points import Points
+from bayeshaptic.recordings.raw_signals import clipping
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.reference import fit_local_rational, unit_mass
 from bayeshaptic.recordings.spectra import RandomSpectra
@@ -24,6 +25,8 @@ LOW_END_WINDOWS = 0.875
 LOWEST_HZ = 0.3
 # A rational reference must explain a window better than chance does with its two more terms.
 BETTER = 10.0
+# Share of samples that were cut off, from which that may be why nothing follows the force.
+_MUCH_CUT_OFF = 0.05
 # What to advise: 12 lines are then 12 Hz, and limits below 20 Hz are common.
 SHORTEST_S = 1.0
 
@@ -81,13 +84,29 @@ def points(windows: Windows) -> Points:
 def _in_chosen_band(recording: Recording, minimum: int) -> tuple[RandomSpectra, Notice]:
     widest = max(LOWEST_HZ, LOW_END_WINDOWS * minimum / recording.duration_s)
     everything = _spectra(recording, (widest, 0.5 / recording.period_s), minimum)
-    low, high = choose_band(everything, recording.name)
+    try:
+        low, high = choose_band(everything, recording.name)
+    except InputError as error:
+        raise _cut_off(recording) or error from None
     text = (
         f"Band {low:.3g} to {high:.4g} Hz, chosen where the force has power and the position "
         "answers it."
     )
     return _spectra(recording, (low, high), minimum, "the force drives"), Notice(
         "note", "band", text
+    )
+
+
+def _cut_off(recording: Recording) -> InputError | None:
+    """What is wrong where the position was cut off and does not follow the force because of it."""
+    ends = clipping(recording.position)
+    share = (ends.low_samples + ends.high_samples) / recording.samples
+    if not (ends.low_clipped or ends.high_clipped) or share < _MUCH_CUT_OFF:
+        return None
+    return InputError(
+        f"{recording.name}: the position is cut off at {ends.low:.4g} or {ends.high:.4g} "
+        f"{recording.position_unit} in {100 * share:.0f} % of the samples, and what is left does "
+        "not follow the force; widen the range of the sensor, or keep the device in its middle"
     )
 
 
