@@ -184,6 +184,11 @@ SINE = np.sin(2 * np.pi * 5e-3 * np.arange(30000))
         (lambda: changed(force=np.ones(30000)), None, "the force is 1 in all 30000 samples"),
         (lambda: changed(position=np.zeros(30000)), None, "the position is 0 in all"),
         (lambda: changed(position=NOISE), None, "does not follow the force"),
+        (
+            lambda: changed(position=np.clip(NOISE, -0.1, 0.1)),
+            None,
+            "cut off at -0.1 or 0.1 m in 9",
+        ),
         (lambda: changed(force=SINE), None, "the periodic force excites 1 lines"),
         (with_nan, None, "position is nan in sample 6"),
     ],
