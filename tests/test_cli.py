@@ -362,9 +362,12 @@ def test_warnings_are_one_line_each(run: Run, monkeypatch: pytest.MonkeyPatch) -
     assert status == 0 and err == "bayeshaptic: warning: twice the lines\n"
 
 
+# A shell's background processes ignore interrupts, and so would their children.
 WAITING = """
-import sys, time
+import signal, sys, time
 from bayeshaptic import batch, cli
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def wait(*_):
     print("working", flush=True)
@@ -377,16 +380,19 @@ sys.exit(cli.main(["report", "a.csv"]))
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for child processes on Windows")
 def test_an_interrupt_ends_a_process_without_traceback(tmp_path: Path) -> None:
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-c", WAITING],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-    )
-    assert process.stdout is not None and process.stdout.readline() == "working\n"
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=30)
+    ) as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline() == "working\n"
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert process.returncode == 130 and not out
     assert only_line(err) == "bayeshaptic: interrupted"
     assert not os.listdir(tmp_path)
