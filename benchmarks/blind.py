@@ -18,86 +18,27 @@ import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-
-CASES = {
-    "LHIfAM free": ("lhifam", False),
-    "LHIfAM held": ("lhifam", True),
-    "PHANToM free": ("phantom", False),
-    "PHANToM held": ("phantom", True),
-}
-UNKNOWN = "unexplained"
-# Effect on the bench, fields unlike its typical strength, class, and the names that are right.
-SINGLE: dict[str, tuple[dict[str, Any], str, set[str]]] = {
-    "second_mode": ({}, "linear", {"second_mode"}),
-    "extra_delay": ({}, "linear", {"extra_delay"}),
-    "actuator_lag": ({}, "linear", {"actuator_lag"}),
-    "position_filter": ({}, "linear", {"position_filter"}),
-    "reflex": ({}, "linear", {"reflex"}),
-    "centring_stiffness": ({}, "linear", {"centring_stiffness"}),
-    "structural_damping": ({}, "linear", {"structural_damping"}),
-    "coulomb_friction": ({}, "nonlinear", {"coulomb_friction"}),
-    "hardening_spring": ({}, "nonlinear", {"hardening_spring"}),
-    "hardening_connection": ({}, "nonlinear", {"hardening_spring", "hardening_connection"}),
-    "backlash": ({}, "nonlinear", {"backlash"}),
-    "grip_drift": ({}, "time-varying", {"grip_drift"}),
-    "quantisation": ({}, "measurement", {"quantisation"}),
-    "mains_tone": ({}, "measurement", {"mains_tone"}),
-    "held_samples": ({}, "measurement", {"held_samples"}),
-    # Outside the list of the library's promises.
-    "base_compliance": ({}, "linear", {"base_compliance"}),
-    "stribeck_friction": ({}, "nonlinear", {"stribeck_friction"}),
-    "dahl_friction": ({}, "nonlinear", {"dahl_friction"}),
-    "drag": ({}, "nonlinear", {"drag"}),
-    "actuator_saturation": ({}, "nonlinear", {"actuator_saturation"}),
-    "gain_drift": ({}, "time-varying", {"gain_drift"}),
-    "force_ripple": ({}, "nonlinear", {UNKNOWN}),
-    "position_clipping": ({}, "measurement", {"position_clipping"}),
-    # Outside the bench's own effects as well: see foreign.py. UNKNOWN: there is no law for it.
-    "tanh_saturation": ({}, "nonlinear", {"soft_saturation"}),
-    "velocity_cubed": ({}, "nonlinear", {"cubic_damping"}),
-    "load_friction": ({}, "nonlinear", {"coulomb_friction"}),
-    "lopsided_friction": ({}, "nonlinear", {"coulomb_friction", UNKNOWN}),
-    "asymmetric_gain": ({}, "nonlinear", {UNKNOWN}),
-    "coarse_command": ({}, "nonlinear", {UNKNOWN}),
-    "eccentric_encoder": ({}, "nonlinear", {UNKNOWN}),
-    "end_stops": ({}, "nonlinear", {UNKNOWN}),
-}
-LISTED = 15  # the first of them are those that the library promises
-PAIRS = (
-    ("extra_delay", "coulomb_friction"),
-    ("second_mode", "coulomb_friction"),
-    ("second_mode", "extra_delay"),
-    ("actuator_lag", "second_mode"),
-    ("centring_stiffness", "extra_delay"),
-    ("hardening_spring", "extra_delay"),
-    ("coulomb_friction", "mains_tone"),
-    ("second_mode", "held_samples"),
-    ("coulomb_friction", "centring_stiffness"),
-    ("backlash", "extra_delay"),
+from blind_recordings import (
+    CASES,
+    LISTED,
+    PAIR,
+    SINGLE,
+    SIZES,
+    UNKNOWN,
+    Job,
+    bench_of,
+    jobs_for,
+    pair_jobs,
+    single_jobs,
 )
-NEEDS_A_HAND = {"reflex", "grip_drift"}
-PAIR = "pair: "
-HIDDEN_BY_A_HAND = {"centring_stiffness"}  # the hand's own spring takes it up
-# What the effect's size is called on the bench and in the library.
-SIZES = {
-    "coulomb_friction": ("force", "friction_force"),
-    "load_friction": ("force", "friction_force"),
-    "second_mode": ("frequency_hz", "mode_hz"),
-    "backlash": ("gap", "half_gap"),
-    "drag": ("coefficient", "drag_coefficient"),
-}
 
-
-@dataclass(frozen=True)
-class Job:
-    """One recording: which device, which effects, which seed."""
-
-    case: str
-    effects: tuple[str, ...]
-    seed: int
+from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.errors import InputError
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.rig import Bench, simulate
 
 
 @dataclass(frozen=True)
@@ -122,20 +63,9 @@ class Outcome:
 
 def run(job: Job) -> Outcome:
     """Simulate, close the loop, compare."""
-    import foreign  # noqa: F401  (importing registers)
-
-    from bayeshaptic.diagnosis.closed import close_loop
-    from bayeshaptic.models import build_model
-    from bayeshaptic.recordings import recording_from_arrays
-    from bayeshaptic.rig import Bench, simulate
-
     warnings.simplefilter("ignore")
     device, held = CASES[job.case]
-    bench = Bench.from_device(device, held=held)
-    declared = bench.encoder_resolution
-    for effect in job.effects:
-        fields = SINGLE[effect][0] if effect in SINGLE else {}
-        bench = bench.with_effect(effect, **fields)
+    bench = bench_of(job)
     simulated = simulate(bench, seed=job.seed)
     recording = recording_from_arrays(
         simulated.force,
@@ -143,7 +73,7 @@ def run(job: Job) -> Outcome:
         period_s=bench.period_s,
         force_unit=bench.force_unit,
         position_unit=bench.position_unit,
-        encoder_resolution=declared,
+        encoder_resolution=bench.encoder_resolution,
     )
     truth = bench.true_critical_stiffness()
     model = build_model("grasped" if held else "free", device)
@@ -169,7 +99,7 @@ def run(job: Job) -> Outcome:
     )
 
 
-def _size_error(bench: Any, closed: Any) -> float | None:
+def _size_error(bench: Bench, closed: Closed) -> float | None:
     """Relative error of the size of the first effect on the bench, where it was named."""
     for effect in bench.effects:
         there, here = SIZES.get(effect.name, ("", ""))
@@ -183,20 +113,8 @@ def _db(value: float, truth: float) -> float:
     return float(20 * np.log10(max(value, 1e-12) / truth))
 
 
-def jobs_for(effects: tuple[str, ...], count: int, seed: int) -> list[Job]:
-    """`count` recordings dealt out over the devices on which the effects make sense."""
-    cases = [
-        case
-        for case, (_, held) in CASES.items()
-        if not (NEEDS_A_HAND if not held else HIDDEN_BY_A_HAND) & set(effects)
-    ]
-    return [Job(cases[i % len(cases)], effects, seed + i) for i in range(count)]
-
-
 def attempt(job: Job) -> Outcome | str:
     """The outcome, or why the recording was refused."""
-    from bayeshaptic.errors import InputError
-
     try:
         return run(job)
     except InputError as error:
@@ -205,32 +123,16 @@ def attempt(job: Job) -> Outcome | str:
 
 def main() -> None:
     """Run everything and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--each", type=int, default=10)
-    parser.add_argument("--only", nargs="*", help="these effects alone")
-    parser.add_argument("--others", type=int, default=4)
-    parser.add_argument("--clean", type=int, default=100)
-    parser.add_argument("--pairs", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=90_000)
-    parser.add_argument("--workers", type=int, default=2)
-    chosen = parser.parse_args()
-    groups: dict[str, list[Job]] = {"clean": jobs_for((), chosen.clean, chosen.seed)}
-    for number, effect in enumerate(SINGLE, start=1):
-        count = chosen.each if number <= LISTED else chosen.others
-        if chosen.only is not None and effect not in chosen.only:
-            count = 0
-        groups[effect] = jobs_for((effect,), count, chosen.seed + 1000 * number)
-    for i in range(chosen.pairs):
-        pair = PAIRS[i % len(PAIRS)]
-        turn = i + i // len(PAIRS)  # the same pair comes on another device
-        jobs = jobs_for(pair, 4, chosen.seed + 50_000 + 10 * i)
-        groups.setdefault(PAIR + " + ".join(pair), []).append(jobs[turn % len(jobs)])
+    chosen = _arguments()
+    groups = {"clean": jobs_for((), chosen.clean, chosen.seed)}
+    for effect in SINGLE if chosen.only is None else chosen.only:
+        groups[effect] = single_jobs(effect, chosen.each, chosen.others, chosen.seed)
+    groups |= pair_jobs(chosen.pairs, chosen.seed)
     print(
         f"{'effect':36s} {'n':>3s} {'clear':>6s} {'class':>6s} {'name':>6s} {'expl.':>6s} "
         f"{'K dB, worst':>12s} {'covers before':>14s} {'after':>6s} {'held-out':>9s} {'size':>7s} "
         f"{'CPU s':>6s}"
     )
-    every: list[Outcome] = []
     refused: list[str] = []
     sums: dict[str, list[Outcome]] = {"listed": [], "others": [], "pairs": []}
     with ProcessPoolExecutor(chosen.workers) as pool:
@@ -240,19 +142,35 @@ def main() -> None:
             answers = [next(results) for _ in jobs]
             refused += [answer for answer in answers if isinstance(answer, str)]
             outcomes = [answer for answer in answers if isinstance(answer, Outcome)]
-            if not outcomes:
-                continue
             print(_row(name, outcomes), flush=True)
-            if name == "clean":
-                continue
-            every += outcomes
-            listed = "listed" if name in list(SINGLE)[:LISTED] else "others"
-            sums["pairs" if name.startswith(PAIR) else listed] += outcomes
+            if name != "clean":
+                sums[_kind(name)] += outcomes
     for name, outcomes in sums.items():
-        if outcomes:
-            print(_row(f"all {name}", outcomes))
-    if every:
-        print(_row("all but clean", every))
+        print(_row(f"all {name}", outcomes))
+    every = [outcome for outcomes in sums.values() for outcome in outcomes]
+    print(_row("all but clean", every))
+    _print_failures(every, refused)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--each", type=int, default=10, help="recordings of a promised effect")
+    parser.add_argument("--others", type=int, default=4, help="of any other effect")
+    parser.add_argument("--only", nargs="*", choices=SINGLE, help="these effects alone")
+    parser.add_argument("--clean", type=int, default=100)
+    parser.add_argument("--pairs", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=90_000)
+    parser.add_argument("--workers", type=int, default=2)
+    return parser.parse_args()
+
+
+def _kind(name: str) -> str:
+    if name.startswith(PAIR):
+        return "pairs"
+    return "listed" if name in list(SINGLE)[:LISTED] else "others"
+
+
+def _print_failures(every: list[Outcome], refused: list[str]) -> None:
     print(f"refused: {len(refused)}", *refused, sep="\n")
     missed = [o for o in every if not (_class_right(o) and _name_right(o))]
     print(f"class or name missed: {len(missed)} of {len(every)}")
@@ -261,7 +179,7 @@ def main() -> None:
             f"  {o.job.case}, {', '.join(o.job.effects)}, seed {o.job.seed}: {o.verdict}, "
             f"{', '.join(o.found) or 'nothing'}, K_CR {o.error_db:+.2f} dB"
         )
-    unsafe = [o for o in every if o.error_db > 1.5 and o.verdict != "unexplained"]
+    unsafe = [o for o in every if o.error_db > 1.5 and o.verdict != UNKNOWN]
     print(f"median over 1.5 dB too high and not called unexplained: {len(unsafe)} of {len(every)}")
     for o in unsafe:
         print(
@@ -273,6 +191,8 @@ def _row(name: str, outcomes: list[Outcome]) -> str:
     def share(values: list[bool]) -> str:
         return f"{100 * np.mean(values):.0f} %"
 
+    if not outcomes:
+        return f"{name.removeprefix(PAIR):36s} none"
     worst = max((o.error_db for o in outcomes), key=abs)
     sizes = [o.size_error for o in outcomes if o.size_error is not None]
     clear = [o.clear for o in outcomes]
@@ -293,7 +213,7 @@ def _row(name: str, outcomes: list[Outcome]) -> str:
 def _class_right(outcome: Outcome) -> bool:
     if not outcome.job.effects:
         return outcome.verdict == "consistent"
-    wanted = {SINGLE[e][1] for e in outcome.job.effects if e in SINGLE}
+    wanted = {SINGLE[e][0] for e in outcome.job.effects if e in SINGLE}
     seen = set(outcome.families) or {outcome.residual_class}
     return wanted <= seen
 
@@ -302,7 +222,7 @@ def _name_right(outcome: Outcome) -> bool:
     said = set(outcome.found) | set(outcome.ties) | {outcome.verdict} & {UNKNOWN}
     if not outcome.job.effects:
         return not said
-    return all(SINGLE[e][2] & said for e in outcome.job.effects)
+    return all(SINGLE[e][1] & said for e in outcome.job.effects)
 
 
 if __name__ == "__main__":

@@ -9,14 +9,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.rig.effects.effect import Effect, Samples, Scales, register
+from bayeshaptic.rig.effects.effect import Effect, Samples, Scales
 from bayeshaptic.rig.laws import DryFriction, SmoothLaw
 from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
 
 Floats = NDArray[np.float64]
 
 
-@register
 @dataclass(frozen=True)
 class TanhSaturation(Effect):
     """An actuator that gives limit tanh(u / limit)."""
@@ -32,7 +31,6 @@ class TanhSaturation(Effect):
         return np.asarray(self.limit * np.tanh(force / self.limit))
 
 
-@register
 @dataclass(frozen=True)
 class AsymmetricGain(Effect):
     """An actuator that pushes more than it pulls."""
@@ -44,7 +42,6 @@ class AsymmetricGain(Effect):
         return np.asarray(force * (1 + self.share * np.sign(force)))
 
 
-@register
 @dataclass(frozen=True)
 class CoarseCommand(Effect):
     """An actuator that knows only multiples of a step."""
@@ -60,7 +57,6 @@ class CoarseCommand(Effect):
         return np.asarray(np.round(force / self.step) * self.step)
 
 
-@register
 @dataclass(frozen=True)
 class EccentricEncoder(Effect):
     """An encoder disc off its centre: a reading that waves along the position."""
@@ -104,7 +100,6 @@ class _Stops(SmoothLaw):
         return -self.stiffness * (max(q - self.free, 0.0) + min(q + self.free, 0.0))
 
 
-@register
 @dataclass(frozen=True)
 class VelocityCubed(Effect):
     """A damper whose force grows with the cube of the velocity."""
@@ -120,7 +115,6 @@ class VelocityCubed(Effect):
         structure.laws.append(NodeLaw("m1", FRAME, _Cube(self.coefficient)))
 
 
-@register
 @dataclass(frozen=True)
 class LoadFriction(Effect):
     """Dry friction on the far mass."""
@@ -136,7 +130,6 @@ class LoadFriction(Effect):
         structure.laws.append(NodeLaw("m2", FRAME, DryFriction(self.force, self.force)))
 
 
-@register
 @dataclass(frozen=True)
 class LopsidedFriction(Effect):
     """Friction that is larger one way, and that does not stick."""
@@ -153,7 +146,6 @@ class LopsidedFriction(Effect):
         structure.laws.append(NodeLaw("m1", FRAME, _Lopsided(self.force, self.velocity)))
 
 
-@register
 @dataclass(frozen=True)
 class EndStops(Effect):
     """Soft stops that the motion runs into now and then."""
@@ -168,3 +160,18 @@ class EndStops(Effect):
 
     def build(self, structure: Structure) -> None:
         structure.laws.append(NodeLaw("m1", FRAME, _Stops(self.stiffness, self.free)))
+
+
+EFFECTS: dict[str, type[Effect]] = {
+    effect.name: effect
+    for effect in (
+        TanhSaturation,
+        AsymmetricGain,
+        CoarseCommand,
+        EccentricEncoder,
+        VelocityCubed,
+        LoadFriction,
+        LopsidedFriction,
+        EndStops,
+    )
+}

@@ -121,17 +121,12 @@ def bench(path: Path) -> dict[str, Bench]:
     }
     found = {}
     for source, weighed in noises.items():
-        steps = tuple(_refit(stage, weighed, period, ~held_out) for stage in stages)
+        steps = tuple(
+            balance(s.model, weighed, period, s.forces, s.theta, s.strength, ~held_out)
+            for s in stages
+        )
         found[source] = Bench(loop, weighed, held_out, steps, load)
     return found
-
-
-def _refit(step: Balanced, windows: Windows, period: Period, fitted: NDArray[np.bool_]) -> Balanced:
-    """A step fitted to some of the lines."""
-    # Without forces a balance is one fit, and its motions are those it started from.
-    for _ in range(1 if step.forces else 2):
-        step = balance(step.model, windows, period, step.forces, step.theta, step.strength, fitted)
-    return step
 
 
 def close_again(path: Path, windows: Windows) -> PeriodicLoop:

@@ -29,6 +29,18 @@ def with_effects(traced: Traced, **changes: float) -> Traced:
     return replace(traced, state=replace(state, accepted=effects))
 
 
+def too_damped(fit: Fit) -> Fit:
+    """A base model that is far off."""
+    theta = fit.theta.copy()
+    for name in ("b1", "bc", "b2"):
+        theta[fit.model.names.index(name)] *= 4
+    return replace(fit, theta=theta)
+
+
+def limit_of(fit: Fit) -> float:
+    return float(critical_stiffness(fit.model, fit.theta).value)
+
+
 def test_a_steady_ramp_lies_within_the_fall() -> None:
     closed = fake_closed("explained", "time-varying")
     ratio = log_ratios(closed, with_effects(closed.traced, limit_log_fall=0.1))
@@ -49,14 +61,8 @@ def test_the_fall_is_that_of_a_ramp_from_the_middle_of_a_part_to_its_end() -> No
 def test_the_rest_of_an_effect_is_its_share_of_what_the_effect_did() -> None:
     closed = fake_closed("explained", "nonlinear")
     fit = closed.analysis.fit
-    # A base model that is far off.
-    theta = fit.theta.copy()
-    for name in ("b1", "bc", "b2"):
-        theta[fit.model.names.index(name)] *= 4
-    base = replace(fit, theta=theta)
-    moved = np.log(
-        critical_stiffness(base.model, theta).value / critical_stiffness(fit.model, fit.theta).value
-    )
+    base = too_damped(fit)
+    moved = np.log(limit_of(base) / limit_of(fit))
     left = replace(
         with_effects(closed.traced, limit_log_sd=0.0),
         verdict="unexplained",
@@ -74,19 +80,14 @@ def test_the_rest_of_an_effect_is_its_share_of_what_the_effect_did() -> None:
 def test_a_law_that_leaves_what_would_pass_for_noise_is_not_quite_right_either() -> None:
     closed = fake_closed("explained", "nonlinear")
     fit = closed.analysis.fit
-    theta = fit.theta.copy()
-    for name in ("b1", "bc", "b2"):
-        theta[fit.model.names.index(name)] *= 4
+    base = too_damped(fit)
     found = replace(
         with_effects(closed.traced, limit_log_sd=0.0),
         before=_tests(90.0, "nonlinear"),
         after=_tests(3.0, "nonlinear"),
     )
-    ratio = log_ratios(closed, found, replace(fit, theta=theta))
-    before, after = (
-        critical_stiffness(fit.model, parameters).value for parameters in (theta, fit.theta)
-    )
-    assert 0 < np.abs(ratio).max() <= abs(np.log(before / after)) / 30
+    ratio = log_ratios(closed, found, base)
+    assert 0 < np.abs(ratio).max() <= abs(np.log(limit_of(base) / limit_of(fit))) / 30
 
 
 def test_where_nothing_was_found_the_limit_falls_and_its_upper_end_stays() -> None:

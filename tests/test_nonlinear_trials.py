@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import sys
+from dataclasses import replace
 from functools import cache
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +21,10 @@ from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.effects.effect import Effect as BenchEffect
-from bayeshaptic.rig.laws import DryFriction, SmoothLaw
-from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
 from bayeshaptic.stability import critical_stiffness
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from foreign import LoadFriction, TanhSaturation, VelocityCubed
 
 LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 10.0, 3
@@ -144,52 +147,6 @@ def test_without_a_recording_there_is_nothing_to_simulate() -> None:
     assert nonlinear_trials(replace(state, etfe=bare), {"sign(v)"}) == []
 
 
-@dataclass(frozen=True)
-class _Made(BenchEffect):
-    """Something that the bench does not have by itself."""
-
-    name: ClassVar[str] = "made"
-    size: float = 0.0
-
-    def build(self, structure: Structure) -> None:
-        self.attach(structure)
-
-    def attach(self, structure: Structure) -> None:
-        pass
-
-
-@dataclass(frozen=True)
-class _Load(_Made):
-    """Dry friction on m2."""
-
-    def attach(self, structure: Structure) -> None:
-        structure.laws.append(NodeLaw("m2", FRAME, DryFriction(self.size, self.size)))
-
-
-@dataclass(frozen=True)
-class _Cubed(SmoothLaw):
-    coefficient: float
-
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        return -self.coefficient * v**3
-
-
-@dataclass(frozen=True)
-class _CubicDamping(_Made):
-    """-size v^3 on the motor."""
-
-    def attach(self, structure: Structure) -> None:
-        structure.laws.append(NodeLaw("m1", FRAME, _Cubed(self.size)))
-
-
-@dataclass(frozen=True)
-class _Tanh(_Made):
-    """An actuator that gives size tanh(u / size)."""
-
-    def command(self, force: np.ndarray, progress: np.ndarray, time_s: np.ndarray) -> np.ndarray:
-        return self.size * np.tanh(force / self.size)
-
-
 def best_of(effect: BenchEffect | str, raised: str) -> Trial:
     trials = nonlinear_trials(state_of(LHIFAM.with_effect(effect)), {raised})
     best = max(trials, key=lambda trial: trial.score)
@@ -201,14 +158,14 @@ def best_of(effect: BenchEffect | str, raised: str) -> Trial:
 
 
 def test_friction_on_the_other_mass_is_put_there() -> None:
-    best = best_of(_Load(0.5), "sign(v)")
+    best = best_of(LoadFriction(0.5), "sign(v)")
     assert best.accepted.title.endswith("at the load")
     assert best.accepted.estimates["friction_force"].mean == pytest.approx(0.5, rel=0.1)
 
 
 def test_damping_by_the_cube_is_told_from_drag(monkeypatch: pytest.MonkeyPatch) -> None:
     only(monkeypatch, "drag", "cubic_damping")
-    best = best_of(_CubicDamping(100.0), "v^3")
+    best = best_of(VelocityCubed(100.0), "v^3")
     assert best.name == "cubic_damping"
     found = best.accepted.estimates["cubic_damping"]
     assert found.mean == pytest.approx(100.0, rel=0.1) and found.unit == "N s^3/m^3"
@@ -217,7 +174,7 @@ def test_damping_by_the_cube_is_told_from_drag(monkeypatch: pytest.MonkeyPatch) 
 def test_a_gradual_saturation_is_told_from_a_hard_one(monkeypatch: pytest.MonkeyPatch) -> None:
     only(monkeypatch, "actuator_saturation", "soft_saturation")
     # The tanh is none of the family's curves, but near that of a sharpness of 2.5.
-    assert best_of(_Tanh(8.0), "u^3").name == "soft_saturation"
+    assert best_of(TanhSaturation(8.0), "u^3").name == "soft_saturation"
     assert best_of("actuator_saturation", "u^3").name == "actuator_saturation"
 
 

@@ -95,7 +95,8 @@ class ForceBench:
         if {CONNECTION, LOAD} & set(places) and len(system.mechanism.masses) > 1:
             x2, v2 = linear_motion(system, self.force, period, 1, SUBSTEPS)
             found[CONNECTION] = Motion(x - x2, v - v2, self.force)
-            found[LOAD] = Motion(x2, v2 + along, self.force)  # what is slow moves both masses
+            if LOAD in places:  # what is slow moves both masses
+                found[LOAD] = Motion(x2, v2 + along, self.force)
         return found
 
     def _hand(self, besides: Floats) -> Floats:

@@ -25,9 +25,9 @@ Floats = NDArray[np.float64]
 _ROUNDS = 12
 _NO_GAIN, _SHARE = 0.5, 1e-3  # of the log likelihood, and of what the force gains in all
 _ON, _BACK = 2.0, 0.3  # factors on a step that goes well, and on one that does not
-_NUDGE = 0.1  # relative, of strength and shape for the slopes; and the least share of it
-_NEAREST, _NEAR = 0.1, 0.5
+_NUDGE = 0.1  # relative, of strength and shape for the slopes
 _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
+_NEAREST, _NEAR = 0.1, 0.5  # least share of these distances, and what counts as a small one
 _MOST = 0.8  # log change a round
 _SHAPE_SD = 1.0  # log; how far a shape may be from the grid's
 

@@ -21,12 +21,6 @@ class ActuatorSaturation(CommandEffect):
     columns = ("u^3",)
     strength = ("force_limit", "force")
 
-    @classmethod
-    def candidates(
-        cls, model: Model, motion: Mapping[Place, Motion]
-    ) -> tuple[NonlinearEffect, ...]:
-        return (cls(),)
-
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return np.abs(motion.command).max() * np.array([0.95, 0.75, 0.55, 0.4, 0.25])
 
@@ -74,12 +68,6 @@ class DeadZone(CommandEffect):
     title = "dead zone of the actuator"
     columns = ("u^3",)
     strength = ("half_zone", "force")
-
-    @classmethod
-    def candidates(
-        cls, model: Model, motion: Mapping[Place, Motion]
-    ) -> tuple[NonlinearEffect, ...]:
-        return (cls(),)
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return motion.command.std() * np.array([0.01, 0.03, 0.1, 0.3, 0.6])

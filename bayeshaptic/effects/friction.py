@@ -12,6 +12,7 @@ from bayeshaptic.effects.nonlinear import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
 
+_FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
 _BY_VELOCITY = ("sign(v)", "v|v|", "v^3")
 
 
@@ -38,7 +39,7 @@ class CoulombFriction(NonlinearEffect):
         return tuple(cls(place) for place in (MOTOR, LOAD) if place in motion)
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         def force(step: Step) -> Floats:
@@ -75,7 +76,7 @@ class StribeckFriction(NonlinearEffect):
         )
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         rise = self.shape["static_excess"]
@@ -113,7 +114,7 @@ class DahlFriction(NonlinearEffect):
         )
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         distance = self.shape["presliding_distance"]
@@ -134,15 +135,9 @@ class _PowerOfVelocity(NonlinearEffect):
     columns = _BY_VELOCITY
     power: ClassVar[int]
 
-    @classmethod
-    def candidates(
-        cls, model: Model, motion: Mapping[Place, Motion]
-    ) -> tuple[NonlinearEffect, ...]:
-        return (cls(),)
-
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         scale = _force_scale(model, theta, motion) / motion.velocity.std() ** self.power
-        return scale * np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+        return scale * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         def force(step: Step) -> Floats:

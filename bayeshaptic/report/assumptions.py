@@ -103,8 +103,9 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
             "The limit is widened by what is left unexplained. Where the rest is linear, the "
             "response is multiplied by a random smooth deviation as large as the residual shows; "
             "where it is not, the limit is taken down as far as the rejected candidates and the "
-            "damping in doubt would take it, or, where an effect of the class was found, by what "
-            "is left of it. This is an estimate of what an unknown effect does, not a bound."
+            "damping in doubt would take it, its upper end left about where it was; or, where an "
+            "effect of the class was found, it is widened by what is left of that. This is an "
+            "estimate of what an unknown effect does, not a bound."
         )
     return tuple(found)
 
