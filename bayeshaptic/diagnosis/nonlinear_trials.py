@@ -196,6 +196,7 @@ def _with_points(etfe: Etfe, fit: Fit) -> Etfe:
 def _where(effect: NonlinearEffect) -> str:
     if isinstance(effect, CommandEffect):
         return ""
-    return {CONNECTION: " in the connection", LOAD: " at the load"}.get(
+    where = {CONNECTION: " in the connection", LOAD: " at the load"}.get(
         effect.place, " at the motor"
     )
+    return "" if effect.title.endswith(where) else where

@@ -106,11 +106,14 @@ def _panel(
     row: list[tuple[ForceCurve, dict[str, Any]]],
     factor: float,
 ) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     etfe = closed.base.etfe
     unit = etfe.position_unit + ("/s" if over == "velocity" else "")
     unit = etfe.force_unit if over == "command" else unit
     motion = scale(float(np.abs(row[0][0].motion).max()), unit)
     style.panel(axes, f"{_TITLES[over]}, {motion.unit}")
+    axes.xaxis.set_major_locator(MaxNLocator(4, symmetric=True))  # numbers of a stretch are long
     axes.axhline(0, color=style.PRIOR, linewidth=0.7)
     for curve, look in row:
         clear = curve.sd <= _VAGUE * np.median(curve.sd)
