@@ -23,13 +23,12 @@ if TYPE_CHECKING:
     from bayeshaptic.devices import Device, device_names, load_device
     from bayeshaptic.diagnosis.analysis import Analysis, analyse
     from bayeshaptic.diagnosis.closed import Closed, close_loop
-    from bayeshaptic.diagnosis.study_analysis import StudyAnalysis, analyse_study
     from bayeshaptic.errors import BayeshapticWarning, InputError, Notice
     from bayeshaptic.inference.arviz_io import load_posterior
     from bayeshaptic.inference.choose import Choice, choose_model
     from bayeshaptic.inference.least_squares import Fit, least_squares
     from bayeshaptic.inference.next_experiment import Experiment, next_experiment
-    from bayeshaptic.inference.population import Population, infer_population
+    from bayeshaptic.inference.population.infer import Population, infer_population
     from bayeshaptic.inference.posterior import Posterior
     from bayeshaptic.inference.sampler import sample
     from bayeshaptic.models import (
@@ -53,9 +52,9 @@ if TYPE_CHECKING:
         read_study,
         recording_from_arrays,
     )
-    from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
+    from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
     from bayeshaptic.report import write_report
-    from bayeshaptic.report.study_report import write_study_report
+    from bayeshaptic.report.study.write import write_study_report
     from bayeshaptic.stability import (
         Backward,
         Case,
@@ -67,11 +66,12 @@ if TYPE_CHECKING:
         device_limit,
         measure_relay,
     )
-    from bayeshaptic.stability.elasticities import Elasticities, elasticities
-    from bayeshaptic.stability.kb_region import kb_region
-    from bayeshaptic.stability.limit_table import LimitTable, limit_table
-    from bayeshaptic.stability.shares import VarianceShares, variance_shares
-    from bayeshaptic.stability.sweep import Sweep, sweep
+    from bayeshaptic.stability.guidance.elasticities import Elasticities, elasticities
+    from bayeshaptic.stability.guidance.shares import VarianceShares, variance_shares
+    from bayeshaptic.stability.guidance.sweep import Sweep, sweep
+    from bayeshaptic.stability.walls.limit_table import LimitTable, limit_table
+    from bayeshaptic.stability.walls.region import kb_region
+    from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
 
 __version__ = "0.1.0"
 
@@ -80,11 +80,11 @@ _HOMES = {
     "bayeshaptic.devices": ("Device", "device_names", "load_device"),
     "bayeshaptic.diagnosis.analysis": ("Analysis", "analyse"),
     "bayeshaptic.diagnosis.closed": ("Closed", "close_loop"),
-    "bayeshaptic.diagnosis.study_analysis": ("StudyAnalysis", "analyse_study"),
+    "bayeshaptic.study.analysis": ("StudyAnalysis", "analyse_study"),
     "bayeshaptic.errors": ("BayeshapticWarning", "InputError", "Notice"),
     "bayeshaptic.inference": ("Fit", "Posterior", "least_squares", "load_posterior", "sample"),
     "bayeshaptic.inference.choose": ("Choice", "choose_model"),
-    "bayeshaptic.inference.population": ("Population", "infer_population"),
+    "bayeshaptic.inference.population.infer": ("Population", "infer_population"),
     "bayeshaptic.models": (
         "HalfNormal",
         "LogNormal",
@@ -106,9 +106,9 @@ _HOMES = {
         "read_study",
         "recording_from_arrays",
     ),
-    "bayeshaptic.recordings.etfe": ("Etfe", "estimate_etfe"),
+    "bayeshaptic.recordings.response.etfe": ("Etfe", "estimate_etfe"),
     "bayeshaptic.report": ("write_report",),
-    "bayeshaptic.report.study_report": ("write_study_report",),
+    "bayeshaptic.report.study.write": ("write_study_report",),
     "bayeshaptic.stability": (
         "Backward",
         "Case",

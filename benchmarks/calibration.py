@@ -16,7 +16,7 @@ from scipy.stats import kstest
 from bayeshaptic.inference import least_squares, sample
 from bayeshaptic.models import HalfNormal, LogNormal, Model, NearZero, build_model, draw
 from bayeshaptic.recordings import Recording
-from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.noise import tremor_density, wander_density
 from bayeshaptic.rig.recording import SimulatedRecording

@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayeshaptic.rig.dynamics.laws import DryFriction, SmoothLaw
+from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
 from bayeshaptic.rig.effects.effect import Effect, Samples, Scales
-from bayeshaptic.rig.laws import DryFriction, SmoothLaw
-from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
-
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
 
 
 @dataclass(frozen=True)

@@ -18,17 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.harmonic_balance import Balanced, balance
-from bayeshaptic.diagnosis.inverse_dynamics import InverseDynamics, inverse_dynamics
-from bayeshaptic.diagnosis.periodic import FLOOR, PeriodicLoop, close_periodic
+from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics, inverse_dynamics
+from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
+from bayeshaptic.diagnosis.periodic.loop import FLOOR, PeriodicLoop, close_periodic
+from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Period, one_period, with_floor
 from bayeshaptic.diagnosis.state import REPORT, share
-from bayeshaptic.diagnosis.steady_motion import LOAD, Period, one_period, with_floor
-from bayeshaptic.effects.nonlinear import Motion
-from bayeshaptic.recordings.spectra import PeriodicSpectra
-from bayeshaptic.recordings.windows import Windows, compress
+from bayeshaptic.effects.nonlinear.protocol import Motion
+from bayeshaptic.recordings.response.spectra import PeriodicSpectra
+from bayeshaptic.recordings.response.windows import Windows, compress
 from bayeshaptic.report.figures.style import CYCLE, DATA, MODEL, OTHER, new_figure, panel
-
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
 
 BENCH = "two_mass_bench/MultisineTypeA.mat"
 SERVO = "emps/DATA_EMPS.mat"

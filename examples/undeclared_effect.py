@@ -24,8 +24,8 @@ import argparse
 from pathlib import Path
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.force_curve import VELOCITY, force_curve, motions
 from bayeshaptic.diagnosis.loop import residual_tests
+from bayeshaptic.diagnosis.residuals.force_curve import VELOCITY, force_curve, motions
 
 RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "lhifam-user-b.csv.gz"
 

@@ -13,11 +13,11 @@ from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.registry import effect_class
 from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.models import Model, build_model
-from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.rig import Bench, Effect, WhiteNoise, simulate
 from bayeshaptic.rig import register as on_the_bench
-from bayeshaptic.rig.structure import Relaxation, Structure
+from bayeshaptic.rig.dynamics.structure import Relaxation, Structure
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.loop import Candidate, Traced
-from bayeshaptic.diagnosis.residual import Test
+from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.diagnostics import Diagnostics
@@ -18,8 +18,8 @@ from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import build_model
 from bayeshaptic.models.model import Model
-from bayeshaptic.recordings.etfe import Etfe, TableSpectra
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe, TableSpectra
 from bayeshaptic.stability.critical import critical_stiffness
 
 ENSEMBLES, STEPS, WALKERS = 4, 25, 32

@@ -10,15 +10,15 @@ import numpy as np
 from fake_analysis import fake_analysis
 
 from bayeshaptic.devices import load_device
-from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits
-from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
-from bayeshaptic.recordings.references import Reference
+from bayeshaptic.recordings.known_limits import Reference
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON, Case, device_limit
 from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.study.analysis import Analysed, StudyAnalysis
+from bayeshaptic.study.configuration_limits import ConfigurationLimits
 
 DRAWS = 1500
 NAMES = ("anna", "ben", "carla", "david", "emma", "farid", "gül <b>", "h")

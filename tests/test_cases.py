@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
@@ -12,8 +11,8 @@ from bayeshaptic.models import build_model
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability.cases import FREE, HELD, Case, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.types import Floats
 
-Floats = NDArray[np.float64]
 MODEL = build_model("free", "phantom")
 
 

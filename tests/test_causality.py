@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
-from bayeshaptic.recordings.causality import (
+from bayeshaptic.recordings.read import read_recording, recording_from_arrays
+from bayeshaptic.recordings.signals.causality import (
     NOTABLE_SHARE,
     Causality,
     causality,
 )
-from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")

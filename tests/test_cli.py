@@ -19,17 +19,19 @@ import numpy as np
 import pytest
 
 import bayeshaptic
-from bayeshaptic import batch, cli, executors
+from bayeshaptic import cli
 from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.simulate import parse_effect
 from bayeshaptic.commands.talk import Talk
 from bayeshaptic.devices import device_names
-from bayeshaptic.diagnosis import analysis, closed, study_analysis
+from bayeshaptic.diagnosis import analysis, closed
 from bayeshaptic.errors import InputError
+from bayeshaptic.jobs import batch, executors
 from bayeshaptic.report import summary_json
 from bayeshaptic.report.headline import Headline
-from bayeshaptic.report.limits_section import table_of
 from bayeshaptic.report.reported import Reported
+from bayeshaptic.report.walls.section import table_of
+from bayeshaptic.study import analysis as study_analysis
 
 Run = Callable[..., tuple[int, str, str]]
 # The quickest analysis: two parameters, below the first mode.
@@ -76,7 +78,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         study_analysis, "analyse", lambda *a, **b: analysis.analyse(*a, **b | {"ess": 50})
     )
     monkeypatch.setattr(
-        "bayeshaptic.report.study_report.table_of", lambda cases: table_of(cases, draws=60)
+        "bayeshaptic.report.study.write.table_of", lambda cases: table_of(cases, draws=60)
     )
     monkeypatch.setattr("bayeshaptic.report.write_report", write)
 

@@ -10,25 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_analysis import fake_analysis
-from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 from toy_study import toy_model, toy_posterior
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.analysis import Analysis
-from bayeshaptic.diagnosis.configuration_limits import configuration_limits
-from bayeshaptic.diagnosis.study_analysis import Analysed, StudyAnalysis
-from bayeshaptic.diagnosis.study_cases import study_cases
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.configurations import Configurations, infer_configurations
-from bayeshaptic.inference.path import Path as Line
-from bayeshaptic.inference.population import prior_moments, study_coordinates
+from bayeshaptic.inference.population.configurations import Configurations, infer_configurations
+from bayeshaptic.inference.population.infer import prior_moments, study_coordinates
+from bayeshaptic.inference.population.path import Path as Line
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.recordings.study import Study, StudyEntry
-from bayeshaptic.report.population_json import population_json
-from bayeshaptic.report.study_words import people
+from bayeshaptic.report.study.population_json import population_json
+from bayeshaptic.report.study.words import people
+from bayeshaptic.study.analysis import Analysed, StudyAnalysis
+from bayeshaptic.study.cases import study_cases
+from bayeshaptic.study.configuration_limits import configuration_limits
+from bayeshaptic.types import Floats
 
-Floats = NDArray[np.float64]
 PLACES = (0.0, 0.2, 0.5, 0.7, 1.0)
 KEYS = (
     "device", "recordings", "users", "population", "correlation", "new_person", "configurations",

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.configuration_limits import ConfigurationLimits, configuration_limits
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.study.configuration_limits import ConfigurationLimits, configuration_limits
 
 MEASURED = (0.0, 0.3, 0.6, 1.0)
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from bayeshaptic.models import LinearSystem, build_model
-from bayeshaptic.models.dynamic_link import DynamicLink
-from bayeshaptic.models.mechanism import Mechanism
-from bayeshaptic.models.polynomial import evaluate
+from bayeshaptic.models.response.dynamic_link import DynamicLink
+from bayeshaptic.models.response.mechanism import Mechanism
+from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.stability import find_crossings
 from bayeshaptic.stability.crossings import search
-from bayeshaptic.stability.evaluated import EvaluatedResponse
+from bayeshaptic.stability.responses.evaluated import EvaluatedResponse
 
 T = 1e-3
 FREQUENCY_HZ = np.geomspace(0.3, 480, 50)

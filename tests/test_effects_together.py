@@ -17,7 +17,7 @@ from bayeshaptic.effects.registry import effect_class, effects, register
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.archive import model_from_dict, model_to_dict
 from bayeshaptic.models import HalfNormal, Model, Parameter, build_model, rigid
-from bayeshaptic.models.mechanism import Link
+from bayeshaptic.models.response.mechanism import Link
 from bayeshaptic.models.start import informed
 from bayeshaptic.rig import Bench, run_wall
 from bayeshaptic.stability import critical_stiffness

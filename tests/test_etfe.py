@@ -19,10 +19,10 @@ from linear_bench import (
 from scipy.signal import butter, lfilter
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.etfe import estimate_etfe
-from bayeshaptic.recordings.excitation import Repetition, excited_lines, find_repetition
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.rounding import repeated_rounding
+from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
+from bayeshaptic.recordings.signals.rounding import repeated_rounding
 
 MEASURED = Path(
     os.environ.get(

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.spectra import TableSpectra
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.spectra import TableSpectra
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability import critical_stiffness, etfe_critical_stiffness
 from bayeshaptic.stability.from_etfe import _caveat, _runs

@@ -14,9 +14,9 @@ from test_measured import PERIOD_S, servo
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.feedback import explain_force, has_feedback
+from bayeshaptic.diagnosis.feedback.explain import explain_force, has_feedback
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.report import force_words
+from bayeshaptic.report.loop import force_words
 
 FRICTION_N = 20.0
 

@@ -9,7 +9,7 @@ import pytest
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import read_frf, read_measurement
-from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 
 FREQUENCY = np.linspace(2.0, 300.0, 40)
 RESPONSE = 1 / (5.0 * (2j * np.pi * FREQUENCY) ** 2 + 7.0 * 2j * np.pi * FREQUENCY)

@@ -12,13 +12,13 @@ from bayeshaptic.inference.least_squares import least_squares, summarise
 from bayeshaptic.inference.next_experiment import information, next_experiment
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.read import recording_from_arrays
-from bayeshaptic.recordings.windows import compress
+from bayeshaptic.recordings.response.windows import compress
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.cases import Case
-from bayeshaptic.stability.elasticities import elasticities, with_delay
-from bayeshaptic.stability.guidance import usual_sweeps
-from bayeshaptic.stability.shares import explained, tied_groups, variance_shares
-from bayeshaptic.stability.sweep import sweep
+from bayeshaptic.stability.guidance.elasticities import elasticities, with_delay
+from bayeshaptic.stability.guidance.guidance import usual_sweeps
+from bayeshaptic.stability.guidance.shares import explained, tied_groups, variance_shares
+from bayeshaptic.stability.guidance.sweep import sweep
 
 
 def case(model, draws):

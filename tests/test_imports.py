@@ -14,20 +14,22 @@ PACKAGE = Path(__file__).parents[1] / "bayeshaptic"
 # From the bottom up. A module may import its own folder and what stands in a lower row; folders of
 # one row do not import each other unless SIDEWAYS says so.
 LAYERS = (
-    ("errors", "threads"),
+    ("errors", "threads", "types"),
+    ("numerics",),
     ("devices",),
     ("recordings",),
     ("models",),
     ("effects",),
     ("inference", "stability"),
     ("diagnosis",),
+    ("study",),
     ("report",),
-    ("batch", "study_batch", "executors", "cli", "commands", "__main__"),
+    ("jobs", "cli", "commands", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 TOP = LAYERS[-1]
 # The rig is the independent check on the models: beside them, not above.
-RIG_MAY_IMPORT = {"rig", "devices", "errors", "threads"}
+RIG_MAY_IMPORT = {"rig", "devices", "errors", "threads", "types"}
 MAY_IMPORT_RIG = {"rig", *TOP}
 
 

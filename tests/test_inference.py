@@ -8,8 +8,8 @@ import pytest
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.choose import choose_model
-from bayeshaptic.inference.mixture import fit_student_mixture, student
 from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform, draw
+from bayeshaptic.numerics.mixture import fit_student_mixture, student
 from bayeshaptic.rig import Bench, simulate
 
 
@@ -71,9 +71,9 @@ def test_the_posterior_holds_the_truth(held_phantom):
 def test_the_sampler_agrees_with_a_plain_stretch_run(held_phantom):
     import emcee
 
-    from bayeshaptic.inference.coordinates import coordinates
-    from bayeshaptic.inference.density import Density
-    from bayeshaptic.inference.near_zero import with_near_zero
+    from bayeshaptic.inference.sampling.coordinates import coordinates
+    from bayeshaptic.inference.sampling.density import Density
+    from bayeshaptic.inference.sampling.near_zero import with_near_zero
 
     _, _, fit, posterior = held_phantom
     here = with_near_zero(coordinates(fit.model), fit)  # without it no stretch run sees all of b2

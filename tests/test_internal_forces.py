@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bayeshaptic.diagnosis.force_bench import ForceBench
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.effects.internal_force import CONNECTION, MOTOR
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR
 from bayeshaptic.effects.registry import effect_class
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
-from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.excitation import Given
 

@@ -12,8 +12,8 @@ import bayeshaptic as bh
 from bayeshaptic.models import build_model
 from bayeshaptic.rig import Bench, run_wall
 from bayeshaptic.rig.truth import sampled_loop
-from bayeshaptic.stability.damping import Backward, LowPass, derivative, derivative_at_nyquist
-from bayeshaptic.stability.kb_region import kb_region, with_damping
+from bayeshaptic.stability.walls.damping import Backward, LowPass, derivative, derivative_at_nyquist
+from bayeshaptic.stability.walls.region import kb_region, with_damping
 
 FILTERS = (Backward(), LowPass(200.0), LowPass(40.0))
 DELAYS = (0.0, 0.2e-3, 1e-3, 1.4e-3, 2.6e-3)

@@ -9,12 +9,12 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.effects.registry import effect_class
-from bayeshaptic.inference.coordinates import sampling_coordinates
-from bayeshaptic.inference.density import Density
-from bayeshaptic.inference.ensembles import _spread_start
-from bayeshaptic.inference.importance import Adapted, adapt
-from bayeshaptic.inference.laplace import laplace
-from bayeshaptic.inference.mixture import student
+from bayeshaptic.inference.sampling.coordinates import sampling_coordinates
+from bayeshaptic.inference.sampling.density import Density
+from bayeshaptic.inference.sampling.ensembles import _spread_start
+from bayeshaptic.inference.sampling.importance import Adapted, adapt
+from bayeshaptic.inference.sampling.laplace import laplace
+from bayeshaptic.numerics.mixture import student
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 # Dampers of which only the sum is known: b1 is within its error of zero.

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from linear_bench import LHIFAM_FREE, Device
 
-from bayeshaptic.inference.gauss_newton import jacobian, minimise
-from bayeshaptic.inference.laplace import _truncated_moments as truncated_moments
 from bayeshaptic.inference.least_squares import _best_of_many, least_squares
+from bayeshaptic.inference.sampling.laplace import _truncated_moments as truncated_moments
 from bayeshaptic.models import LogNormal, free, grasped, rigid
+from bayeshaptic.numerics.gauss_newton import jacobian, minimise
 from bayeshaptic.recordings import Recording
-from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 CASES = [("lhifam", False), ("phantom", True)]

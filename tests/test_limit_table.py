@@ -11,13 +11,13 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.models import build_model
-from bayeshaptic.report.limit_rules import rules_of
-from bayeshaptic.report.limits_section import limits_section
+from bayeshaptic.report.walls.rules import rules_of
+from bayeshaptic.report.walls.section import limits_section
 from bayeshaptic.stability.cases import Case
-from bayeshaptic.stability.damping import Backward, LowPass
-from bayeshaptic.stability.joint import joint_region
-from bayeshaptic.stability.kb_region import kb_region
-from bayeshaptic.stability.limit_table import limit_table
+from bayeshaptic.stability.walls.damping import Backward, LowPass
+from bayeshaptic.stability.walls.joint import joint_region
+from bayeshaptic.stability.walls.limit_table import limit_table
+from bayeshaptic.stability.walls.region import kb_region
 
 COMPARE = (np.less, np.less_equal)
 

@@ -10,18 +10,18 @@ import pytest
 from test_examples import EXAMPLES, load
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.harmonic_balance import Basis, balance
-from bayeshaptic.diagnosis.inverse_dynamics import inverse_dynamics
-from bayeshaptic.diagnosis.periodic import close_periodic, is_periodic, periodic_tests
-from bayeshaptic.diagnosis.periodic_forces import force_candidates
-from bayeshaptic.diagnosis.periodic_trace import traced
+from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
+from bayeshaptic.diagnosis.periodic.forces import force_candidates
+from bayeshaptic.diagnosis.periodic.harmonic_balance import Basis, balance
+from bayeshaptic.diagnosis.periodic.loop import close_periodic, is_periodic, periodic_tests
+from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, one_period, places_of, with_floor
+from bayeshaptic.diagnosis.periodic.trace import traced
 from bayeshaptic.diagnosis.state import REPORT, share
-from bayeshaptic.diagnosis.steady_motion import LOAD, one_period, places_of, with_floor
-from bayeshaptic.effects.internal_force import CONNECTION
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.windows import compress
+from bayeshaptic.recordings.response.windows import compress
 
 Find = Callable[[str], Path]
 PERIOD_S = 1e-3

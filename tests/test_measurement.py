@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bayeshaptic.diagnosis.measurement import Inspection, inspect, repair_measurement
+from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability import critical_stiffness
 

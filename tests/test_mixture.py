@@ -8,9 +8,9 @@ from scipy.integrate import quad
 from scipy.stats import kstest, multivariate_t
 from scipy.stats import t as student_t
 
-from bayeshaptic.inference.importance import adapt
-from bayeshaptic.inference.mixture import StudentMixture, fit_student_mixture, student
-from bayeshaptic.inference.straight import nothing_to_straighten, straighten
+from bayeshaptic.inference.sampling.importance import adapt
+from bayeshaptic.numerics.mixture import StudentMixture, fit_student_mixture, student
+from bayeshaptic.numerics.straightening import nothing_to_straighten, straighten
 
 
 def two_humps(size: int = 2, freedom: float = 8.0) -> StudentMixture:

@@ -19,12 +19,12 @@ from bayeshaptic.models import (
     grasped,
     rigid,
 )
-from bayeshaptic.models.motion import linear_motion
 from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.start import informed, scales, starting_points
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.recordings import Recording
-from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.recordings.response.etfe import estimate_etfe
 
 FREE = ("m1", "b1", "bc", "kc", "m2", "b2")
 

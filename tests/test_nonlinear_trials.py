@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bayeshaptic.diagnosis import nonlinear_trials as tried
-from bayeshaptic.diagnosis.nonlinear_trials import nonlinear_trials
 from bayeshaptic.diagnosis.state import State, Trial
+from bayeshaptic.diagnosis.trials import nonlinear as tried
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.effects.registry import effects
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.etfe import estimate_etfe
+from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.effects.effect import Effect as BenchEffect
 from bayeshaptic.stability import critical_stiffness

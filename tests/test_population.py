@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from toy_study import toy_model, toy_posterior
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.gaussian_likelihood import fit_quadratic
-from bayeshaptic.inference.hierarchy import Hierarchy
-from bayeshaptic.inference.hyperparameters import LKJ, Layout
-from bayeshaptic.inference.pareto import pareto_k
-from bayeshaptic.inference.population import (
+from bayeshaptic.inference.population.cavity import Cavity, cavity, described
+from bayeshaptic.inference.population.gaussian_likelihood import fit_quadratic
+from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.inference.population.hyperparameters import LKJ, Layout
+from bayeshaptic.inference.population.infer import (
     Population,
     infer_population,
     prior_moments,
     study_coordinates,
 )
-from bayeshaptic.inference.population_cavity import Cavity, cavity, described
-from bayeshaptic.inference.population_sampler import sample_level
-
-Floats = NDArray[np.float64]
+from bayeshaptic.inference.population.sampler import sample_level
+from bayeshaptic.numerics.pareto import pareto_k
+from bayeshaptic.types import Floats
 
 
 def quadratic(mean: Floats, covariance: Floats, seed: int = 0) -> object:

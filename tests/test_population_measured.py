@@ -6,20 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from toy_study import toy_model
 
 import bayeshaptic as bh
-from bayeshaptic.inference.gaussian_likelihood import linearised
-from bayeshaptic.inference.hyperparameters import Layout
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.population import infer_population, prior_moments, study_coordinates
-from bayeshaptic.inference.population_cavity import cavity
+from bayeshaptic.inference.population.cavity import cavity
+from bayeshaptic.inference.population.gaussian_likelihood import linearised
+from bayeshaptic.inference.population.hyperparameters import Layout
+from bayeshaptic.inference.population.infer import (
+    infer_population,
+    prior_moments,
+    study_coordinates,
+)
+from bayeshaptic.inference.population.reweighting import _from_own, _sampled
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.reweighting import _from_own, _sampled
 from bayeshaptic.rig import Bench, simulate
+from bayeshaptic.types import Floats
 
-Floats = NDArray[np.float64]
 HANDS = ((0.0, 0.0), (0.35, -0.2), (-0.3, 0.25))  # log ks and log mh beside the paper's
 
 

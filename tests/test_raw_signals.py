@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayeshaptic.recordings.raw_signals import clipping, increment_unit, repeats
+from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit, repeats
 
 RNG = np.random.default_rng(0)
 MOTION = np.cumsum(np.cumsum(RNG.normal(size=5000)) * 1e-5 * np.hanning(5000))

@@ -21,12 +21,12 @@ from fake_analysis import CASES, FEEDBACK, fake_analysis
 import bayeshaptic
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.report import write, write_report
+from bayeshaptic.report.estimates import least_squares_limit, witnesses
 from bayeshaptic.report.figures import PICTURES, draw_pictures, png
 from bayeshaptic.report.figures.pairs import correlation, strongest
 from bayeshaptic.report.figures.residuals import third_octaves
 from bayeshaptic.report.figures.sampler import rank_histogram
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.limits import least_squares_limit, witnesses
 from bayeshaptic.report.quantities import estimate, interval, percent, quantity, scale
 from bayeshaptic.report.tables import comparison, parameters, safe
 from bayeshaptic.report.words import agreement, hump, misfit

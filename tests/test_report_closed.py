@@ -15,17 +15,18 @@ from browser import needs_browser, probe
 from fake_analysis import fake_analysis, fake_closed
 
 from bayeshaptic import read_recording, write_report
-from bayeshaptic.diagnosis.force_curve import force_curve, motions
+from bayeshaptic.diagnosis.residuals.force_curve import force_curve, motions
 from bayeshaptic.inference.least_squares import summarise
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.etfe import estimate_etfe
-from bayeshaptic.recordings.windows import compress
+from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.windows import compress
 from bayeshaptic.report import summary
 from bayeshaptic.report.assumptions import assumptions
-from bayeshaptic.report.figures import LOOP_PICTURES, loop_stiffness
+from bayeshaptic.report.figures import LOOP_PICTURES
+from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.loop_tables import candidates, errors, estimates, found, outcomes
-from bayeshaptic.report.loop_words import lacked, verdict
+from bayeshaptic.report.loop.tables import candidates, errors, estimates, found, outcomes
+from bayeshaptic.report.loop.words import lacked, verdict
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
 FAMILIES = ("linear", "nonlinear", "time-varying")

@@ -23,7 +23,7 @@ from bayeshaptic.rig import (
     run_wall,
     simulate,
 )
-from bayeshaptic.rig.structure import FRAME, Link, Structure
+from bayeshaptic.rig.dynamics.structure import FRAME, Link, Structure
 
 PERIOD = 1e-3
 HELD = Bench.from_device("lhifam", held=True)

@@ -9,9 +9,9 @@ from scipy.signal import tf2ss
 
 from bayeshaptic.devices import load_device
 from bayeshaptic.models import build_model, draw
-from bayeshaptic.models.mechanism import Link, Mechanism
-from bayeshaptic.models.sampled import from_poles, from_polynomials
-from bayeshaptic.models.system import LinearSystem
+from bayeshaptic.models.response.mechanism import Link, Mechanism
+from bayeshaptic.models.response.sampled import from_poles, from_polynomials
+from bayeshaptic.models.response.system import LinearSystem
 
 T = 1e-3
 FREQUENCY = np.geomspace(0.3, 499.9, 60)

@@ -9,8 +9,9 @@ import pytest
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import Model, build_model, draw
-from bayeshaptic.models.mechanism import Link, Mechanism
-from bayeshaptic.models.system import LinearSystem
+from bayeshaptic.models.response.mechanism import Link, Mechanism
+from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.roots import bracketed_roots
 from bayeshaptic.rig import Bench, critical_limit
 from bayeshaptic.stability import (
     confirms,
@@ -25,9 +26,8 @@ from bayeshaptic.stability import (
 from bayeshaptic.stability.binding import MODE, NEVER, RIGID, group_crossings
 from bayeshaptic.stability.crossings import search
 from bayeshaptic.stability.effective import effective_draws
-from bayeshaptic.stability.evaluated import EvaluatedResponse
-from bayeshaptic.stability.response import pole_response
-from bayeshaptic.stability.roots import bracketed_roots
+from bayeshaptic.stability.responses.evaluated import EvaluatedResponse
+from bayeshaptic.stability.responses.response import pole_response
 
 T = 1e-3
 CASES = [

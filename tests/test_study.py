@@ -10,7 +10,7 @@ import pytest
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import Recording, read_study
-from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 
 SIGNALS = np.random.default_rng(0).normal(size=(30, 2))
 

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from bayeshaptic import cli
-from bayeshaptic.diagnosis import study_analysis
-from bayeshaptic.inference import population_sampler
-from bayeshaptic.report import study_report
-from bayeshaptic.report.limits_section import table_of
+from bayeshaptic.inference.population import sampler as population_sampler
+from bayeshaptic.report.study import write as study_report
+from bayeshaptic.report.walls.section import table_of
 from bayeshaptic.rig import Bench, WhiteNoise, simulate, write_recording
+from bayeshaptic.study import analysis as study_analysis
 
 SECONDS = 4.0
 STUDY = """

@@ -15,13 +15,13 @@ from browser import needs_browser, probe
 from fake_study import NAMES, SIX_DB, fake_study
 
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.report import study_report
-from bayeshaptic.report.figures.study import STUDY_PICTURES
-from bayeshaptic.report.limits_section import limits_section, table_of
-from bayeshaptic.report.population_json import population_summary
-from bayeshaptic.report.study_headline import study_headline
-from bayeshaptic.report.study_report import write_study_report
-from bayeshaptic.report.study_words import missing, people
+from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
+from bayeshaptic.report.study import write as study_report
+from bayeshaptic.report.study.headline import study_headline
+from bayeshaptic.report.study.population_json import population_summary
+from bayeshaptic.report.study.words import missing, people
+from bayeshaptic.report.study.write import write_study_report
+from bayeshaptic.report.walls.section import limits_section, table_of
 
 SHAPES: dict[str, dict[str, Any]] = {
     "whole": {"people": 3, "free": 2, "places": (0.0, 1.0), "references": True, "failed": 1},
@@ -210,7 +210,7 @@ def test_a_file_in_the_way_is_one_line(tmp_path: Path) -> None:
 
 
 def test_references_are_drawn_where_they_are() -> None:
-    from bayeshaptic.report.figures import study_people
+    from bayeshaptic.report.figures.study import people as study_people
 
     figure = study_people.draw(study("whole"))
     (line,) = [line for line in figure.axes[0].lines if line.get_marker() == "v"]

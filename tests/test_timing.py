@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.timing import sampling_period
+from bayeshaptic.recordings.signals.timing import sampling_period
 
 RNG = np.random.default_rng(3)
 N = 5000

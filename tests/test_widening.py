@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from fake_analysis import fake_closed
 
-from bayeshaptic.diagnosis.recorded_cases import recorded, signature, widening
-from bayeshaptic.diagnosis.study_analysis import Analysed
 from bayeshaptic.recordings.study import StudyEntry
 from bayeshaptic.stability.cases import HELD
+from bayeshaptic.study.analysis import Analysed
+from bayeshaptic.study.recorded_cases import recorded, signature, widening
 
 
 def closed(name: str, log_sd: float = 0.0, shift: float = 0.0, family: str = "linear") -> Analysed:

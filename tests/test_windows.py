@@ -18,11 +18,11 @@ from linear_bench import (
 )
 from scipy.stats import chi2
 
-from bayeshaptic.recordings.etfe import TableSpectra, estimate_etfe
-from bayeshaptic.recordings.local_polynomial import NODES, interpolation, window_edges
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.reference import fit_local_rational, unit_mass
-from bayeshaptic.recordings.windows import compress
+from bayeshaptic.recordings.response.etfe import TableSpectra, estimate_etfe
+from bayeshaptic.recordings.response.local_polynomial import NODES, interpolation, window_edges
+from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
+from bayeshaptic.recordings.response.windows import compress
 
 PERIOD = 1e-3
 HIGHEST_HZ = 200.0

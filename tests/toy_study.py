@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.inference.diagnostics import Diagnostics
-from bayeshaptic.inference.population import study_coordinates
+from bayeshaptic.inference.population.infer import study_coordinates
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import build_model
 from bayeshaptic.models.model import Model
-
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
 
 
 def toy_model(*names: str, device: str = "phantom", base: str = "grasped") -> Model:

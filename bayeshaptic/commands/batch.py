@@ -56,9 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the reports; 0 where all came out, else 1."""
-    from bayeshaptic import executors
-    from bayeshaptic.batch import jobs, refuse_file, report_source
     from bayeshaptic.commands.talk import Talk
+    from bayeshaptic.jobs import executors
+    from bayeshaptic.jobs.batch import jobs, refuse_file, report_source
 
     folder = arguments.output.absolute()
     refuse_file(folder)

@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bayeshaptic.batch import Settings
+    from bayeshaptic.jobs.batch import Settings
 
 MODELS = ("auto", "rigid", "free", "grasped")
 
@@ -136,14 +136,14 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 def workers_from(arguments: argparse.Namespace) -> int:
     """How many processes to use."""
-    from bayeshaptic.executors import usable_cores
+    from bayeshaptic.jobs.executors import usable_cores
 
     return arguments.workers or usable_cores()
 
 
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """What `add_analysis_options` understood, as one thing."""
-    from bayeshaptic.batch import Settings
+    from bayeshaptic.jobs.batch import Settings
 
     return Settings(
         columns=arguments.columns,

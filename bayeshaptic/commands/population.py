@@ -52,10 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the population; 0, or 1 where a recording failed."""
-    from bayeshaptic.batch import Job
     from bayeshaptic.commands.talk import Talk
+    from bayeshaptic.jobs.batch import Job
+    from bayeshaptic.jobs.study_batch import report_population
     from bayeshaptic.recordings.read import recording_name
-    from bayeshaptic.study_batch import report_population
 
     folder = arguments.output or Path(f"{recording_name(arguments.source)}-population")
     job = Job(arguments.source, folder, settings_from(arguments))

@@ -10,8 +10,8 @@ from bayeshaptic.commands.options import add_quiet, positive
 from bayeshaptic.errors import InputError
 
 if TYPE_CHECKING:
-    from bayeshaptic.stability.relay import RelayMeasurement
-    from bayeshaptic.stability.relay_check import RelayCheck
+    from bayeshaptic.stability.relay.check import RelayCheck
+    from bayeshaptic.stability.relay.measure import RelayMeasurement
 
 NAME = "relay"
 SUMMARY = "measure gain margin and frequency from a relay recording"
@@ -64,8 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.models import build_model
     from bayeshaptic.recordings.read import read_measurement
     from bayeshaptic.recordings.recording import Recording
-    from bayeshaptic.stability.relay import measure_relay
-    from bayeshaptic.stability.relay_check import check_relay
+    from bayeshaptic.stability.relay.check import check_relay
+    from bayeshaptic.stability.relay.measure import measure_relay
 
     recording = read_measurement(arguments.recording, arguments.columns, arguments.period_s)
     if not isinstance(recording, Recording):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -15,14 +15,13 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model, Prior, build_model
 from bayeshaptic.recordings.checks import check_recording
-from bayeshaptic.recordings.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.stability.tail import TailWatch
 from bayeshaptic.threads import single_threaded
-
-Progress = Callable[[float, str], None]
+from bayeshaptic.types import Progress
 
 # Effective draws of every parameter that a report asks for; sampling then goes on until 20 lie
 # below the critical stiffness of 0.1 % risk.

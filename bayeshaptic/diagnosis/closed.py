@@ -17,15 +17,20 @@ from bayeshaptic.diagnosis.analysis import (
     finish,
 )
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
-from bayeshaptic.diagnosis.feedback import ForceExplained, explain_force, has_feedback, trace_force
+from bayeshaptic.diagnosis.feedback.explain import (
+    ForceExplained,
+    explain_force,
+    has_feedback,
+    trace_force,
+)
 from bayeshaptic.diagnosis.loop import Traced, trace
 from bayeshaptic.diagnosis.state import REPORT, Accepted, share
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.least_squares import Fit, polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model, Prior
-from bayeshaptic.recordings.etfe import Etfe
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
 
 _BEFORE_ESS = 1000

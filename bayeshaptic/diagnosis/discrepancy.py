@@ -13,16 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.loop import UNEXPLAINED, Traced
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from bayeshaptic.types import Complexes, Floats
 
 _DRAWS = 2000
 _GRID = 1500

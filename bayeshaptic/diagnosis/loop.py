@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.columns import nonlinear_tests
-from bayeshaptic.diagnosis.drift import drift_tests
-from bayeshaptic.diagnosis.drift_trials import drift_trials
-from bayeshaptic.diagnosis.linear_trials import linear_trials
-from bayeshaptic.diagnosis.measurement import measurement_tests, repair_measurement
-from bayeshaptic.diagnosis.nonlinear_trials import nonlinear_trials
-from bayeshaptic.diagnosis.periodic import is_periodic
-from bayeshaptic.diagnosis.residual import Test, frequency_tests
+from bayeshaptic.diagnosis.periodic.loop import is_periodic
+from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
+from bayeshaptic.diagnosis.residuals.drift import drift_tests
+from bayeshaptic.diagnosis.residuals.residual import Test, frequency_tests
+from bayeshaptic.diagnosis.samples.mend import measurement_tests, repair_measurement
 from bayeshaptic.diagnosis.state import State, Trial
+from bayeshaptic.diagnosis.trials.drift import drift_trials
+from bayeshaptic.diagnosis.trials.linear import linear_trials
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.inference.least_squares import Fit
-from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.types import Tick
 
 ROUNDS = 3
 _LAW_ERROR = 0.2  # of the statistic that raised a nonlinear force
@@ -29,7 +29,6 @@ _RIVAL = 0.85  # share of the best score that a rival has at least
 _NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit
 _TIE = 6.0  # difference of scores that one recording does not decide
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
-Tick = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
     Traced
     """
     if is_periodic(etfe):  # its residual repeats: lines are held out, not windows of noise
-        from bayeshaptic.diagnosis.periodic_trace import trace_periodic
+        from bayeshaptic.diagnosis.periodic.trace import trace_periodic
 
         return trace_periodic(etfe, fit, tick)
     before = tests = seen = residual_tests(fit, etfe)

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
-from bayeshaptic.recordings.etfe import Etfe
-from bayeshaptic.recordings.windows import Windows
-
-Floats = NDArray[np.float64]
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.types import Floats
 
 # Windows are dealt out in turn: half of them to fit, a quarter to choose, a quarter to report on.
 FIT, CHOOSE, REPORT = (0, 2), (1,), (3,)

@@ -21,13 +21,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bayeshaptic.models import LinearSystem, Model, Parameter
-from bayeshaptic.recordings.etfe import Etfe
-
-Floats = NDArray[np.float64]
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.types import Floats
 
 
 @dataclass(frozen=True)

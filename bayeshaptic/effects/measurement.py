@@ -1,6 +1,6 @@
 """Effects of encoder, clock and logger: the data or the noise change, the device does not.
 
-They have no parameters in the model. `bayeshaptic.diagnosis.measurement` finds them in the samples
+They have no parameters in the model. `bayeshaptic.diagnosis.samples.mend` finds them in the samples
 and, where that can be done, mends the recording.
 """
 

@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bayeshaptic.models import Model, Parameter
 from bayeshaptic.models.start import informed
-from bayeshaptic.recordings.etfe import Etfe
-
-Floats = NDArray[np.float64]
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.types import Floats
 
 MOTOR, BODY, HAND = "m1", "m2", "mh"
 MASSES = {MOTOR: 0, BODY: 1, HAND: 2}

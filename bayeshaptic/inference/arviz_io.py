@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.archive import model_from_dict, model_to_dict
@@ -21,8 +20,8 @@ from bayeshaptic.inference.diagnostics import diagnose
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import draw
+from bayeshaptic.types import Floats
 
-Floats = NDArray[np.float64]
 _PREDICTIVE_DRAWS = 4  # a walker: the response at every frequency is large
 _LIKELIHOOD_DRAWS = 20  # a walker
 _PRIOR_DRAWS = 2000

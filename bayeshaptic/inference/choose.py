@@ -11,7 +11,7 @@ from bayeshaptic.devices import Device
 from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.structures import STRUCTURES
-from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
 
 _MATERIAL = 2.0  # a richer model that misfits too must cut the squared residual by this factor

@@ -9,16 +9,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
-from bayeshaptic.inference.gauss_newton import jacobian, minimise
 from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.sampling.coordinates import Coordinates, coordinates, reach
 from bayeshaptic.models import Model
 from bayeshaptic.models.start import informed, starting_points
-from bayeshaptic.recordings.etfe import Etfe
-from bayeshaptic.recordings.windows import Windows, compress
+from bayeshaptic.numerics.gauss_newton import jacobian, minimise
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import Windows, compress
 from bayeshaptic.threads import single_threaded
-
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
 
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1

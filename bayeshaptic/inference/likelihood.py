@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.models import Model
-from bayeshaptic.recordings.windows import Windows
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.types import Complexes, Floats
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 _CHUNK = 128
 
 

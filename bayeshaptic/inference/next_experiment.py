@@ -15,14 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.coordinates import Coordinates, coordinates
-from bayeshaptic.inference.gauss_newton import jacobian
 from bayeshaptic.inference.least_squares import Fit, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.sampling.coordinates import Coordinates, coordinates
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.structures import FREE, GRASPED, HAND
-
-Floats = NDArray[np.float64]
+from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.types import Floats
 
 _OCTAVE = 2**0.5  # half an octave to either side of a crossing
 _FEWEST = 6  # windows in that band

@@ -9,14 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.models import Model
-from bayeshaptic.recordings.etfe import Etfe
-from bayeshaptic.recordings.windows import Windows
-
-Floats = NDArray[np.float64]
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.types import Floats
 
 _DOMINATED = 0.5  # posterior sd over prior sd from which the prior decides
 

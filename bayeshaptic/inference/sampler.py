@@ -6,25 +6,22 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.coordinates import sampling_coordinates
-from bayeshaptic.inference.density import Density
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
-from bayeshaptic.inference.ensembles import Ensemble, refitted, warmed_up
-from bayeshaptic.inference.importance import adapt
-from bayeshaptic.inference.laplace import laplace
 from bayeshaptic.inference.least_squares import Fit, least_squares
-from bayeshaptic.inference.near_zero import redrawing, start_of, with_near_zero
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampling.coordinates import sampling_coordinates
+from bayeshaptic.inference.sampling.density import Density
+from bayeshaptic.inference.sampling.ensembles import Ensemble, refitted, warmed_up
+from bayeshaptic.inference.sampling.importance import adapt
+from bayeshaptic.inference.sampling.laplace import laplace
+from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
 from bayeshaptic.models import Model
-from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
+from bayeshaptic.types import Floats, Progress
 
-Floats = NDArray[np.float64]
-Progress = Callable[[float, str], None]
-"""Called with the share done (0 to 1) and a word about it."""
 Until = Callable[[Floats], int]
 """Called with the chains (ensembles, S, walkers, P): how many steps they should have in all."""
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.coordinates import coordinates
-from bayeshaptic.inference.gauss_newton import jacobian
 from bayeshaptic.inference.least_squares import weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.sampling.coordinates import coordinates
 from bayeshaptic.models import Model
 from bayeshaptic.models.model import LinearEffect
 from bayeshaptic.models.structures import HAND
-from bayeshaptic.recordings.windows import Windows
-
-Floats = NDArray[np.float64]
+from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.types import Floats
 
 
 def starting_bases(model: Model, theta: Floats) -> Floats:

@@ -14,7 +14,7 @@ from bayeshaptic.models.prior import (
     draw,
     prior_from_table,
 )
-from bayeshaptic.models.system import LinearSystem
+from bayeshaptic.models.response.system import LinearSystem
 
 __all__ = [
     "HalfNormal",

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.parameter import Parameter, unit_of
 from bayeshaptic.models.prior import Prior
+from bayeshaptic.models.response.system import Complexes, Floats, LinearSystem
 from bayeshaptic.models.structures import Structure
-from bayeshaptic.models.system import Complexes, Floats, LinearSystem
 
 if TYPE_CHECKING:
     from bayeshaptic.devices import Device

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.models.build import delay_prior
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.prior import HalfNormal, LogNormal, Prior, draw
 from bayeshaptic.models.structures import GROUND_DAMPERS
-from bayeshaptic.recordings.etfe import Etfe
-
-Floats = NDArray[np.float64]
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.types import Floats
 
 
 @dataclass(frozen=True)

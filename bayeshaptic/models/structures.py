@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayeshaptic.models.mechanism import Link, Mechanism
+from bayeshaptic.models.response.mechanism import Link, Mechanism
+from bayeshaptic.types import Floats
 
-Floats = NDArray[np.float64]
 Values = Mapping[str, Floats]
 
 # name: (dimension, title)

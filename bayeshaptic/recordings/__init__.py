@@ -1,11 +1,17 @@
 """What was measured: recordings, studies, their readers and checks."""
 
 from bayeshaptic.recordings.checks import check_recording
-from bayeshaptic.recordings.frf_table import read_frf
-from bayeshaptic.recordings.raw_signals import Clipping, Repeats, clipping, increment_unit, repeats
 from bayeshaptic.recordings.read import read_measurement, read_recording, recording_from_arrays
 from bayeshaptic.recordings.readers import Reader, register_reader
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.frf_table import read_frf
+from bayeshaptic.recordings.signals.raw_signals import (
+    Clipping,
+    Repeats,
+    clipping,
+    increment_unit,
+    repeats,
+)
 from bayeshaptic.recordings.study import Study, StudyEntry, read_study
 
 __all__ = [

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from bayeshaptic.devices import STRUCTURES, Device
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.recordings.causality import causality
-from bayeshaptic.recordings.raw_signals import increment_unit
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.timing import NOTABLE_JITTER
+from bayeshaptic.recordings.signals.causality import causality
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
 
 # Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
 FEWEST_SAMPLES = 1000

@@ -17,11 +17,11 @@ from bayeshaptic.recordings.columns import (
     parse_columns,
     pick,
 )
-from bayeshaptic.recordings.etfe import Etfe
-from bayeshaptic.recordings.frf_table import frf_from_arrays
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.timing import sampling_period
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.frf_table import frf_from_arrays
+from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.units import base_unit, choose_units
 
 Columns = str | Mapping[str, str] | None

@@ -11,10 +11,10 @@ from bayeshaptic.devices import Device, device_from_table, device_names, load_de
 from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import parse_columns
-from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.known_limits import Reference, read_references
 from bayeshaptic.recordings.read import Columns, read_measurement
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.references import Reference, read_references
+from bayeshaptic.recordings.response.etfe import Etfe
 
 STUDY_KEYS = ("device", "prior", "recording", "reference")
 ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns")

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.diagnosis.feedback import has_feedback
+from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.inference.least_squares import MISFIT
-from bayeshaptic.report.limits import decibel, own_limit
-from bayeshaptic.report.loop_words import in_short
+from bayeshaptic.report.estimates import decibel, own_limit
+from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.quantities import estimate, percent, pure, quantity
 from bayeshaptic.report.summary import analysis_of, closed_of, tip_limit
 

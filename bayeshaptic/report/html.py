@@ -11,10 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic import __version__
-from bayeshaptic.report import force_words, loop_tables, loop_words, tables, words
+from bayeshaptic.report import tables, words
 from bayeshaptic.report.assumptions import assumptions, priors, versions
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.loop import tables as loop_tables
+from bayeshaptic.report.loop import words as loop_words
 from bayeshaptic.report.summary import analysis_of, closed_of, measured_of
 
 if TYPE_CHECKING:
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.errors import Notice
 
-HERE = Path(__file__).parent
+TEMPLATES = Path(__file__).parent / "templates"
 LABELS = {
     "safe": "Recommendation",
     "caution": "Recommendation, with caution",
@@ -102,11 +105,11 @@ def embedded(name: str, png: bytes, alternative: str = "") -> EmbeddedPicture:
 
 
 def template(name: str) -> Template:
-    """A template of this folder."""
+    """A template of the folder `templates`."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(HERE, encoding="utf-8"),
+        loader=FileSystemLoader(TEMPLATES, encoding="utf-8"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -117,7 +120,7 @@ def template(name: str) -> Template:
 
 def style() -> str:
     """The style sheet of every page."""
-    return (HERE / "report.css").read_text(encoding="utf-8")
+    return (TEMPLATES / "report.css").read_text(encoding="utf-8")
 
 
 def written() -> str:

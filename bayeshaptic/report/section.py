@@ -30,7 +30,7 @@ class Section:
 
 
 def section(name: str, figures: Mapping[str, tuple[Figure, str]], **values: Any) -> Section:
-    """Render the template `name` of this folder, which shows its figures by `macros.jinja`.
+    """Render the template `name`, which shows its figures by `macros.jinja`.
 
     Parameters
     ----------

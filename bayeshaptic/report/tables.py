@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.report.limits import RISKS, decibel, finite, witnesses
+from bayeshaptic.report.estimates import RISKS, decibel, finite, witnesses
 from bayeshaptic.report.quantities import interval, percent, pretty_unit, quantity, scale, spread_of
 from bayeshaptic.report.summary import QUANTILES, tip_limit
 

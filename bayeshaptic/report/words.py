@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.report.estimates import own_limit
 from bayeshaptic.report.figures.residuals import third_octaves
 from bayeshaptic.report.headline import misfit_factor, misfit_is_clear
-from bayeshaptic.report.limits import own_limit
 from bayeshaptic.report.quantities import estimate, interval, percent, pure, quantity
 
 if TYPE_CHECKING:

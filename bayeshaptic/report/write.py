@@ -10,18 +10,18 @@ from typing import Any
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, draw_pictures
-from bayeshaptic.report.guidance_section import guidance_section
+from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.html import render
-from bayeshaptic.report.limits_section import (
+from bayeshaptic.report.section import Section
+from bayeshaptic.report.summary import analysis_of, summary_json
+from bayeshaptic.report.walls.section import (
     case_of,
     friction_of,
     limits_section,
     resolution_of,
     table_of,
 )
-from bayeshaptic.report.section import Section
-from bayeshaptic.report.summary import analysis_of, summary_json
 from bayeshaptic.threads import single_threaded
 
 # Whoever waits for a report looks for its summary: it arrives when the rest is there.

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.rig.dynamics.plant import Plant, assemble
+from bayeshaptic.rig.dynamics.structure import chain, check_parameters
 from bayeshaptic.rig.effects import Effect, Scales, make_effect
-from bayeshaptic.rig.plant import Plant, assemble
-from bayeshaptic.rig.structure import chain, check_parameters
 
 if TYPE_CHECKING:
     from bayeshaptic.devices import Device

@@ -8,8 +8,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.noise import shaped_noise
-from bayeshaptic.rig.plant import Array
 
 
 @runtime_checkable

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.fft
 
-from bayeshaptic.rig.plant import Array
+from bayeshaptic.rig.dynamics.plant import Array
 
 
 def shaped_noise(

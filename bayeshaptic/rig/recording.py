@@ -12,7 +12,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.bench import Bench
-from bayeshaptic.rig.plant import Array
+from bayeshaptic.rig.dynamics.plant import Array
 
 COLUMNS = {"N": ("time_s", "force_n", "position_m"), "Nm": ("time_s", "torque_nm", "angle_rad")}
 

@@ -9,9 +9,9 @@ import numpy as np
 import scipy.integrate
 
 from bayeshaptic.rig.bench import Bench
+from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.effects import Scales
 from bayeshaptic.rig.noise import tremor_density, wander_density
-from bayeshaptic.rig.plant import Array
 
 
 def motion_scales(bench: Bench) -> Scales:

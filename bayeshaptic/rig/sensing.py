@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.rig.bench import Bench
+from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.effects.effect import Effect, Log, Samples
 from bayeshaptic.rig.noise import shaped_noise, tremor_density, wander_density
-from bayeshaptic.rig.plant import Array
 from bayeshaptic.rig.recording import SimulatedRecording
 
 

@@ -16,15 +16,15 @@ import scipy.optimize
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.bench import Bench
-from bayeshaptic.rig.plant import Array, Plant
-from bayeshaptic.rig.propagate import (
+from bayeshaptic.rig.dynamics.plant import Array, Plant
+from bayeshaptic.rig.dynamics.propagate import (
     generator,
     layout,
     period_map,
     split_delay,
     stretches,
 )
-from bayeshaptic.rig.stepper import delay_lookup
+from bayeshaptic.rig.dynamics.stepper import delay_lookup
 
 # Moments of the recording at which a mechanism that changes is looked at.
 MOMENTS = 11

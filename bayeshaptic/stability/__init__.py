@@ -4,23 +4,23 @@ from bayeshaptic.stability.binding import BindingCrossing
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.crossings import Crossings, find_crossings
-from bayeshaptic.stability.damping import Backward, LowPass
-from bayeshaptic.stability.elasticities import Elasticities, elasticities
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
-from bayeshaptic.stability.kb_region import KbRegion, kb_region
-from bayeshaptic.stability.kb_width import Boundary, ZWidth
-from bayeshaptic.stability.limit_table import LimitTable, limit_table
-from bayeshaptic.stability.relay import RelayMeasurement, measure_relay
-from bayeshaptic.stability.relay_check import RelayCheck, check_relay
+from bayeshaptic.stability.guidance.elasticities import Elasticities, elasticities
+from bayeshaptic.stability.guidance.shares import Share, VarianceShares, variance_shares
+from bayeshaptic.stability.guidance.sweep import Jump, Sweep, sweep
+from bayeshaptic.stability.relay.check import RelayCheck, check_relay
+from bayeshaptic.stability.relay.measure import RelayMeasurement, measure_relay
 from bayeshaptic.stability.rules import (
     ground_damping,
     passivity_limit,
     quantisation_limit,
     rigid_limit,
 )
-from bayeshaptic.stability.shares import Share, VarianceShares, variance_shares
 from bayeshaptic.stability.spectral_radius import confirms, spectral_radius
-from bayeshaptic.stability.sweep import Jump, Sweep, sweep
+from bayeshaptic.stability.walls.damping import Backward, LowPass
+from bayeshaptic.stability.walls.limit_table import LimitTable, limit_table
+from bayeshaptic.stability.walls.region import KbRegion, kb_region
+from bayeshaptic.stability.walls.width import Boundary, ZWidth
 
 __all__ = [
     "Backward",

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayeshaptic.models.polynomial import evaluate
-from bayeshaptic.models.system import LinearSystem
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int_]
+from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.types import Floats, Ints
 
 RIGID, AGAINST_HAND, MODE, NYQUIST, NEVER, NONE = range(6)
 TITLES = {

@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.critical import ENOUGH_BELOW, MOST_DRAWS, CriticalStiffness
 from bayeshaptic.stability.effective import effective_draws
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int_]
+from bayeshaptic.types import Floats, Ints
 
 FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.model import Model
@@ -15,9 +15,7 @@ from bayeshaptic.stability.crossings import find_crossings, rational
 from bayeshaptic.stability.effective import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
 from bayeshaptic.threads import single_threaded
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int_]
+from bayeshaptic.types import Floats, Ints
 
 ENOUGH_BELOW = 20  # effective draws below a stiffness that is called safe
 MOST_DRAWS = 150_000  # 0.1 % risk needs 20,000 effective draws

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.models.system import LinearSystem
-from bayeshaptic.stability.evaluated import EvaluableSystem, EvaluatedResponse
-from bayeshaptic.stability.grid import search_grid
-from bayeshaptic.stability.linked import linked_response
-from bayeshaptic.stability.response import Response, pole_response
-from bayeshaptic.stability.roots import bracketed_roots
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int_]
+from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.roots import bracketed_roots
+from bayeshaptic.stability.responses.evaluated import EvaluableSystem, EvaluatedResponse
+from bayeshaptic.stability.responses.grid import search_grid
+from bayeshaptic.stability.responses.linked import linked_response
+from bayeshaptic.stability.responses.response import Response, pole_response
+from bayeshaptic.types import Floats, Ints
 
 _CHUNK = 64  # rows at a time: the arrays of one chunk stay in the cache
 _DIP_POINTS = 17

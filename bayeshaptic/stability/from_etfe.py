@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayeshaptic.recordings.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.local_fit import LocalFit, ResponseData, local_fit, response_data
 from bayeshaptic.threads import single_threaded
-
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
 
 DRAWS = 4000
 _STEP = 0.03  # relative distance of the places where the phase is looked at

@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import digamma
 
-from bayeshaptic.recordings.etfe import Etfe
-from bayeshaptic.recordings.windows import compress
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import compress
+from bayeshaptic.types import Complexes, Floats
 
 _ORDER = 3
 _RICHER = 5

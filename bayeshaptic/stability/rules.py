@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from bayeshaptic.models.system import LinearSystem
-
-Floats = NDArray[np.float64]
+from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.types import Floats
 
 
 def rigid_limit(

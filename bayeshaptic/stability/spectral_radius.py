@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.models.system import Filter, LinearSystem
-
-Floats = NDArray[np.float64]
+from bayeshaptic.models.response.system import Filter, LinearSystem
+from bayeshaptic.types import Floats
 
 
 def spectral_radius(system: LinearSystem, period_s: float, stiffness: Floats) -> Floats:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.critical import (
     ENOUGH_BELOW,
@@ -15,8 +12,7 @@ from bayeshaptic.stability.critical import (
     critical_stiffness,
     most_draws,
 )
-
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
 
 LEAST_RISK = 0.001
 _MARGIN = 1.1

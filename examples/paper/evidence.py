@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
+
 LogLikelihood = Callable[[Floats], Floats]
 
 DRAWS = 800

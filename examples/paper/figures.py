@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bayeshaptic.models import build_model
 from bayeshaptic.report.figures import style
 from bayeshaptic.stability import find_crossings
+from bayeshaptic.types import Floats
 
 from .identification import Identified
 from .published import TITLES, decibel
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 DRAWS = 300
 POINTS = 900

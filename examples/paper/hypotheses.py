@@ -6,17 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.stability import find_crossings
+from bayeshaptic.types import Floats
 
 from .evidence import Evidence, evidence
 from .published import delay_s, values
 from .relay_data import PERIOD_S, RelayData
 
-Floats = NDArray[np.float64]
 Values = dict[str, Floats]
 
 

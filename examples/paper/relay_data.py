@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import log_ndtr, logsumexp
 
 from bayeshaptic.models import LinearSystem
-
-Floats = NDArray[np.float64]
+from bayeshaptic.types import Floats
 
 PERIOD_S = 1e-3
 POINTS = 3  # places inside a bin of the power spectral density

@@ -6,17 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from bayeshaptic.models import LinearSystem
-from bayeshaptic.models.mechanism import Link
+from bayeshaptic.models.response.mechanism import Link
+from bayeshaptic.types import Floats
 
 from .hypotheses import Hypothesis, Unknown, Values, Weighed, weigh
 from .published import BIN_HZ, TABLES, relays, values
 from .relay_data import PERIOD_S, RelayData
-
-Floats = NDArray[np.float64]
 
 LHIFAM = ("lhifam", "grasped")
 PHANTOM = ("phantom", "free")

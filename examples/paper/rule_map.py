@@ -11,10 +11,9 @@ from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.structures import FREE
 from bayeshaptic.stability import find_crossings, rigid_limit
 from bayeshaptic.stability.binding import MODE, binding_kinds
+from bayeshaptic.types import Floats
 
 from .published import TABLES, delay_s, values
-
-Floats = NDArray[np.float64]
 
 PERIOD_S = 1e-3
 MODE_HZ = np.geomspace(20.0, 300.0, 61)

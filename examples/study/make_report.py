@@ -10,8 +10,8 @@ import argparse
 from pathlib import Path
 
 import bayeshaptic as bh
-from bayeshaptic import executors
-from bayeshaptic.report.study_report import write_study_report
+from bayeshaptic.jobs import executors
+from bayeshaptic.report.study.write import write_study_report
 from bayeshaptic.threads import one_thread_from_the_start
 
 FOLDER = Path(__file__).parent

@@ -12,11 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.report.figures import (
     crossings,
-    loop_force,
-    loop_inverse,
-    loop_residual,
-    loop_stiffness,
-    loop_tests,
     marginals,
     pairs,
     residuals,
@@ -24,6 +19,11 @@ from bayeshaptic.report.figures import (
     sampler,
     stiffness,
 )
+from bayeshaptic.report.figures.loop import force as loop_force
+from bayeshaptic.report.figures.loop import inverse as loop_inverse
+from bayeshaptic.report.figures.loop import residual as loop_residual
+from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
+from bayeshaptic.report.figures.loop import tests as loop_tests
 from bayeshaptic.report.figures.style import png
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bayeshaptic.diagnosis.analysis import Analysis
-    from bayeshaptic.recordings.etfe import Etfe
+    from bayeshaptic.recordings.response.etfe import Etfe
 
 
 def draw(analysis: Analysis) -> Figure:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.report.estimates import RISKS, Witness, decibel, own_limit, witnesses
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.limits import RISKS, Witness, decibel, own_limit, witnesses
 from bayeshaptic.report.quantities import Scale, percent, scale
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.effects.effect import Effect, Scales, register
-from bayeshaptic.rig.plant import Array
 
 
 @register

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.rig.dynamics.structure import FRAME, GROUND, Link, Relaxation, Structure
 from bayeshaptic.rig.effects.effect import Effect, Scales, register
-from bayeshaptic.rig.structure import FRAME, GROUND, Link, Relaxation, Structure
 
 
 def _mounted(mass: float, frequency_hz: float, damping_ratio: float) -> tuple[float, float]:

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.rig.plant import Array
-from bayeshaptic.rig.structure import Structure
+from bayeshaptic.rig.dynamics.plant import Array
+from bayeshaptic.rig.dynamics.structure import Structure
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bayeshaptic.rig.dynamics.laws import Dahl, DryFriction
+from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
 from bayeshaptic.rig.effects.effect import Effect, Scales, register
-from bayeshaptic.rig.laws import Dahl, DryFriction
-from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
 
 SHARE = 0.15
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.rig.dynamics.structure import GROUND, DelayedSpring, Structure
 from bayeshaptic.rig.effects.effect import Effect, Scales, register
-from bayeshaptic.rig.structure import GROUND, DelayedSpring, Structure
 
 
 @register

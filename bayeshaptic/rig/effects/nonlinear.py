@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bayeshaptic.rig.dynamics.laws import Drag as DragLaw
+from bayeshaptic.rig.dynamics.laws import Gap, PowerSpring, Ripple
+from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
 from bayeshaptic.rig.effects.effect import Effect, Scales, register
-from bayeshaptic.rig.laws import Drag as DragLaw
-from bayeshaptic.rig.laws import Gap, PowerSpring, Ripple
-from bayeshaptic.rig.structure import FRAME, NodeLaw, Structure
 
 # Root mean square of x^3 over the cube of that of x, for a Gaussian x.
 CUBE = 15.0**0.5

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.effects.effect import Effect, Log, Samples, Scales, register
-from bayeshaptic.rig.plant import Array
 
 
 @register

@@ -1,0 +1,1 @@
+"""Recordings whose force was computed from the motion."""

@@ -1,0 +1,81 @@
+"""Where feedback biases the response: the loop closed on the force instead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics, inverse_dynamics
+from bayeshaptic.diagnosis.loop import Traced, residual_tests, verdict_of
+from bayeshaptic.diagnosis.state import Accepted, Estimate, State
+from bayeshaptic.effects.registry import effects
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+
+_ONE_MASS = 0.3  # of the force that may be left where the device moves as one mass
+_FRICTION = "coulomb"
+
+
+@dataclass(frozen=True)
+class ForceExplained:
+    """The force of a recording with feedback, explained by its motion.
+
+    Attributes
+    ----------
+    first : InverseDynamics
+        Mass, damping and offset, and the one term that mattered most.
+    further : InverseDynamics
+        With every term that earned its place.
+    """
+
+    first: InverseDynamics
+    further: InverseDynamics
+
+
+def has_feedback(notices: Iterable[Notice]) -> bool:
+    """Whether a warning says that the force was computed from the motion."""
+    return any(n.topic == "feedback" and n.level == "warning" for n in notices)
+
+
+def explain_force(recording: Recording | None) -> ForceExplained | None:
+    """Inverse dynamics of a recording.
+
+    None where it is too short for it, or where the motion leaves so much of the force that the
+    device cannot move as one mass.
+    """
+    if recording is None:
+        return None
+    try:
+        further = inverse_dynamics(recording)
+    except InputError:
+        return None
+    if further.relative_error > _ONE_MASS:
+        return None
+    terms = tuple(step.term for step in further.steps[1:2])
+    return ForceExplained(inverse_dynamics(recording, terms=terms) if terms else further, further)
+
+
+def trace_force(etfe: Etfe, fit: Fit, force: ForceExplained) -> Traced:
+    """What the loop found in the force; the residual of the biased response stays as it is."""
+    tests = residual_tests(fit, etfe)
+    state = State(etfe, fit, _friction(force))
+    verdict, residual_class = verdict_of(state, tests)
+    return Traced(verdict, residual_class, state, tests, tests)
+
+
+def _friction(force: ForceExplained) -> tuple[Accepted, ...]:
+    """Dry friction, where it is the term that mattered most."""
+    linear, *added = force.further.steps
+    if not added or added[0].term != _FRICTION:
+        return ()
+    (kind,) = (e for e in effects("nonlinear") if e.name == "coulomb_friction")
+    (term,) = (t for t in force.first.terms if t.name == _FRICTION)
+    evidence = (
+        f"lowers the error of the force on the half that was not fitted from "
+        f"{linear.held_out_rms:.3g} to {added[0].held_out_rms:.3g} {term.unit} rms (inverse "
+        "dynamics, which feedback does not bias)"
+    )
+    estimates = {"friction_force": Estimate(*force.first[_FRICTION], term.unit)}
+    return (Accepted(kind.name, kind.title, kind.family, evidence, estimates),)

@@ -1,0 +1,296 @@
+r"""Inverse dynamics: the force explained by the motion, for recordings with feedback.
+
+Where a controller makes the force from the position, their spectra do not give the response: noise
+and friction come back through the controller.  The equation of motion holds all the same,
+
+.. math:: u = m \ddot x + b \dot x + F_c\, \mathrm{sign}(\dot x) + \dots + \mathrm{offset},
+
+and is linear in its coefficients: least squares of the force on columns made of the position,
+low-passed forwards and backwards so that nothing is late, and everything then decimated to the
+bandwidth that is left (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997;
+A. Janot, M. Gautier and M. Brunot, "Data set and reference models of EMPS", 2019).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.signal import butter, decimate, sosfiltfilt
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.types import Floats
+
+_BAND = 0.05  # of the sampling rate: the usual cut-off
+_FEWEST = 100  # samples left after decimation
+_BLOCK_S = 1.0  # residuals further apart are taken to be independent
+_WORTH = 0.02  # a term must lower the held-out error by so much, in both halves
+
+
+@dataclass(frozen=True)
+class Path:
+    """A motion without what the encoder adds: position, velocity, acceleration, jerk, (N,)."""
+
+    position: Floats = field(repr=False)
+    velocity: Floats = field(repr=False)
+    acceleration: Floats = field(repr=False)
+    jerk: Floats = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Term:
+    """One column of the inverse dynamics.
+
+    Attributes
+    ----------
+    name, title : str
+    unit : str
+    column : callable
+        From `Path` to the force for a coefficient of one, shape (N,).
+    """
+
+    name: str
+    title: str
+    unit: str
+    column: Callable[[Path], Floats] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One round: the term that was added and the held-out rms error of the force with it."""
+
+    term: str
+    held_out_rms: float
+
+
+@dataclass(frozen=True)
+class InverseDynamics:
+    """The force explained by the motion.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+    value, sd : ndarray, shape (J,)
+        Coefficients; standard deviations allow for the residual's correlation within a second.
+    steps : tuple of Step
+        From the linear model on, each error that of one half with the coefficients of the other.
+    tried : tuple of Step
+        Terms that did not earn their place, and what they would have brought.
+    relative_error : float
+        Norm of the residual over the norm of the force, all of it fitted.
+    time_s, force, explained : ndarray, shape (N,)
+        Filtered and decimated.
+    path : Path
+        At the same times.
+    cutoff_hz : float
+    """
+
+    terms: tuple[Term, ...]
+    value: Floats
+    sd: Floats
+    steps: tuple[Step, ...]
+    tried: tuple[Step, ...]
+    relative_error: float
+    time_s: Floats = field(repr=False)
+    force: Floats = field(repr=False)
+    explained: Floats = field(repr=False)
+    path: Path = field(repr=False)
+    cutoff_hz: float
+
+    def __getitem__(self, name: str) -> tuple[float, float]:
+        """Value and standard deviation of the coefficient called `name`."""
+        index = [term.name for term in self.terms].index(name)
+        return float(self.value[index]), float(self.sd[index])
+
+    @property
+    def rms(self) -> float:
+        """Rms of the force that is left, all of it fitted."""
+        return float(np.sqrt(np.mean((self.force - self.explained) ** 2)))
+
+
+def inverse_dynamics(
+    recording: Recording,
+    cutoff_hz: float | None = None,
+    terms: tuple[str, ...] | None = None,
+) -> InverseDynamics:
+    """Explain the force of a recording by its motion; works with and without feedback.
+
+    Begins with mass, damper and offset and adds the term that lowers the error most on the half
+    that was not fitted, while both halves gain.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of a device that moves as one mass below `cutoff_hz`.
+    cutoff_hz : float, optional
+        Of the low-pass (Butterworth, order 4, forwards and backwards); a twentieth of the
+        sampling rate by default.
+    terms : tuple of str, optional
+        Use exactly these beside mass, damping and offset.
+
+    Returns
+    -------
+    InverseDynamics
+
+    Raises
+    ------
+    InputError
+        Where the recording is too short for the cut-off, or a term has no such name.
+    """
+    cutoff_hz = _BAND / recording.period_s if cutoff_hz is None else cutoff_hz
+    every = max(int(0.5 / (cutoff_hz * recording.period_s)), 1)
+    edge = int(np.ceil(2 / (cutoff_hz * recording.period_s)))  # where the filters are not settled
+    if (recording.samples - 2 * edge) // every < _FEWEST:
+        raise InputError(
+            f"{recording.name}: {recording.samples} samples are too few for inverse dynamics below "
+            f"{cutoff_hz:g} Hz; raise cutoff_hz"
+        )
+    path = _path(recording, cutoff_hz)
+
+    def thin(signal: Floats) -> Floats:
+        inner = signal[edge:-edge]
+        if every == 1:
+            return inner
+        return np.asarray(decimate(inner, every, zero_phase=True), dtype=np.float64)
+
+    force, time_s = thin(recording.force), np.arange(recording.samples)[edge:-edge:every]
+    start, library = _terms(recording, path)
+    known = {term.name: term for term in (*start, *library)}
+    columns = {name: thin(term.column(path)) for name, term in known.items()}
+    chosen = [term.name for term in start]
+    steps, tried = [Step("linear", _held_out(columns, chosen, force)[0])], []
+    if terms is not None:
+        unknown = sorted(set(terms) - set(known))
+        if unknown:
+            raise InputError(f"no term {', '.join(unknown)}; there are {', '.join(known)}")
+        chosen += [name for name in terms if name not in chosen]
+        steps.append(Step(" + ".join(terms), _held_out(columns, chosen, force)[0]))
+    else:
+        tried = _grow(columns, chosen, force, steps)
+    design = np.stack([columns[name] for name in chosen], axis=1)
+    value, sd = _solve(design, force, max(int(_BLOCK_S / (every * recording.period_s)), 1))
+    left = force - design @ value
+    return InverseDynamics(
+        tuple(known[name] for name in chosen),
+        value,
+        sd,
+        tuple(steps),
+        tuple(tried),
+        float(np.linalg.norm(left) / np.linalg.norm(force)),
+        np.asarray(time_s * recording.period_s, dtype=np.float64),
+        force,
+        np.asarray(design @ value, dtype=np.float64),
+        Path(*(thin(a) for a in (path.position, path.velocity, path.acceleration, path.jerk))),
+        cutoff_hz,
+    )
+
+
+def _path(recording: Recording, cutoff_hz: float) -> Path:
+    """Zero-phase low-pass and central differences."""
+    low = butter(4, cutoff_hz, fs=1 / recording.period_s, output="sos")
+    x = sosfiltfilt(low, recording.position)
+    v = np.gradient(x, recording.period_s)
+    a = np.zeros_like(x)
+    a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / recording.period_s**2
+    return Path(x, v, a, np.gradient(a, recording.period_s))
+
+
+def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
+    """Those of the linear model, and those that may join it."""
+    fast = float(np.sqrt(np.mean(path.velocity**2)))
+    middle = float(np.mean(path.position))
+
+    def unit(dimension: str) -> str:
+        return unit_of(dimension, recording.force_unit, recording.position_unit)
+
+    force, x = unit("force"), recording.position_unit
+    start = (
+        Term("mass", "mass", unit("mass"), lambda p: p.acceleration),
+        Term("damping", "viscous damping", unit("damping"), lambda p: p.velocity),
+        Term("offset", "constant force", force, lambda p: np.ones_like(p.velocity)),
+    )
+    stribeck = tuple(
+        Term(
+            f"stribeck_{part:g}",
+            f"friction that differs below {part * fast:.3g} {x}/s",
+            force,
+            _slow_friction(part * fast),
+        )
+        for part in (0.03, 0.1, 0.3, 1.0)
+    )
+    return start, (
+        Term("coulomb", "dry (Coulomb) friction", force, lambda p: np.sign(p.velocity)),
+        *stribeck,
+        Term(
+            "asymmetric_damping",
+            "damping that differs between the directions",
+            unit("damping"),
+            lambda p: np.abs(p.velocity),
+        ),
+        Term("drag", "drag", unit("drag"), lambda p: p.velocity * np.abs(p.velocity)),
+        Term(
+            "friction_root",
+            "friction that grows with the root of the velocity",
+            f"{force} ({x}/s)^-1/2",
+            lambda p: np.sign(p.velocity) * np.sqrt(np.abs(p.velocity)),
+        ),
+        Term("spring", "spring", unit("stiffness"), lambda p: p.position - middle),
+        Term(
+            "friction_slope",
+            "friction that changes along the way",
+            unit("stiffness"),
+            lambda p: (p.position - middle) * np.sign(p.velocity),
+        ),
+        Term("jerk", "lag between force and motion", f"{force} s^3/{x}", lambda p: p.jerk),
+    )
+
+
+def _slow_friction(velocity: float) -> Callable[[Path], Floats]:
+    """Friction that fades out around a velocity (Stribeck's law, less the Coulomb part)."""
+    return lambda p: np.sign(p.velocity) * np.exp(-((p.velocity / velocity) ** 2))
+
+
+def _grow(
+    columns: dict[str, Floats], chosen: list[str], force: Floats, steps: list[Step]
+) -> list[Step]:
+    """Add terms to `chosen` while both halves gain; what is left over comes back."""
+    while True:
+        _, halves = _held_out(columns, chosen, force)
+        found = {
+            name: _held_out(columns, [*chosen, name], force)
+            for name in columns
+            if name not in chosen
+        }
+        order = sorted(found, key=lambda name: found[name][0])
+        if not order or np.any(found[order[0]][1] > (1 - _WORTH) * halves):
+            return [Step(name, found[name][0]) for name in order]
+        chosen.append(order[0])
+        steps.append(Step(order[0], found[order[0]][0]))
+
+
+def _held_out(columns: dict[str, Floats], names: list[str], force: Floats) -> tuple[float, Floats]:
+    """Rms error of each half with the other half's coefficients: together, and a half, (2,)."""
+    design = np.stack([columns[name] for name in names], axis=1)
+    first = np.arange(len(force)) < len(force) // 2
+    squares = []
+    for own in (first, ~first):
+        value = np.linalg.lstsq(design[~own], force[~own], rcond=None)[0]
+        squares.append(np.mean((force[own] - design[own] @ value) ** 2))
+    return float(np.sqrt(np.mean(squares))), np.sqrt(np.array(squares, dtype=np.float64))
+
+
+def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:
+    """Coefficients, and standard deviations that allow for correlation within blocks.
+
+    Sandwich of the scores summed over blocks (K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986).
+    """
+    value = np.linalg.lstsq(design, force, rcond=None)[0]
+    scores = design * (force - design @ value)[:, None]
+    sums = np.add.reduceat(scores, np.arange(0, len(force), block))
+    bread = np.linalg.inv(design.T @ design)
+    covariance = bread @ (sums.T @ sums) @ bread
+    sd = np.sqrt(np.diag(covariance) * len(sums) / max(len(sums) - design.shape[1], 1))
+    return np.asarray(value, dtype=np.float64), np.asarray(sd, dtype=np.float64)

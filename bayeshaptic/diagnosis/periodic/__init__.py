@@ -1,0 +1,1 @@
+"""The loop on periodic recordings: line spectra and harmonic balance."""

@@ -1,0 +1,122 @@
+"""Is there a force that is not linear in the motion?  Columns built from the motion tell.
+
+Each candidate column is a nonlinear function of the command or of the motion, sent through the
+mechanism.  In every window it is compared with what no smooth linear response explains, so that an
+error of the linear model cannot raise it (nonlinear identification through feedback of the
+outputs; S. F. Masri and T. K. Caughey, J. Appl. Mech. 46, 1979, for the force surface).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.types import Complexes, Floats
+
+_THRESHOLD = 4.5
+_HAND_HZ = 20.0  # below it a hand moves the device, and the encoder sees it well
+
+
+def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """One test for each nonlinear function of command and motion; none without a recording."""
+    recording = etfe.recording
+    if recording is None or etfe.period_lines is not None:
+        return ()
+    tests = []
+    for name, column in columns(fit, etfe, recording).items():
+        windows = etfe.spectra.windows(fit.response, column[None])
+        coefficient, score = common_coefficient(windows)
+        text = f"a force like {name} stands {abs(score):.1f} standard deviations out of the noise"
+        tests.append(Test(name, "nonlinear", abs(score), _THRESHOLD, None, text))
+    return tuple(tests)
+
+
+def common_coefficient(windows: Windows) -> tuple[float, float]:
+    """Coefficient of the last input, the same in all windows, and its robust score.
+
+    Each window's own smooth response is free, so only what it cannot explain counts.
+    """
+    nodes = windows.frequency_hz.shape[1]
+    slope, found = windows.design[:, -1, -1], windows.target[:, -1]
+    weight = np.maximum(windows.lines - nodes - 2, 0.5) / windows.scatter
+    information = float(np.sum(weight * np.abs(slope) ** 2))
+    if information == 0:
+        return 0.0, 0.0
+    coefficient = float(np.sum(weight * (slope.conj() * found).real) / information)
+    left = found - coefficient * slope
+    spread = np.sqrt(np.sum((weight * (slope.conj() * left).real) ** 2))
+    usual = np.sqrt(0.5 * information)
+    return coefficient, coefficient * information / max(float(spread), float(usual))
+
+
+def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, Complexes]:
+    """Motions that nonlinear forces would add, at the lines of the spectra; by name."""
+    system = fit.model.system(fit.theta)
+    force = recording.force - recording.force.mean()
+    x, v = driven_motion(fit, recording)
+    s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
+    mechanism = system.continuous_response(s)[0]
+    through_loop = fit.response(s.imag / (2 * np.pi))
+    measured = recording.position - recording.position.mean()
+    at_lines = line_transform(etfe, recording)
+    unit_u, unit_v, unit_x = force.std(), v.std(), measured.std()
+    forces = {
+        "sign(v)": -np.sign(v),
+        "v|v|": -v * np.abs(v) / unit_v**2,
+        "v^3": -((v / unit_v) ** 3),
+        "x^3": -((measured / unit_x) ** 3),
+        "x^2": -((measured / unit_x) ** 2),
+    }
+    found = {name: mechanism * at_lines(value) for name, value in forces.items()}
+    found["u^3"] = through_loop * at_lines((force / unit_u) ** 3)
+    if len(system.mechanism.masses) > 1:
+        other, _ = linear_motion(system, force, recording.period_s, mass=1)
+        stretch = x - other
+        stretch = stretch / stretch.std()
+        pair = pair_response(fit, s)
+        found["stretch^3"] = pair * at_lines(-(stretch**3))
+        found["clipped stretch"] = pair * at_lines(-np.clip(stretch, -0.5, 0.5))
+    return found
+
+
+def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
+    """Position and velocity of the motor without encoder noise.
+
+    What the command does comes from the model; what a hand does besides is taken from the
+    measured position below 20 Hz, where the encoder sees it well.
+    """
+    force = recording.force - recording.force.mean()
+    x, v = linear_motion(fit.model.system(fit.theta), force, recording.period_s)
+    if fit.model.name == "grasped":
+        rest = recording.position - recording.position.mean() - x
+        rate = 1 / recording.period_s
+        low = butter(4, min(_HAND_HZ, 0.4 * rate), fs=rate, output="sos")
+        v = v + np.gradient(sosfiltfilt(low, rest), recording.period_s)
+    return x, v
+
+
+def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped-def]
+    """A function from a signal, shape (N,), to its DFT at the lines of the spectra."""
+    duration = recording.samples * recording.period_s
+    lines = np.rint(etfe.spectra.frequency_hz * duration).astype(int)  # type: ignore[attr-defined]
+
+    def transform(signal: Floats) -> Complexes:
+        return np.fft.rfft(signal - signal.mean())[lines] / np.sqrt(recording.samples)
+
+    return transform
+
+
+def pair_response(fit: Fit, s: Complexes) -> Complexes:
+    """Position of the motor over a pair of forces in the connection, +1 on m1 and -1 on m2."""
+    mechanism = fit.model.system(fit.theta).mechanism
+    numerator = mechanism.mutual(mechanism.drive, (0, 1))
+    denominator = mechanism.transfer()[1]
+    points = s[:, None]
+    return np.asarray((evaluate(numerator, points) / evaluate(denominator, points))[:, 0])

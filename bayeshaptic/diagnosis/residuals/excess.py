@@ -1,0 +1,80 @@
+"""Noise in the driven band beside the noise above it, where the force does nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe, RandomSpectra
+from bayeshaptic.recordings.response.local_polynomial import leakage_terms
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+
+THRESHOLD = 6.0
+_HAND_HZ, _FREE_HZ = 45.0, 20.0  # below it a hand, or a draught, moves the device
+_QUIET = 3e-3  # power of the force, over that in the band, which moves nothing up there
+_LINES, _FEWEST = 60, 5
+_TOGETHER = 3
+_ROUNDED = 0.25  # counts a sample; rounding a slower motion does not make white noise
+
+
+def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """How far does the noise in the driven band rise above the encoder's?
+
+    The noise of an encoder is the same at all frequencies, and where the force ends nothing else
+    is left. What a linear device adds to it is the motion of a hand, at low frequencies; so noise
+    that rises inside the band comes of a force that is not linear in the motion, of a device that
+    changes, or of a fault of the measurement.  None without frequencies that are not driven, or
+    where the motion is too slow for its encoder.
+    """
+    recording, spectra = etfe.recording, etfe.spectra
+    if recording is None or not isinstance(spectra, RandomSpectra):
+        return ()
+    if _counts_a_sample(recording) < _ROUNDED:
+        return ()
+    floor = _floor(recording, etfe.band_hz)
+    windows = RandomSpectra.windows(spectra, fit.response)  # as measured, nothing discounted
+    centre = windows.frequency_hz[:, 1]
+    driven = centre > (_HAND_HZ if fit.model.name == "grasped" else _FREE_HZ)
+    if floor is None or driven.sum() < _TOGETHER:
+        return ()
+    together = np.ones(_TOGETHER)
+    scatter = np.convolve(windows.scatter[driven], together, "valid")
+    freedom = np.convolve(windows.lines[driven] - 3, together, "valid")
+    rise = 10 * np.log10(scatter / freedom / floor)
+    worst = int(np.argmax(rise))
+    where = float(centre[driven][worst + _TOGETHER // 2])
+    text = f"the noise around {where:.3g} Hz is {rise[worst]:.1f} dB above that beyond the band"
+    return (Test("excess noise", "nonlinear", float(rise[worst]), THRESHOLD, where, text),)
+
+
+def _counts_a_sample(recording: Recording) -> float:
+    """Mean increment in counts; infinite where there are none."""
+    unit = max(increment_unit(recording.position) or 0.0, recording.encoder_resolution or 0.0)
+    steps = float(np.mean(np.abs(np.diff(recording.position))))
+    return steps / unit if unit > 0 else np.inf
+
+
+def _floor(recording: Recording, band_hz: tuple[float, float]) -> float | None:
+    """Median power of a line above the band, leakage projected out."""
+    samples = recording.samples
+    frequency = np.fft.rfftfreq(samples, recording.period_s)
+    scale = 1 / np.sqrt(samples)
+    time = np.arange(samples) - (samples - 1) / 2
+    position = recording.position - recording.position.mean()
+    position = position - time * (time @ position) / (time @ time)
+    y = np.fft.rfft(position) * scale
+    power = np.abs(np.fft.rfft(recording.force - recording.force.mean()) * scale) ** 2
+    inside = power[(frequency > 0.3 * band_hz[1]) & (frequency < 0.9 * band_hz[1])].mean()
+    first, last = np.searchsorted(frequency, [1.05 * band_hz[1], 0.48 / recording.period_s])
+    x = np.linspace(-1, 1, _LINES)
+    found = []
+    for start in range(first, last - _LINES, _LINES):
+        lines = slice(start, start + _LINES)
+        if power[lines].mean() > _QUIET * inside:
+            continue
+        basis = np.linalg.qr(leakage_terms(x, frequency[lines], frequency[[start]]))[0]
+        left = y[lines] - basis @ (basis.T @ y[lines])
+        found.append(np.sum(np.abs(left) ** 2) / (_LINES - basis.shape[1]))
+    return float(np.median(found)) if len(found) >= _FEWEST else None

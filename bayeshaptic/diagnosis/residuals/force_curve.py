@@ -1,0 +1,111 @@
+"""The force that a linear model leaves over, as a curve over velocity, position or stretch.
+
+The residual force surface of S. F. Masri and T. K. Caughey (J. Appl. Mech. 46, 1979), one variable
+at a time.  The curve is piecewise linear, and its ordinates are fitted to all windows at once with
+the weights of the likelihood: binning U - Y/G over time instead would drown it in the encoder's
+noise, which grows with the square of the frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.diagnosis.residuals.columns import driven_motion, line_transform, pair_response
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.types import Complexes, Floats
+
+# Dense about zero, where friction turns round; no wider than the motion often is.
+_KNOTS = np.array([-2.2, -1.3, -0.7, -0.3, -0.08, 0.08, 0.3, 0.7, 1.3, 2.2])
+_EDGES = (0.003, 0.997)  # share of the time outside of which no knot stands
+VELOCITY, POSITION, STRETCH, COMMAND = "velocity", "position", "stretch", "command"
+
+
+@dataclass(frozen=True)
+class ForceCurve:
+    """A force on the device that the linear model does not hold.
+
+    Attributes
+    ----------
+    over : str
+        "velocity" and "position" of the motor, "stretch" of the connection, or "command".
+    motion : ndarray, shape (K,)
+        Position units, position units a second, or force units.
+    force, sd : ndarray, shape (K,)
+        Force units; its mean over the recording is zero, because a constant cannot be seen.
+    """
+
+    over: str
+    motion: Floats
+    force: Floats
+    sd: Floats
+
+
+def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
+    """What a force may be drawn over, shape (N,) each: by name.
+
+    The motion is that of the model: signs taken from an encoder are those of its noise.
+    """
+    _, velocity = driven_motion(fit, recording)
+    found = {VELOCITY: velocity, POSITION: recording.position - recording.position.mean()}
+    force = recording.force - recording.force.mean()
+    system = fit.model.system(fit.theta)
+    if len(system.mechanism.masses) > 1:
+        ends = [linear_motion(system, force, recording.period_s, mass=n)[0] for n in (0, 1)]
+        found[STRETCH] = ends[0] - ends[1]
+    found[COMMAND] = force
+    return found
+
+
+def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
+    """The force that `fit` leaves over in `etfe`, as a curve over a motion.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+        Of a recording with random excitation.
+    over : {"velocity", "position", "stretch", "command"}
+    motion : ndarray, shape (N,)
+        As `motions` gives it.
+    """
+    assert etfe.recording is not None
+    low, high = np.quantile(motion, _EDGES)
+    knots = _KNOTS * motion.std()
+    knots = knots[(knots > low) & (knots < high)]
+    hats = [np.interp(motion, knots, row) for row in np.eye(len(knots))]
+    s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
+    if over == STRETCH:
+        response = pair_response(fit, s)
+    elif over == COMMAND:
+        response = fit.response(s.imag / (2 * np.pi))
+    else:
+        response = fit.model.system(fit.theta).continuous_response(s)[0]
+    at_lines = line_transform(etfe, etfe.recording)
+    columns = np.stack([response * at_lines(hat) for hat in hats])
+    force, covariance = _weighted(fit, etfe, columns)
+    # A constant force has no line in the band: what is drawn has mean zero over time.
+    centre = np.eye(len(knots)) - np.mean(hats, axis=1)[None, :]
+    sd = np.sqrt(np.maximum(np.diag(centre @ covariance @ centre.T), 0))
+    return ForceCurve(over, knots, centre @ force, sd)
+
+
+def _weighted(fit: Fit, etfe: Etfe, columns: Complexes) -> tuple[Floats, Floats]:
+    """Real coefficients of the columns in what the fit leaves over, and their covariance."""
+    windows = etfe.spectra.windows(fit.response, columns)
+    count = len(columns)
+    nodes = windows.frequency_hz.shape[1]
+    g = fit.response(windows.frequency_hz.ravel()).reshape(-1, nodes)
+    left = windows.target - np.einsum("wij,wj->wi", windows.design[:, :, :nodes], g)
+    freedom = np.maximum(windows.lines - nodes - count, 1.0)
+    weight = np.sqrt(2 * freedom / windows.scatter)  # of real and imaginary part
+    rows = weight[:, None, None] * windows.design[:, :, nodes:]
+    target = weight[:, None] * left
+    a = np.concatenate([rows.real.reshape(-1, count), rows.imag.reshape(-1, count)])
+    b = np.concatenate([target.real.ravel(), target.imag.ravel()])
+    inverse = np.linalg.pinv(a, rcond=1e-6)
+    return inverse @ b, inverse @ inverse.T

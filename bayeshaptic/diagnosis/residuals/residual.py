@@ -1,0 +1,154 @@
+"""The residual in frequency: is it noise, and if not, where does it sit?
+
+All tests look at the windows of the likelihood around a fit.  A window's deviation z - R g has
+twice as many real degrees of freedom as nodes, and its scatter s0 tells the noise, so that every
+statistic has a known distribution where the model is true.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri_exp
+from scipy.stats import chi2, f, norm
+
+from bayeshaptic.inference.least_squares import Fit, weighted_residuals
+from bayeshaptic.inference.sampling.coordinates import coordinates
+from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.types import Floats
+
+_BAND_DECADES = 0.15
+_KNOTS = 16
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test of the residual.
+
+    Attributes
+    ----------
+    name : str
+    family : str
+        The class of effects that raises it: "linear", "nonlinear", "time-varying", "measurement".
+    statistic, threshold : float
+        Flagged where the statistic exceeds the threshold; clean recordings stay well below.
+    frequency_hz : float or None
+        Where it is largest.
+    text : str
+        What was found, in words.
+    """
+
+    name: str
+    family: str
+    statistic: float
+    threshold: float
+    frequency_hz: float | None
+    text: str
+
+    @property
+    def flagged(self) -> bool:
+        return self.statistic > self.threshold
+
+    @property
+    def excess(self) -> float:
+        """Statistic over threshold."""
+        return self.statistic / self.threshold
+
+
+def frequency_tests(fit: Fit) -> tuple[Test, ...]:
+    """The tests of the residual over frequency: in bands, in total, and against smooth changes."""
+    return (_band_test(fit), _total_test(fit), _smooth_test(fit))
+
+
+def window_scores(fit: Fit) -> Floats:
+    """Each window's squared deviation as a standard normal score, shape (W,)."""
+    windows = fit.windows
+    nodes = windows.target.shape[1]
+    left = fit.residual.reshape(windows.target.shape)
+    freedom = np.maximum(windows.lines - nodes, 1.0)
+    # fit.residual is scaled to the mean of the F variable; undo that.
+    mean = freedom / np.maximum(freedom - 1, 0.5)
+    ratio = mean * np.mean(np.abs(left) ** 2, axis=1)
+    return -_upper_score(f.logsf(ratio, 2 * nodes, 2 * freedom))
+
+
+def _upper_score(log_p: Floats) -> Floats:
+    """The normal quantile with the given log upper tail probability, with its sign turned."""
+    return np.asarray(ndtri_exp(np.clip(log_p, -1e5, -1e-12)))
+
+
+def _band_test(fit: Fit) -> Test:
+    scores = window_scores(fit)
+    centre = np.log10(fit.windows.frequency_hz.mean(axis=1))
+    band = np.floor((centre - centre[0]) / _BAND_DECADES).astype(int)
+    worst, where = -np.inf, 0.0
+    for index in np.unique(band):
+        inside = band == index
+        z = scores[inside].sum() / np.sqrt(inside.sum())
+        if z > worst:
+            worst, where = float(z), float(10 ** centre[inside].mean())
+    text = f"the residual around {where:.3g} Hz is {worst:.1f} standard deviations above noise"
+    return Test("bands", "linear", worst, 5.0, where, text)
+
+
+def _total_test(fit: Fit) -> Test:
+    scores = window_scores(fit)
+    z = float(scores.sum() / np.sqrt(len(scores)))
+    text = f"over all frequencies the residual is {z:.1f} standard deviations above noise"
+    return Test("total", "linear", z, 4.5, None, text)
+
+
+def _smooth_test(fit: Fit) -> Test:
+    """Would a smooth relative change of the response explain the residual better than noise would?
+
+    The score of G (1 + delta), delta complex and piecewise linear on knots over log frequency,
+    with what the model's own parameters can do projected out.
+    """
+    columns, residual, centres = smooth_columns(fit)
+    found = columns.T @ residual
+    z = chi_square_score(float(found @ found), columns.shape[1])
+    strongest = int(np.argmax(np.abs(columns) @ np.abs(found)))
+    where = float(centres[strongest])
+    text = f"a smooth change of the response would explain it ({z:.1f} standard deviations)"
+    return Test("smooth change", "linear", z, 5.0, where, text)
+
+
+def smooth_columns(fit: Fit) -> tuple[Floats, Floats, Floats]:
+    """An orthonormal basis of smooth changes that the parameters cannot make.
+
+    Returns
+    -------
+    columns : ndarray, shape (N, C)
+    residual : ndarray, shape (N,)
+        Real, of unit variance where the model is true.
+    frequency_hz : ndarray, shape (N,)
+        Of every row.
+    """
+    windows, here = fit.windows, coordinates(fit.model)
+    residuals = weighted_residuals(fit.likelihood, here)
+    phi = here.coordinate(fit.theta[None])
+    residual = residuals(phi)
+    slope = jacobian(residuals, phi, residual)[0]
+    g = fit.response(windows.frequency_hz.ravel()).reshape(windows.frequency_hz.shape)
+    log_f = np.log10(windows.frequency_hz)
+    knots = np.linspace(log_f.min(), log_f.max(), _KNOTS)
+    hats = np.stack([np.interp(log_f, knots, row) for row in np.eye(_KNOTS)], axis=-1)
+    scale = np.sqrt(2 / fit.likelihood.noise_variance)[:, None, None]
+    effect = scale * (windows.design @ (g[..., None] * hats))  # (W, k, knots)
+    effect = effect.reshape(-1, _KNOTS)
+    both = np.concatenate([effect, 1j * effect], axis=1)
+    stacked = np.concatenate([both.real, both.imag])
+    own = np.linalg.qr(slope)[0]
+    stacked = stacked - own @ (own.T @ stacked)
+    basis, sizes, _ = np.linalg.svd(stacked, full_matrices=False)
+    basis = basis[:, sizes > 1e-6 * sizes[0]]
+    rows = np.tile(windows.frequency_hz.ravel(), 2)
+    return basis, residual[0], rows
+
+
+def chi_square_score(value: float, freedom: int) -> float:
+    """A chi-square value as a standard normal score."""
+    if value < 1400:
+        return float(-norm.ppf(chi2.sf(value, freedom)))
+    return float(np.sqrt(2 * value) - np.sqrt(2 * freedom - 1))

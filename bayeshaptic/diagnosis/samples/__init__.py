@@ -1,0 +1,1 @@
+"""What is wrong with the samples of a recording, and the recording without it."""

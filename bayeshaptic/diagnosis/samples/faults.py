@@ -1,0 +1,215 @@
+"""Rare faults of a logger: rows that are missing, and single samples that are wild."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Predictor, Samples
+
+LOST_THRESHOLD = 4.0
+WILD_THRESHOLD = 4.0
+_ERRORS = 5.0  # how badly a sample must be predicted to be looked at
+_WILD = 8.0  # how far off a wild one must be, in the same measure
+_MOST = 300  # more are no faults but noise
+_PASSES = 3  # what lies close behind a gap is seen when the gap is mended
+_LONGEST = 3  # rows missing in one place
+_EQUATIONS = (24, 10, 6)  # predictions that a fault must explain; fewer where faults lie close
+_CONVINCING = 30.0  # gain in squared errors over their variance
+_APART = 12  # samples badly predicted closer to each other have one cause
+_LEFT = 2.5  # squared error a prediction over its variance that may remain
+_A_ROW = 4.0  # squared errors that a further missing row must explain
+_SIMPLER = 8.0  # and that a gap must explain more than a wild sample
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What was found.
+
+    Attributes
+    ----------
+    lost : int
+        Rows that were missing.
+    samples : Samples
+        With the missing rows put back, their positions known to be missing.
+    wild : ndarray of bool, shape (N,)
+        Wild samples, in the rows of `samples`.
+    wild_score : float
+        How many, less the samples that are badly predicted for no reason found.
+    """
+
+    lost: int
+    samples: Samples
+    wild: Bools
+    wild_score: float
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """Rows missing before a sample, with their force as far as the motion shows it."""
+
+    before: int
+    force: Floats
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Gaps, wild samples, how many badly predicted samples are neither; and by which predictor."""
+
+    gaps: list[_Gap]
+    wild: Bools
+    unexplained: int
+    predictor: Predictor
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """An explanation: what it leaves of the squared errors, over their variance, and its values."""
+
+    left: float
+    at: int
+    position: Floats
+    force: Floats
+
+
+def faults(samples: Samples) -> Faults:
+    """Rows that are missing, and wild samples.
+
+    Where a sample is badly predicted several explanations compete: it alone is wrong; rows are
+    missing before it; or a force struck the device, which is no fault.
+    """
+    lost, mended, predictor = 0, samples, samples.predictor
+    if predictor is None:
+        return Faults(0, samples, np.zeros(samples.recording.samples, dtype=bool), 0.0)
+    look = _look(samples, predictor)
+    for _ in range(_PASSES):
+        if len(look.gaps) <= look.unexplained:
+            break
+        lost += sum(len(gap.force) for gap in look.gaps)
+        if lost <= LOST_THRESHOLD:
+            break
+        mended = _restored(mended, look.gaps)
+        look = _look(mended, look.predictor)
+    return Faults(lost, mended, look.wild, float(look.wild.sum() - look.unexplained))
+
+
+def _look(samples: Samples, predictor: Predictor) -> _Look:
+    """Explain every badly predicted sample, with a predictor that has not seen it."""
+    wild = np.zeros(samples.recording.samples, dtype=bool)
+    suspects = _suspects(samples, predictor)
+    if 0 < len(suspects) <= _MOST:
+        predictor = samples.without(_marked(suspects, wild)).predictor or predictor
+        suspects = _suspects(samples, predictor)
+    if len(suspects) > _MOST:
+        return _Look([], wild, len(suspects), predictor)
+    gaps: list[_Gap] = []
+    unexplained = 0
+    for suspect in suspects:
+        tried = (_explanation(predictor, samples, int(suspect), n) for n in _EQUATIONS)
+        found = next((each for each in tried if each is not None), None)
+        if found is None:
+            unexplained += 1
+        elif isinstance(found, int):
+            wild[found] = True
+        elif not gaps or found.before - gaps[-1].before > 2:
+            gaps.append(found)
+    return _Look(gaps, wild, unexplained, predictor)
+
+
+def _suspects(samples: Samples, predictor: Predictor) -> NDArray[np.intp]:
+    """Badly predicted samples that follow no other one closely."""
+    errors = predictor.errors(samples.position, samples.recording.force)
+    bad = np.flatnonzero(np.abs(errors) > _ERRORS * predictor.spread)
+    bad = bad[(bad > predictor.order + 2) & (bad < len(errors) - max(_EQUATIONS) - 2)]
+    return bad[np.diff(bad, prepend=-_APART) >= _APART]
+
+
+def _marked(index: NDArray[np.intp], like: Bools) -> Bools:
+    marked = np.zeros_like(like)
+    marked[index] = True
+    return marked
+
+
+def _explanation(
+    predictor: Predictor, samples: Samples, suspect: int, equations: int
+) -> _Gap | int | None:
+    """Rows missing, a wild sample (its index), or neither."""
+
+    def trial(at: int, **unknown: int) -> _Trial:
+        return _trial(predictor, samples, at, equations, **unknown)
+
+    here = (suspect, suspect - 1)
+    wild = _best(trial(at, position=1) for at in here)
+    gap = _best(
+        trial(at, missing=length, position=length, force=length)
+        for length in range(1, min(_LONGEST, equations // 4) + 1)
+        for at in (*here, suspect + 1)
+    )
+    best = min(wild.left, gap.left)
+    rival = _best([trial(suspect), *(trial(at, force=1) for at in here)])
+    if rival.left - best < _CONVINCING or best > _LEFT * equations:
+        return None
+    if wild.left > gap.left + _SIMPLER:
+        return _Gap(gap.at, gap.force)
+    return wild.at if abs(wild.position[0]) > _WILD * predictor.spread else None
+
+
+def _best(trials: Iterable[_Trial]) -> _Trial:
+    return min(trials, key=lambda trial: trial.left + _A_ROW * len(trial.force))
+
+
+def _trial(
+    predictor: Predictor,
+    samples: Samples,
+    at: int,
+    equations: int,
+    missing: int = 0,
+    position: int = 0,
+    force: int = 0,
+) -> _Trial:
+    """Solve for unknown positions and forces from a sample on.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    samples : Samples
+    at, equations : int
+    missing : int
+        Rows to insert before that sample; the unknowns are then theirs.
+    position, force : int
+        How many positions and forces are unknown.
+    """
+    order = predictor.order
+    here, blank = slice(at - order, at + equations), np.zeros(missing)
+    y, u = samples.position[here], samples.recording.force[here]
+    centre = y[order - 1]  # small numbers keep their digits
+    y = np.concatenate([y[:order] - centre, blank, y[order:] - centre])
+    u = np.concatenate([u[:order], blank, u[order:]])
+    rows = slice(order, order + equations)
+    errors = np.convolve(y, predictor.past)[rows] - np.convolve(u, predictor.force)[rows]
+    errors += centre * predictor.past.sum() - predictor.constant
+    design = np.zeros((equations, position + force))
+    for j in range(position):
+        design[j:, j] = predictor.past[: equations - j]
+    for j in range(force):
+        design[j:, position + j] = -predictor.force[: equations - j]
+    scale = np.abs(design).max(axis=0)
+    values = np.linalg.lstsq(design / scale, -errors, rcond=1e-10)[0] / scale
+    errors = errors + design @ values
+    left = float(errors @ errors) / predictor.spread**2
+    return _Trial(left, at, values[:position], values[position:])
+
+
+def _restored(samples: Samples, gaps: list[_Gap]) -> Samples:
+    """With the missing rows put back, their positions known to be missing."""
+    recording = samples.recording
+    at = np.concatenate([[gap.before] * len(gap.force) for gap in gaps]).astype(int)
+    force = np.insert(recording.force, at, np.concatenate([gap.force for gap in gaps]))
+    position = np.insert(recording.position, at, recording.position[at - 1])
+    lost = np.insert(np.zeros(recording.samples, dtype=bool), at, True)
+    missing = np.insert(samples.missing, at, True)
+    position[lost] = np.interp(np.flatnonzero(lost), np.flatnonzero(~lost), position[~lost])
+    return Samples(replace(recording, force=force, position=position), missing)

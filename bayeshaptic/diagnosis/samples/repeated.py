@@ -1,0 +1,64 @@
+"""Samples that repeat the one before although the device moved on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Samples
+
+THRESHOLD = 10.0
+_ERRORS = 5.0  # how far off a repeated sample must be, in errors of the prediction
+_UNITS = 1.5  # increments a sample that no rounding turns into zero
+_SPREADS = 4.0  # nor the noise
+_CONFIRMED = 0.6  # of that, how far the filled-in position must lie from the repeated one
+_ROUNDS = 6
+
+
+def held(samples: Samples) -> tuple[Bools, float]:
+    """Repeated samples that are not where all others say that the device was.
+
+    Obvious ones first; without them the prediction is better and finds more.
+
+    Returns
+    -------
+    wrong : ndarray of bool, shape (N,)
+    statistic : float
+        How many there are, less those samples that are as far off without repeating anything.
+    """
+    position = samples.recording.position
+    repeated = np.concatenate([[False], np.diff(position) == 0]) & ~samples.missing
+    if samples.predictor is None:
+        return np.zeros_like(repeated), 0.0
+    fast = max(_UNITS * samples.unit, _SPREADS * samples.predictor.spread)
+    wrong = repeated & _obvious(position, fast)
+    for _ in range(_ROUNDS):
+        trial = samples.without(wrong)
+        if trial.predictor is None:
+            return np.zeros_like(repeated), 0.0
+        limit = _ERRORS * trial.predictor.spread
+        off = np.abs(trial.errors) > limit
+        more = repeated & off & ~wrong
+        if not more.any():
+            break
+        wrong |= more
+    # What was filled in must be elsewhere, too; a device that rests is not.
+    wrong &= np.abs(trial.position - position) > _CONFIRMED * limit
+    return wrong, float(wrong.sum() - np.sum(off & ~repeated))
+
+
+def _obvious(position: Floats, fast: float) -> Bools:
+    """Runs of equal samples in the middle of a fast motion that goes on as if nothing had been."""
+    steps = np.diff(position)
+    still = np.concatenate([[False], steps == 0, [False]])
+    edges = np.flatnonzero(np.diff(still.astype(np.int8)))
+    first, last = edges[::2], edges[1::2]  # of the equal samples
+    inner = (first >= 3) & (last + 4 < len(position))
+    first, last = first[inner], last[inner]
+    speed = (position[first] - position[first - 3] + position[last + 4] - position[last + 1]) / 6
+    with np.errstate(divide="ignore", invalid="ignore"):
+        caught_up = (position[last + 1] - position[last]) / ((last - first + 1) * speed)
+    sure = (np.abs(speed) > fast) & (caught_up > 0.5) & (caught_up < 1.5)
+    changes = np.zeros(len(position) + 1)
+    np.add.at(changes, first[sure] + 1, 1)
+    np.add.at(changes, last[sure] + 1, -1)
+    return np.cumsum(changes)[:-1] > 0

@@ -1,0 +1,254 @@
+"""Lines of the spectrum far above their neighbours: mains hum and other tones in the position.
+
+Random excitation: in windows of neighbouring lines, what neither a smooth response to the force nor
+leakage explains.  Periodic excitation: what does not repeat with it.  Either way no model is asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+from scipy.stats import f
+
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.local_polynomial import leakage_terms
+from bayeshaptic.recordings.response.windows import Reference
+from bayeshaptic.recordings.signals.excitation import find_repetition
+from bayeshaptic.types import Complexes, Floats
+
+Indices = NDArray[np.intp]
+
+THRESHOLD = 5.0  # minus log10 of the chance of one line standing out so far, times all lines
+_HALF = 20  # lines to each side
+_OWN = 0.05  # of a tone, what response and leakage must leave
+_MOST = 24  # a tone that wanders takes several
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A sinusoid Re(amplitude e^(2 pi i frequency_hz t)) in the position.
+
+    Attributes
+    ----------
+    frequency_hz, frequency_sd_hz : float
+    amplitude : complex
+    amplitude_sd : float
+        Of its magnitude.
+    """
+
+    frequency_hz: float
+    frequency_sd_hz: float
+    amplitude: complex
+    amplitude_sd: float
+
+    @property
+    def of_the_mains(self) -> bool:
+        """Whether it is a harmonic of 50 or 60 Hz, to half a per cent."""
+        return any(
+            abs(self.frequency_hz / mains - round(self.frequency_hz / mains))
+            < 0.005 * round(self.frequency_hz / mains)
+            for mains in (50.0, 60.0)
+        )
+
+    def at(self, time_s: NDArray[Any]) -> NDArray[Any]:
+        """The tone at instants from the first sample on."""
+        return (self.amplitude * np.exp(2j * np.pi * self.frequency_hz * time_s)).real
+
+
+@dataclass(frozen=True)
+class Tones:
+    """Tones in a position.
+
+    Attributes
+    ----------
+    tones : tuple of Tone
+        The strongest first. A tone that wanders in frequency is several.
+    score : float
+        Of the strongest line, tone or not: minus log10 of the chance that any line of a clean
+        recording stands out so far.
+    """
+
+    tones: tuple[Tone, ...]
+    score: float
+
+    def apart(self, least_hz: float = 1.0) -> list[Tone]:
+        """Those that are not beside a stronger one, the strongest first."""
+        found: list[Tone] = []
+        for tone in sorted(self.tones, key=lambda tone: -abs(tone.amplitude)):
+            if all(abs(tone.frequency_hz - other.frequency_hz) > least_hz for other in found):
+                found.append(tone)
+        return found
+
+    def taken_off(self, recording: Recording) -> Floats:
+        """The position without them, shape (N,)."""
+        time_s = np.arange(recording.samples) * recording.period_s
+        position: NDArray[Any] = recording.position
+        for tone in self.tones:
+            position = position - tone.at(time_s)
+        return position
+
+
+class _Lines:
+    """DFT of a recording in a band, with what belongs to the response at each line."""
+
+    def __init__(
+        self, recording: Recording, band_hz: tuple[float, float], reference: Reference
+    ) -> None:
+        found = find_repetition(recording.force)
+        self.start, stop, self.periods = 0, recording.samples, 0
+        if found is not None:  # whole periods, the last of them
+            self.periods = (found.stop - found.start) // found.period
+            self.start, stop = found.stop - self.periods * found.period, found.stop
+        self.count, self.period_s = stop - self.start, recording.period_s
+        frequency = np.fft.rfftfreq(self.count, self.period_s)
+        first, last = np.searchsorted(frequency, band_hz)
+        number = np.arange(max(first - _HALF, 1), min(last + _HALF, (self.count - 1) // 2))
+        if self.periods:  # only what does not repeat
+            number = number[number % self.periods != 0]
+        self.number, self.frequency_hz = number, frequency[number]
+        self.searched = np.flatnonzero((number >= first) & (number < last))
+        self.response = reference(self.frequency_hz)
+        here, scale = slice(self.start, stop), 1 / np.sqrt(self.count)
+        force, position = recording.force[here], recording.position[here]
+        self.force = np.fft.rfft(force - force.mean())[number] * scale
+        self.position = np.fft.rfft(position - position.mean())[number] * scale
+
+    def around(self, at: int) -> Indices:
+        """The lines around one of them; at an end of the band those beside it."""
+        first = min(max(at - _HALF, 0), max(len(self.number) - 2 * _HALF - 1, 0))
+        return np.arange(first, min(first + 2 * _HALF + 1, len(self.number)))
+
+    def explained(self, lines: Indices) -> Complexes:
+        """Orthonormal basis of response and leakage in a window, shape (w, c)."""
+        frequency = self.frequency_hz[lines]
+        middle = 0.5 * (frequency[0] + frequency[-1])
+        x = (frequency - middle) / (frequency[-1] - middle)
+        response = self.response[lines, None]
+        columns = [
+            leakage_terms(x, frequency, np.array(middle)),
+            # What rings on at a resonance when the recording ends is as narrow as the resonance.
+            response * x[:, None] ** np.arange(2),
+        ]
+        if not self.periods:
+            columns.append(self.force[lines, None] * response * x[:, None] ** np.arange(3))
+        basis = np.concatenate(columns, axis=1)
+        return np.linalg.qr(basis / np.linalg.norm(basis, axis=0))[0]
+
+    def of(self, frequency_hz: ArrayLike, lines: Indices | slice) -> Complexes:
+        """DFT of e^(2 pi i f t), t from the first sample of the recording, at w lines.
+
+        Shape (w,) for one frequency, (w, F) for F of them.
+        """
+        frequency = np.asarray(frequency_hz)
+        number = self.number[lines].reshape(-1, *[1] * frequency.ndim)
+        apart = frequency * self.period_s * self.count - number
+        apart = np.where(np.abs(apart) < 1e-9, 1e-9, apart)
+        half = np.pi * apart / self.count
+        kernel = np.sin(np.pi * apart) / np.sin(half) / np.sqrt(self.count)
+        turned = 2 * np.pi * frequency * self.period_s * self.start
+        return np.asarray(kernel * np.exp(1j * (half * (self.count - 1) + turned)))
+
+
+class _Window(NamedTuple):
+    """Neighbouring lines, which of them are judged, and what is explained among them."""
+
+    lines: Indices
+    judged: NDArray[np.bool_]
+    basis: Complexes
+
+    def unexplained(self, values: Complexes) -> Complexes:
+        return np.asarray(values - self.basis @ (self.basis.conj().T @ values))
+
+
+def find_tones(recording: Recording, band_hz: tuple[float, float], reference: Reference) -> Tones:
+    """Tones in the position, each found after the stronger ones are taken off.
+
+    Parameters
+    ----------
+    recording : Recording
+    band_hz : (low, high)
+    reference : callable
+        A response whose resonances are where the device's are; no more is asked of it.
+    """
+    lines = _Lines(recording, band_hz, reference)
+    found: list[Tone] = []
+    if len(lines.number) <= 2 * _HALF or len(lines.searched) == 0:
+        return Tones((), 0.0)
+    windows = _windows(lines)
+    strongest = score = _strongest(lines, windows)
+    while score[0] > THRESHOLD and len(found) < _MOST:
+        tone = _fitted(lines, score[1])
+        lines.position = lines.position - 0.5 * tone.amplitude * lines.of(
+            tone.frequency_hz, slice(None)
+        )
+        found.append(tone)
+        score = _strongest(lines, windows)
+    return Tones(tuple(found), strongest[0])
+
+
+def _windows(lines: _Lines) -> list[_Window]:
+    """Overlapping windows that together judge every line once."""
+    found, last = [], int(lines.searched[-1])
+    for first in range(int(lines.searched[0]), last + 1, _HALF):
+        judged = np.arange(first, min(first + _HALF, last + 1))
+        around = lines.around(int(judged[len(judged) // 2]))
+        found.append(_Window(around, np.isin(around, judged), lines.explained(around)))
+    return found
+
+
+def _strongest(lines: _Lines, windows: list[_Window]) -> tuple[float, float]:
+    """The score of the tone that stands out most from the lines beside it, and its frequency.
+
+    Tones on the lines and halfway between them: no other one loses more than a tenth.
+    """
+    best, where = 0.0, 0.0
+    spacing = 1 / (lines.count * lines.period_s)
+    for window in windows:
+        judged = lines.frequency_hz[window.lines[window.judged]]
+        candidates = np.concatenate([judged, judged + 0.5 * spacing])
+        columns = window.unexplained(lines.of(candidates, window.lines))
+        left = window.unexplained(lines.position[window.lines])
+        total = np.sum(np.abs(left) ** 2)
+        size = np.sum(np.abs(columns) ** 2, axis=0)
+        # A tone that response and leakage can imitate is none to be seen.
+        size = np.maximum(size, _OWN * np.max(size))
+        power = np.abs(columns.conj().T @ left) ** 2 / size
+        freedom = len(left) - window.basis.shape[1] - 1
+        ratio = freedom * power / np.maximum(total - power, 1e-12 * total + 1e-300)
+        at = int(np.argmax(ratio))
+        score = -float(f.logsf(ratio[at], 2, 2 * freedom)) / np.log(10)
+        if score > best:
+            best, where = score, float(candidates[at])
+    return best - float(np.log10(2 * len(lines.searched))), where
+
+
+def _fitted(lines: _Lines, near_hz: float) -> Tone:
+    """Frequency and amplitude of the tone nearest to a frequency, by least squares."""
+    around = lines.around(int(np.searchsorted(lines.frequency_hz, near_hz)))
+    window = _Window(around, np.ones(len(around), dtype=bool), lines.explained(around))
+    left = window.unexplained(lines.position[around])
+    spacing = 1 / (lines.count * lines.period_s)
+
+    def missed(frequency_hz: float) -> float:
+        column = window.unexplained(lines.of(frequency_hz, around))
+        return -float(np.abs(column.conj() @ left) ** 2 / np.sum(np.abs(column) ** 2))
+
+    grid = near_hz + spacing * np.linspace(-1, 1, 21)
+    near = grid[int(np.argmin([missed(frequency) for frequency in grid]))]
+    bounds = (near - 0.1 * spacing, near + 0.1 * spacing)
+    options = {"xatol": 1e-5 * spacing}
+    frequency = float(minimize_scalar(missed, bounds=bounds, method="bounded", options=options).x)
+    column = window.unexplained(lines.of(frequency, around))
+    size = float(np.sum(np.abs(column) ** 2))
+    value = complex(column.conj() @ left) / size
+    rest = float(np.sum(np.abs(left - value * column) ** 2))
+    variance = rest / max(len(around) - window.basis.shape[1] - 2, 1)
+    # The spectrum at positive frequencies holds half of a tone.
+    amplitude, sd = 2 * value, 2 * np.sqrt(0.5 * variance / size)
+    # The Cramer-Rao bound of the frequency of a sinusoid whose phase is unknown.
+    frequency_sd = np.sqrt(3) * sd * spacing / (np.pi * abs(amplitude))
+    return Tone(frequency, float(frequency_sd), amplitude, float(sd))

@@ -1,0 +1,1 @@
+"""Trying what could explain a residual."""

@@ -1,0 +1,180 @@
+"""Trying drift: the recording in parts, some of the parameters free to differ between them.
+
+The critical stiffness is then that of the worst part, and lower by what a drift that goes on does
+between the middle of that part and its end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from bayeshaptic.diagnosis.state import CHOOSE, FIT, Accepted, Estimate, State, Trial, share
+from bayeshaptic.effects.linear.gain import Gain
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.least_squares import least_squares, polish, summarise
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models import Model
+from bayeshaptic.models.structures import HAND
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.types import Floats
+
+PARTS = 3
+_SHORTEST_S = 5.0
+_GAIN_PART_S = 3.0
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Which parameters may drift together."""
+
+    name: str
+    title: str
+    parameters: tuple[str, ...]
+
+
+_GRIP = _Kind("grip_drift", "a grip that changes during the recording", HAND)
+_GAIN = _Kind("gain_drift", "a gain that changes during the recording", ("gain",))
+_DEVICE = _Kind(
+    "device_drift", "a device that changes during the recording", ("b1", "bc", "kc", "b2", "m", "b")
+)
+
+
+def drift_trials(state: State, tick: Callable[[str], None] | None = None) -> list[Trial]:
+    """One trial for each group of parameters that may drift; none for short recordings."""
+    recording = state.etfe.recording
+    if recording is None or recording.duration_s < PARTS * _SHORTEST_S:
+        return []
+    edges = np.linspace(0, recording.samples, PARTS + 1).astype(int)
+    try:
+        parts = [
+            estimate_etfe(recording.part(a, b), state.etfe.band_hz, minimum_lines=12)
+            for a, b in zip(edges[:-1], edges[1:], strict=True)
+        ]
+    except InputError:
+        return []
+    trials = []
+    for kind in (_GRIP, _GAIN, _DEVICE):
+        model = state.model
+        if kind is _GAIN:
+            model = model.with_effect(Gain.candidates(model, state.etfe)[0])
+        if any(name in model.names for name in kind.parameters):
+            if tick:
+                tick(kind.title)
+            trials.append(_try(state, kind, model, parts))
+    return trials
+
+
+def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
+    start = dict(zip(state.model.names, state.fit.theta, strict=True)) | {"gain": 1.0}
+    varying = tuple(name for name in model.names if name in kind.parameters)
+    known = {name: start[name] for name in model.names if name not in varying}
+    narrow = model.with_known(known)
+    gains = np.zeros(2)
+    found = []
+    for part in parts:
+        windows = compress(part, state.fit.response)
+        theta = np.array([start[name] for name in narrow.names])
+        before = _log_likelihoods(narrow, windows, theta)
+        theta = polish(narrow, windows.part(share(windows, FIT)), theta)
+        gains += _log_likelihoods(narrow, windows, theta) - before
+        found.append(theta)
+    limits = critical_stiffness(narrow, np.stack(found)).samples
+    worst = int(np.argmin(limits))
+    size = len(varying) * (PARTS - 1)
+    estimates = _estimates(narrow, found) | {"worst_part": Estimate(worst + 1.0, 0.0, "")}
+    accepted = Accepted(
+        kind.name,
+        kind.title,
+        "time-varying",
+        f"letting {', '.join(varying)} differ between {PARTS} parts of the recording raises the "
+        f"log likelihood of windows it was not fitted to by {gains[1]:.0f}; the limit is that of "
+        f"part {worst + 1}",
+        estimates,
+        limit_log_fall=0.0 if kind is _GAIN else _fall(limits),
+    )
+    changed = state
+    if gains[1] > 8 and kind is _GAIN:
+        changed, spread = _with_steady_gain(state, narrow, start)
+        accepted = replace(accepted, limit_log_sd=spread)
+    elif gains[1] > 8:
+        changed = _on_part(state, parts[worst], dict(zip(narrow.names, found[worst], strict=True)))
+    changed = replace(changed, accepted=(*state.accepted, accepted))
+    return Trial(accepted, changed, float(gains[0]), float(gains[1]), size)
+
+
+def _fall(limits: Floats) -> float:
+    """How much log K_CR falls from the middle of the worst part to the end of the recording.
+
+    That is half of a steady ramp's fall from the part beside it, if the worst is the first or last.
+    """
+    worst = int(np.argmin(limits))
+    if worst not in (0, len(limits) - 1) or limits[worst] <= 0:
+        return 0.0
+    beside = limits[1] if worst == 0 else limits[-2]
+    return 0.5 * float(np.log(beside / limits[worst]))
+
+
+def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> tuple[State, float]:
+    """The recording with its command scaled by the gain found over time, and log K_CR's spread.
+
+    The gain is set to one where it is largest: there the loop is nearest to instability, and the
+    critical stiffness in units of the command is lowest.  How well that is known the roughness of
+    the course tells.
+    """
+    recording = state.etfe.recording
+    assert recording is not None
+    count = int(np.clip(recording.duration_s / _GAIN_PART_S, PARTS, 12))
+    edges = np.linspace(0, recording.samples, count + 1).astype(int)
+    gains = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        part = estimate_etfe(recording.part(a, b), state.etfe.band_hz, minimum_lines=12)
+        windows = compress(part, state.fit.response)
+        gains.append(float(polish(narrow, windows, np.array([start["gain"]]))[0]))
+    centres = 0.5 * (edges[:-1] + edges[1:])
+    course = CubicSpline(centres, gains, bc_type="natural")
+    ends = [course(centres[0]) - course(centres[0], 1) * (centres[0] - edges[0])]
+    ends.append(course(centres[-1]) + course(centres[-1], 1) * (edges[-1] - centres[-1]))
+    times = np.concatenate([[edges[0]], centres, [edges[-1]]])
+    gain = np.interp(np.arange(recording.samples), times, [ends[0], *gains, ends[1]])
+    steady = replace(recording, force=recording.force * gain / gain.max())
+    etfe = estimate_etfe(steady, state.etfe.band_hz)
+    fit = least_squares(state.model, etfe, start=state.fit.theta)
+    return replace(state, etfe=etfe, fit=fit), _edge_error(np.array(gains)) / float(gain.max())
+
+
+def _edge_error(gains: Floats) -> float:
+    """Standard deviation of a course's end, from what neighbours do not share with each other."""
+    # Second differences of independent errors have six times their variance, half a step beyond
+    # the last of them, 1.5 g0 - 0.5 g1, two and a half times.
+    return float(np.sqrt(np.mean(np.diff(gains, 2) ** 2) / 6 * 2.5))
+
+
+def _on_part(state: State, part: Etfe, found: dict[str, float]) -> State:
+    """The loop goes on with the worst part of the recording alone."""
+    model = state.model
+    theta = np.array([found.get(n, state.fit.theta[i]) for i, n in enumerate(model.names)])
+    for _ in range(2):
+        windows = compress(part, partial(model.response, theta))
+        theta = polish(model, windows, theta)
+    return replace(state, etfe=part, fit=summarise(model, windows, theta))
+
+
+def _log_likelihoods(model: Model, windows: Windows, theta: Floats) -> Floats:
+    pointwise = Likelihood(model, windows).pointwise(theta[None])[0]
+    return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
+
+
+def _estimates(model: Model, found: list[Floats]) -> dict[str, Estimate]:
+    """Last part over first, for every parameter that was free."""
+    return {
+        f"{name}_last_over_first": Estimate(float(found[-1][i] / found[0][i]), float("nan"), "")
+        for i, name in enumerate(model.names)
+        if found[0][i] > 0
+    }

@@ -1,0 +1,200 @@
+"""One recording and one linear model, on which internal forces are tried.
+
+What a force adds to the motion is simulated and taken off the recording; the linear parameters are
+fitted to what is left.  What goes into the law is the simulated motion, without encoder noise;
+taking sign(v) from the encoder would miss half of the friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from bayeshaptic.diagnosis.residuals.columns import line_transform
+from bayeshaptic.diagnosis.state import CHOOSE, FIT, State, share
+from bayeshaptic.effects.nonlinear.internal_force import (
+    CONNECTION,
+    LOAD,
+    MOTOR,
+    Place,
+    forced_motion,
+)
+from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
+from bayeshaptic.inference.least_squares import polish
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.types import Floats
+
+SUBSTEPS = 8
+_HAND_HZ = 20.0
+
+
+@dataclass(frozen=True)
+class Point:
+    """What one force gives.
+
+    Attributes
+    ----------
+    effect : NonlinearEffect
+    strength : float
+    theta : ndarray, shape (P,)
+        Linear parameters fitted beside it.
+    etfe : Etfe
+        Less the motion that the force adds.
+    windows : Windows
+    gain_fit, gain_choose : float
+        Gain in log likelihood on the windows to fit and on those to choose by.
+    """
+
+    effect: NonlinearEffect
+    strength: float
+    theta: Floats
+    etfe: Etfe
+    windows: Windows
+    gain_fit: float
+    gain_choose: float
+
+
+class ForceBench:
+    """Simulates forces, and fits what they leave.
+
+    Parameters
+    ----------
+    state : State
+    recording : Recording
+    """
+
+    def __init__(self, state: State, recording: Recording) -> None:
+        self.state = state
+        self.model = state.model
+        self.held = self.model.name == "grasped"
+        self.recording = recording
+        self.force = recording.force - recording.force.mean()
+        self._transform = line_transform(state.etfe, recording)
+        self._starts: dict[Place, Floats] = {}
+        self._extra: Floats = np.zeros(recording.samples)
+        self._base = self._likelihoods(state.fit.theta, state.fit.windows)
+
+    def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
+        """Position and velocity at places, on the fine grid, without the force."""
+        system = self.model.system(theta)
+        period = self.recording.period_s
+        x, v = linear_motion(system, self.force, period, 0, SUBSTEPS)
+        found = {}
+        along: Floats | float = 0.0
+        if {MOTOR, LOAD} & set(places):
+            # The measured position has what a hand does, and where the device stands.
+            measured = self.recording.position
+            grid, samples = np.arange(len(x)) / SUBSTEPS, np.arange(len(measured))
+            besides = measured - x[::SUBSTEPS] - self._extra
+            slow = self._hand(besides) if self.held else self._drift(besides, theta)
+            along = np.interp(grid, samples, slow)
+            found[MOTOR] = Motion(np.interp(grid, samples, measured), v + along, self.force)
+        if {CONNECTION, LOAD} & set(places) and len(system.mechanism.masses) > 1:
+            x2, v2 = linear_motion(system, self.force, period, 1, SUBSTEPS)
+            found[CONNECTION] = Motion(x - x2, v - v2, self.force)
+            if LOAD in places:  # what is slow moves both masses
+                found[LOAD] = Motion(x2, v2 + along, self.force)
+        return found
+
+    def _hand(self, besides: Floats) -> Floats:
+        """Velocity that a hand adds: what is slow, because there the encoder sees it well."""
+        rate = 1 / self.recording.period_s
+        low = butter(2, min(_HAND_HZ, 0.4 * rate), fs=rate, output="sos")
+        return np.gradient(sosfiltfilt(low, besides), 1 / rate)
+
+    def _drift(self, besides: Floats, theta: Floats) -> Floats:
+        """Velocity of a free device from how it began and from a constant force.
+
+        Nobody knows either; friction depends on it, and the spectra do not.
+        """
+        period = self.recording.period_s
+        steady = np.ones(len(besides))
+        x, v = linear_motion(self.model.system(theta), steady, period)
+        weights = np.linalg.lstsq(np.stack([steady, x, v], axis=1), besides, rcond=None)[0]
+        return weights[1] * v + weights[2] * np.gradient(v, period)
+
+    def added_motion(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Floats:
+        """What the force adds to the motor's position at the samples, shape (N,)."""
+        system, period = self.model.system(theta), self.recording.period_s
+        if isinstance(effect, CommandEffect):
+            return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
+        motion = self.motions(theta, (effect.place,))[effect.place]
+        forced = forced_motion(
+            system.mechanism,
+            effect.place,
+            effect.law(strength, self.model, theta),
+            motion.position,
+            motion.velocity,
+            period / SUBSTEPS,
+            SUBSTEPS,
+            starts=self._starts.get(effect.place),
+        )
+        self._starts[effect.place] = forced.starts
+        return forced.motor_position
+
+    def remember(self, extra: Floats) -> None:
+        """Take this for what the force adds, when the slow motion is read off the encoder."""
+        self._extra = extra
+
+    def point(
+        self, effect: NonlinearEffect, strength: float, theta: Floats, rounds: int = 1
+    ) -> Point:
+        """Simulate, take off, fit; several times over, because the fit changes the motion."""
+        for _ in range(rounds):
+            etfe, windows = self._simulated(effect, strength, theta)
+            theta = polish(self.model, windows.part(share(windows, FIT)), theta)
+        return self._valued(effect, strength, theta, etfe, windows)
+
+    def as_it_is(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Point:
+        """Simulate and take off, with the linear parameters as given."""
+        etfe, windows = self._simulated(effect, strength, theta)
+        return self._valued(effect, strength, theta, etfe, windows)
+
+    def without(self, effect: NonlinearEffect, strength: float, extra: Floats) -> Etfe:
+        """The measurement without what a force does: the motion `extra`, or of the command less."""
+        own, spectra = self.recording, self.state.etfe.spectra
+        if isinstance(effect, CommandEffect):
+            lost = effect.lost(strength, self.force)
+            force = spectra.force - self._transform(lost)  # type: ignore[attr-defined]
+            own = replace(own, force=own.force - lost)
+            spectra = replace(spectra, force=force)  # type: ignore[call-arg, type-var]
+        else:
+            position = spectra.position - self._transform(extra)  # type: ignore[attr-defined]
+            own = replace(own, position=own.position - extra)
+            spectra = replace(spectra, position=position)  # type: ignore[call-arg, type-var]
+        return replace(self.state.etfe, spectra=spectra, recording=own)
+
+    def windows(self, etfe: Etfe, theta: Floats, columns: list[Floats] | None = None) -> Windows:
+        """Windows of a measurement, with motions as further inputs."""
+        inputs = np.stack([self._transform(column) for column in columns]) if columns else None
+        return compress(etfe, partial(self.model.response, theta), inputs)
+
+    def _simulated(
+        self, effect: NonlinearEffect, strength: float, theta: Floats
+    ) -> tuple[Etfe, Windows]:
+        if not isinstance(effect, CommandEffect):  # that adds no motion
+            self._extra = self.added_motion(effect, strength, theta)
+        etfe = self.without(effect, strength, self._extra)
+        return etfe, self.windows(etfe, theta)
+
+    def _valued(
+        self,
+        effect: NonlinearEffect,
+        strength: float,
+        theta: Floats,
+        etfe: Etfe,
+        windows: Windows,
+    ) -> Point:
+        gains = self._likelihoods(theta, windows) - self._base
+        return Point(effect, strength, theta, etfe, windows, float(gains[0]), float(gains[1]))
+
+    def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
+        pointwise = Likelihood(self.model, windows).pointwise(theta[None])[0]
+        return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])

@@ -1,0 +1,201 @@
+"""Trying internal forces: find the strength and the shape of each law, and what it would mean.
+
+The likelihood of a force is that of the recording less the simulated motion, with the linear
+parameters fitted anew: a profile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.force_fit import fit_force
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
+from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
+from bayeshaptic.effects.registry import effects
+from bayeshaptic.inference.least_squares import Fit, polish, summarise
+from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.random_excitation import points as points_of
+from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.types import Floats
+
+_Called = list[NonlinearEffect]  # variants of one effect
+
+_LAW_SD = 0.03  # relative; how well a law and its shape are known at best
+_HOPELESS = 0.3  # share of the best gain so far below which a scan is not followed up
+_NEAR = np.array([0.8, 1.0])
+_TOO_STRONG = 10.0  # drop of the log likelihood at which a scan stops
+_FAINT = 10.0  # gain below which nothing is tried
+
+
+def nonlinear_trials(
+    state: State, raised: set[str], tick: Callable[[str], None] | None = None
+) -> list[Trial]:
+    """One trial for each nonlinear effect that the raised tests call for; the best of its variants.
+
+    Parameters
+    ----------
+    state : State
+    raised : set of str
+        Names of the nonlinear tests that are flagged.
+    tick : callable, optional
+        Called with the title of each candidate.
+    """
+    recording = state.etfe.recording
+    if recording is None:
+        return []
+    bench = ForceBench(state, recording)
+    motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    firsts: dict[str, _Called] = {}  # by the name of the strength: laws of friction share one
+    others: list[_Called] = []
+    for kind in effects("nonlinear"):
+        if _there(kind, state):
+            continue
+        called = [e for e in kind.candidates(state.model, motion) if e.called_for(raised)]
+        if called and kind.strength[0] in firsts:
+            others.append(called)
+        elif called:
+            firsts[kind.strength[0]] = called
+    found = _fitted(bench, [_search(bench, called, motion, tick) for called in firsts.values()])
+    known = {point.effect.strength[0]: point for point in found}
+    nearby = [
+        _search(bench, called, motion, tick, known.get(called[0].strength[0])) for called in others
+    ]
+    return [_trial(bench, point) for point in _fitted(bench, nearby, found)]
+
+
+def _there(kind: type[NonlinearEffect], state: State) -> bool:
+    """Whether the state has the effect, or another law of the same thing.
+
+    One mass has one friction, and one actuator one characteristic: a second law on top of the
+    first would only mend it.
+    """
+    if any(kind.strength[0] in accepted.estimates for accepted in state.accepted):
+        return True
+    names = {accepted.name for accepted in state.accepted}
+    actuators = {k.name for k in effects("nonlinear") if issubclass(k, CommandEffect)}
+    return kind.name in (names | actuators if names & actuators else names)
+
+
+def _fitted(bench: ForceBench, points: list[Point], before: Sequence[Point] = ()) -> list[Point]:
+    """The points fitted, the most promising first; the hopeless as they are, the faint left out."""
+    found = list(before)
+    for point in sorted(points, key=lambda point: -point.gain_fit):
+        if point.gain_fit < _FAINT:
+            continue
+        best = max((other.gain_fit for other in found), default=0.0)
+        found.append(fit_force(bench, point) if point.gain_fit > _HOPELESS * best else point)
+    return found
+
+
+def _search(
+    bench: ForceBench,
+    variants: _Called,
+    motion: dict[Place, Motion],
+    tick: Callable[[str], None] | None = None,
+    known: Point | None = None,
+) -> Point:
+    """The best variant on a coarse scan of strengths, or beside the strength of a known force."""
+    if tick:
+        tick(variants[0].title)
+    theta = bench.state.fit.theta
+    points: list[Point] = []
+    for effect in variants:
+        if known:
+            points += _scan(bench, effect, _NEAR * known.strength, known.theta)
+            continue
+        firsts = effect.first_strengths(bench.model, theta, motion[effect.place])
+        points += _scan(bench, effect, firsts, theta)
+        if effect.signed:
+            points += _scan(bench, effect, -firsts, theta)
+    return max(points, key=lambda point: point.gain_fit)
+
+
+def _scan(
+    bench: ForceBench, effect: NonlinearEffect, strengths: Floats, theta: Floats
+) -> list[Point]:
+    """From faint to strong, until it is clearly too strong."""
+    points: list[Point] = []
+    for strength in strengths:
+        start = points[-1].theta if points else theta
+        points.append(bench.point(effect, float(strength), start))
+        if len(points) > 1 and points[-1].gain_fit < points[-2].gain_fit - _TOO_STRONG:
+            break
+    return points
+
+
+def _trial(bench: ForceBench, point: Point) -> Trial:
+    """What a force would mean."""
+    theta = polish(bench.model, point.windows, point.theta)
+    fit = summarise(bench.model, point.windows, theta)
+    accepted = _accepted(bench, point, *_spread(bench, point))
+    state = State(_with_points(point.etfe, fit), fit, (*bench.state.accepted, accepted))
+    size = 1 + len(point.effect.shape)
+    return Trial(accepted, state, point.gain_fit, point.gain_choose, size)
+
+
+def _spread(bench: ForceBench, point: Point) -> tuple[float, float]:
+    """Standard deviations of the strength, and of log K_CR because of it.
+
+    From the curvature of the profile, each side simulated and fitted anew.
+    """
+    step = 0.03
+    low, high = (
+        bench.point(point.effect, point.strength * factor, point.theta, rounds=2)
+        for factor in (1 - step, 1 + step)
+    )
+    drop = point.gain_fit - 0.5 * (low.gain_fit + high.gain_fit)
+    # Half of the windows were used: the whole recording has twice the information.
+    relative = step / np.sqrt(2 * 2 * max(drop, 1e-3))
+    # Neither the law nor its shape is known better than this.
+    relative = float(np.clip(np.hypot(relative, _LAW_SD), 0.0, 0.5))
+    limits = critical_stiffness(bench.model, np.stack([low.theta, high.theta])).samples
+    slope = abs(float(np.log(max(limits[1], 1e-9) / max(limits[0], 1e-9)))) / (2 * step)
+    return relative * abs(point.strength), min(slope * relative, 1.0)
+
+
+def _accepted(bench: ForceBench, point: Point, sd: float, limit_log_sd: float) -> Accepted:
+    model, effect = bench.model, point.effect
+    units = (model.force_unit, model.position_unit)
+    name, dimension = effect.strength
+    estimates: dict[str, Estimate] = {
+        name: Estimate(point.strength, sd, unit_of(dimension, *units))
+    }
+    for key, value in effect.shape.items():
+        estimates[key] = Estimate(value, float("nan"), unit_of(effect.dimensions[key], *units))
+    return Accepted(
+        effect.name,
+        effect.title + _where(effect),
+        effect.family,
+        describe_gain(point.gain_choose),
+        estimates,
+        ties=effect.ties,
+        told_apart_by=effect.told_apart_by,
+        limit_log_sd=limit_log_sd,
+    )
+
+
+def _with_points(etfe: Etfe, fit: Fit) -> Etfe:
+    """With what a person sees of it made from its own spectra."""
+    found = points_of(etfe.spectra.windows(fit.response))
+    return replace(
+        etfe,
+        frequency_hz=found.frequency_hz,
+        value=found.value,
+        variance=found.variance,
+        coherence=found.coherence,
+    )
+
+
+def _where(effect: NonlinearEffect) -> str:
+    if isinstance(effect, CommandEffect):
+        return ""
+    where = {CONNECTION: " in the connection", LOAD: " at the load"}.get(
+        effect.place, " at the motor"
+    )
+    return "" if effect.title.endswith(where) else where

@@ -1,0 +1,1 @@
+"""Effects of linear dynamics: more masses, springs, poles, delay."""

@@ -1,0 +1,105 @@
+"""Low-passes in the loop: an actuator that follows late, a filter on the position."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.effects.effect import Floats, LinearEffect
+from bayeshaptic.effects.registry import register
+from bayeshaptic.effects.typical import apart, grid
+from bayeshaptic.models import LinearSystem, LogNormal, Model, Parameter
+from bayeshaptic.recordings.response.etfe import Etfe
+
+# Equal stages are moved apart so far, relative to their time constant: poles and residues of a
+# multiple pole are ill-conditioned, and the response changes by 1e-7 only.
+_APART = 3e-4
+
+
+@register
+@dataclass(frozen=True)
+class ActuatorLag(LinearEffect):
+    """The force follows the command by 1/(1 + s lag)^order.
+
+    Attributes
+    ----------
+    order : int
+        Equal stages; the lag is that of each.
+    """
+
+    order: int = 1
+
+    name = "actuator_lag"
+    title = "actuator lag"
+    ties = ("position_filter", "extra_delay")
+    told_apart_by = "a probe on the motor's current, or an accelerometer beside the encoder"
+
+    @classmethod
+    def candidates(cls, model: Model, etfe: Etfe) -> tuple[LinearEffect, ...]:
+        return tuple(
+            cls(apart(model, (cls._lag(etfe.period_s / order),)), order) for order in (1, 2, 3)
+        )
+
+    @staticmethod
+    def _lag(median: float) -> Parameter:
+        return Parameter("lag_s", "time", "time constant of the actuator", LogNormal(median, 1.0))
+
+    def starting_values(self, model: Model, etfe: Etfe) -> Floats:
+        return etfe.period_s / self.order * np.geomspace(0.1, 10, 9)[:, None]
+
+    def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
+        (lag,) = self.own(values)
+        stages = np.arange(self.order) - (self.order - 1) / 2
+        for stage in stages:
+            system = system.with_filter(*_first_order(lag * (1 + _APART * stage)))
+        return system
+
+
+@register
+@dataclass(frozen=True)
+class PositionFilter(LinearEffect):
+    """A low-pass on the position before it is sampled: order 1, or 2 with a damping ratio.
+
+    With a damping ratio well below 0.7 it is as well a resonance of the actuator or the sensor.
+
+    Attributes
+    ----------
+    order : int
+    """
+
+    order: int = 1
+
+    name = "position_filter"
+    title = "low-pass on the position"
+    ties = ("actuator_lag", "extra_delay")
+    told_apart_by = ActuatorLag.told_apart_by
+
+    @classmethod
+    def candidates(cls, model: Model, etfe: Etfe) -> tuple[LinearEffect, ...]:
+        median = 0.5 / (np.pi * etfe.period_s)
+        cut_off = Parameter(
+            "filter_hz", "frequency", "cut-off of the position filter", LogNormal(median, 1.0)
+        )
+        damping = Parameter(
+            "filter_damping", "number", "damping ratio of the position filter", LogNormal(0.7, 0.5)
+        )
+        return cls(apart(model, (cut_off,)), 1), cls(apart(model, (cut_off, damping)), 2)
+
+    def starting_values(self, model: Model, etfe: Etfe) -> Floats:
+        cut_offs = np.geomspace(0.02, 2, 9) / etfe.period_s
+        return grid(cut_offs) if self.order == 1 else grid(cut_offs, [0.1, 0.35, 0.9])
+
+    def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
+        cut_off, *damping = self.own(values)
+        lag = 1 / (2 * np.pi * cut_off)
+        if self.order == 1:
+            return system.with_filter(*_first_order(lag))
+        one = np.ones_like(lag)
+        return system.with_filter(one[None], np.stack([one, 2 * damping[0] * lag, lag**2]))
+
+
+def _first_order(lag: Floats) -> tuple[Floats, Floats]:
+    one = np.ones_like(lag)
+    return one[None], np.stack([one, lag])

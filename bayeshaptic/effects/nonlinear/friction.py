@@ -1,0 +1,168 @@
+"""Dry friction: Coulomb's law, Stribeck's, Dahl's; and forces with a power of the velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from bayeshaptic.effects.nonlinear.internal_force import LOAD, MOTOR, Law, Place, Step
+from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
+from bayeshaptic.effects.registry import register
+from bayeshaptic.models import Model
+
+_FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
+_BY_VELOCITY = ("sign(v)", "v|v|", "v^3")
+
+
+def _force_scale(model: Model, theta: Floats, motion: Motion) -> float:
+    """The force that viscous damping of the motion would take: what friction hides as."""
+    values = dict(zip(model.names, theta, strict=True))
+    mass = values.get("m", values.get("m1", 0.0) + values.get("m2", 0.0))
+    return float(mass * motion.velocity.std() * 2 * np.pi * 3.0)
+
+
+@register
+class CoulombFriction(NonlinearEffect):
+    """A force of constant size against the motion; it sticks where that holds the mass still."""
+
+    name = "coulomb_friction"
+    title = "dry (Coulomb) friction"
+    columns = _BY_VELOCITY
+    strength = ("friction_force", "force")
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        return tuple(cls(place) for place in (MOTOR, LOAD) if place in motion)
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        def force(step: Step) -> Floats:
+            return np.minimum(
+                np.maximum(step.last_velocity * (-1 / step.gain), -strength), strength
+            )
+
+        return force
+
+
+@register
+class StribeckFriction(NonlinearEffect):
+    """Dry friction that falls from a larger static value as the velocity grows.
+
+    Bound Fc (1 + excess exp(-(v/vs)^2)); R. Stribeck, 1902.
+    """
+
+    name = "stribeck_friction"
+    title = "dry friction that falls with velocity (Stribeck)"
+    columns = _BY_VELOCITY
+    strength = ("friction_force", "force")
+    dimensions = {"static_excess": "number", "stribeck_velocity": "velocity"}
+    tuned = ("static_excess", "stribeck_velocity")
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        usual = float(motion[MOTOR].velocity.std())
+        return tuple(
+            cls(MOTOR, {"static_excess": rise, "stribeck_velocity": share * usual})
+            for rise in (0.35, 0.8)
+            for share in (0.05, 0.25)
+        )
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        rise = self.shape["static_excess"]
+        scale = 1 / self.shape["stribeck_velocity"]
+
+        def force(step: Step) -> Floats:
+            bound = strength * (1 + rise * np.exp(-((step.velocity * scale) ** 2)))
+            return np.minimum(np.maximum(step.last_velocity * (-1 / step.gain), -bound), bound)
+
+        return force
+
+
+@register
+class DahlFriction(NonlinearEffect):
+    """Dry friction that begins as a spring: F' = -s (v + |v| F / Fc) with s = Fc / distance.
+
+    P. R. Dahl, "A solid friction model", Aerospace Corporation, TOR-0158, 1968.
+    """
+
+    name = "dahl_friction"
+    title = "dry friction that begins as a spring (Dahl)"
+    # It may look like a spring, or like nothing but noise.
+    columns = (*_BY_VELOCITY, "x^3", "stretch^3", "clipped stretch", "excess noise")
+    strength = ("friction_force", "force")
+    dimensions = {"presliding_distance": "position"}
+    tuned = ("presliding_distance",)
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        usual = float(motion[MOTOR].velocity.std()) / (2 * np.pi * 10.0)
+        return tuple(
+            cls(MOTOR, {"presliding_distance": share * usual}) for share in (0.1, 0.3, 1.0, 3.0)
+        )
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        distance = self.shape["presliding_distance"]
+
+        def force(step: Step) -> Floats:
+            stiffness = strength * step.duration_s / distance
+            speed = np.abs(step.velocity + 0.5 * step.gain * step.before)
+            # Implicit in the force, so that a stiff beginning is stable.
+            slip = 1 + stiffness * step.gain + speed * (step.duration_s / distance)
+            return (step.before - stiffness * step.velocity) / slip
+
+        return force
+
+
+class _PowerOfVelocity(NonlinearEffect):
+    """A force against the motion that grows with a power of the velocity."""
+
+    columns = _BY_VELOCITY
+    power: ClassVar[int]
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        scale = _force_scale(model, theta, motion) / motion.velocity.std() ** self.power
+        return scale * _FAINT_TO_STRONG
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        def force(step: Step) -> Floats:
+            resistance = strength * np.abs(step.velocity) ** (self.power - 1)
+            # Implicit, so that it never reverses the motion.
+            return -resistance * step.velocity / (1 + 0.5 * resistance * step.gain)
+
+        return force
+
+
+@register
+class Drag(_PowerOfVelocity):
+    """A force -c v |v|, as of a turbulent fluid."""
+
+    name = "drag"
+    title = "drag that grows with the square of the velocity"
+    strength = ("drag_coefficient", "drag")
+    power = 2
+
+
+@register
+class CubicDamping(_PowerOfVelocity):
+    """A force -c v^3."""
+
+    name = "cubic_damping"
+    title = "damping that grows with the cube of the velocity"
+    strength = ("cubic_damping", "cubic_damping")
+    power = 3

@@ -1,0 +1,95 @@
+"""The protocol of nonlinear effects: an internal force, or an actuator that is not linear."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place
+from bayeshaptic.models import Model
+from bayeshaptic.types import Floats
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The motion at a place without the force, to choose the sizes of shapes by.
+
+    Attributes
+    ----------
+    position, velocity : ndarray
+    command : ndarray
+        The commanded force.
+    """
+
+    position: Floats
+    velocity: Floats
+    command: Floats
+
+
+@dataclass(frozen=True)
+class NonlinearEffect(ABC):
+    """An internal force: strength times a function of position and velocity at a place.
+
+    Attributes
+    ----------
+    place : Place
+    shape : mapping
+        Parameters of the function other than the strength: name to value.
+    """
+
+    place: Place = MOTOR
+    shape: Mapping[str, float] = field(default_factory=dict)
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    family: ClassVar[str] = "nonlinear"
+    columns: ClassVar[tuple[str, ...]]
+    """The residual tests that raise it."""
+    strength: ClassVar[tuple[str, str]]
+    """Name and dimension of the strength."""
+    dimensions: ClassVar[Mapping[str, str]] = {}
+    """Dimensions of the shape's parameters."""
+    signed: ClassVar[bool] = False
+    """Whether the strength may be negative."""
+    tuned: ClassVar[tuple[str, ...]] = ()
+    """The shape's parameters that are fitted from the grid on; all above zero."""
+    most: ClassVar[Mapping[str, float]] = {}
+    """The largest values of those that have one."""
+    ties: ClassVar[tuple[str, ...]] = ()
+    told_apart_by: ClassVar[str] = ""
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        """Its variants: places, and a grid of shapes sized by the motion."""
+        return (cls(),)
+
+    def called_for(self, raised: set[str]) -> bool:
+        """Whether one of the residual tests that found something is this effect's."""
+        return bool(raised & set(self.columns))
+
+    @abstractmethod
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        """The force for a given strength."""
+
+    @abstractmethod
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        """Strengths to begin a search with, from faint to strong, shape (S,)."""
+
+
+@dataclass(frozen=True)
+class CommandEffect(NonlinearEffect):
+    """An actuator whose force is not proportional to the command.
+
+    It adds no force to the mechanism: it takes some of the commanded one away.
+    """
+
+    @abstractmethod
+    def lost(self, strength: float, command: Floats) -> Floats:
+        """What of the command does not arrive, shape (N,)."""
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        raise NotImplementedError("acts on the command, not on the motion")

@@ -1,0 +1,89 @@
+"""Springs that are not linear: hardening or softening, and a gap in the connection."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, Law, Place, Step
+from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
+from bayeshaptic.effects.registry import register
+from bayeshaptic.models import Model
+
+
+@register
+class HardeningSpring(NonlinearEffect):
+    """A force -k3 x^3, to the ground or in the connection; softening where k3 is negative."""
+
+    name = "hardening_spring"
+    title = "hardening (or softening) spring"
+    columns = ("x^3", "stretch^3")
+    strength = ("cubic_stiffness", "cubic_stiffness")
+    signed = True
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        return tuple(cls(place) for place in (MOTOR, CONNECTION) if place in motion)
+
+    def called_for(self, raised: set[str]) -> bool:
+        return ("stretch^3" if self.place == CONNECTION else "x^3") in raised
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        values = dict(zip(model.names, theta, strict=True))
+        if self.place == CONNECTION:
+            stiffness = values["kc"]
+        else:
+            mass = values.get("m", values.get("m1", 0.0) + values.get("m2", 0.0))
+            stiffness = mass * (2 * np.pi * 2.0) ** 2
+        scale = stiffness / np.mean(motion.position**2)
+        return scale * np.array([0.001, 0.003, 0.01, 0.03, 0.1])
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        def force(step: Step) -> Floats:
+            return -strength * step.position**3
+
+        return force
+
+
+@register
+class Backlash(NonlinearEffect):
+    """A gap in the connection: within it the spring of the transmission does nothing.
+
+    The strength is half the gap; the force gives back what the linear connection takes inside it:
+    the spring, and a part of the damper.
+    """
+
+    name = "backlash"
+    title = "backlash in the connection"
+    columns = ("clipped stretch", "stretch^3")
+    strength = ("half_gap", "position")
+    dimensions = {"damping_in_gap": "number"}
+    tuned = ("damping_in_gap",)
+    most: ClassVar[Mapping[str, float]] = {"damping_in_gap": 1.0}
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        if CONNECTION not in motion:
+            return ()
+        return (cls(CONNECTION, {"damping_in_gap": 0.9}),)
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return float(motion.position.std()) * np.array([0.05, 0.1, 0.2, 0.3])
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        values = dict(zip(model.names, theta, strict=True))
+        stiffness = values["kc"]
+        damping = (1 - self.shape["damping_in_gap"]) * values["bc"]
+
+        def force(step: Step) -> Floats:
+            inside = np.abs(step.position) < strength
+            slack = np.where(inside, damping * step.velocity, 0.0)
+            return stiffness * np.clip(step.position, -strength, strength) + slack
+
+        return force

@@ -1,0 +1,1 @@
+"""People and configurations: what the recordings of one device have in common."""

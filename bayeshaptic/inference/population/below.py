@@ -1,0 +1,107 @@
+"""Draws of what lies below the hyperparameters: the device, the people, the recordings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bayeshaptic.inference.population.hierarchy import Hierarchy, inverse
+from bayeshaptic.inference.population.hyperparameters import Hyperparameters
+from bayeshaptic.types import Floats
+
+_SWEEPS = 20
+_CHUNK = 256
+
+
+@dataclass(frozen=True)
+class Below:
+    """Joint draws of a hierarchy, n of them.
+
+    Attributes
+    ----------
+    level : Hyperparameters
+    beta : ndarray, shape (n, q)
+        Mean hand, then the device in each configuration; in the coordinates of the study, with the
+        prior's mean added.
+    recordings : ndarray, shape (n, R, D)
+        Coordinates of every recording.
+    """
+
+    level: Hyperparameters
+    beta: Floats = field(repr=False)
+    recordings: Floats = field(repr=False)
+
+
+def draw_below(hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.Generator) -> Below:
+    """One draw below each vector phi of shape (n, Q).
+
+    Parameters
+    ----------
+    hierarchy : Hierarchy
+    phi : ndarray, shape (n, Q)
+    walls : ndarray, shape (D,)
+        Lowest value of each coordinate of the mean; -inf where there is none.
+    rng : numpy.random.Generator
+    """
+    parts = [
+        _draw(hierarchy, phi[start : start + _CHUNK], walls, rng)
+        for start in range(0, len(phi), _CHUNK)
+    ]
+    beta, recordings = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Below(hierarchy.layout.read(phi), beta, recordings)
+
+
+def _draw(
+    hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    given = hierarchy.given(phi)
+    order = np.concatenate([hierarchy.hand, *[hierarchy.device] * (int(hierarchy.place.max()) + 1)])
+    low = (walls - hierarchy.prior_mean)[order]
+    beta = walled(given.beta, inverse(given.precision), low, rng)
+    people = given.draw_people(beta, rng)
+    x = np.einsum("rip,bp->bri", hierarchy.design, beta)
+    x[:, :, hierarchy.hand] += people[:, hierarchy.user]
+    # Around that, by conditioning a draw of prior and noise on what was seen (Matheron's rule).
+    sd = np.sqrt(given.spread)[:, None, :]
+    guess = x + sd * rng.standard_normal(x.shape)
+    roots = np.linalg.cholesky(hierarchy.covariance)
+    noise = np.einsum("rij,brj->bri", roots, rng.standard_normal(x.shape))
+    off = np.einsum("brij,brj->bri", given.weight, hierarchy.mean - guess - noise)
+    x = guess + given.spread[:, None, :] * off
+    return beta + hierarchy.prior_mean[order], x + hierarchy.prior_mean
+
+
+def walled(mean: Floats, covariance: Floats, low: Floats, rng: np.random.Generator) -> Floats:
+    """A draw of each normal distribution, shapes (B, q), (B, q, q), with entries not below `low`.
+
+    The entries with a wall by Gibbs sampling of their own distribution, then the others given them.
+    """
+    draw = mean + np.einsum(
+        "bij,bj->bi", np.linalg.cholesky(covariance), rng.standard_normal(mean.shape)
+    )
+    walled = np.flatnonzero(np.isfinite(low))
+    if walled.size == 0 or np.all(draw[:, walled] >= low[walled]):
+        return draw
+    own = covariance[:, walled][:, :, walled]
+    precision = inverse(own)
+    inside = np.maximum(draw[:, walled], low[walled])
+    for _ in range(_SWEEPS):
+        for i in range(len(walled)):
+            off = inside - mean[:, walled]
+            off[:, i] = 0.0
+            sd = 1 / np.sqrt(precision[:, i, i])
+            centre = mean[:, walled[i]] - sd**2 * np.einsum("bj,bj->b", precision[:, i], off)
+            inside[:, i] = _above(low[walled[i]], centre, sd, rng)
+    change = np.einsum("bij,bj->bi", precision, inside - draw[:, walled])
+    draw = draw + np.einsum("bij,bj->bi", covariance[:, :, walled], change)
+    draw[:, walled] = inside
+    return draw
+
+
+def _above(low: float, centre: Floats, sd: Floats, rng: np.random.Generator) -> Floats:
+    """A draw of each normal distribution above `low`."""
+    from scipy.special import log_ndtr, ndtri_exp
+
+    log_tail = log_ndtr((centre - low) / sd)
+    return centre - sd * ndtri_exp(log_tail + np.log(rng.uniform(size=len(centre))))

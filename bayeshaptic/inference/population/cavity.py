@@ -1,0 +1,118 @@
+"""What the rest of a study says of one recording's parameters, and both together, exactly.
+
+In the words of expectation propagation (A. Gelman et al., "Expectation propagation as a way of
+life", Journal of Machine Learning Research 21, 2020): the cavity is the distribution of a
+recording's parameters given all other recordings, the tilted distribution is the cavity times the
+recording's exact likelihood.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, at_peak
+from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.types import Floats
+
+_COMPONENTS = 120  # draws of the hyperparameters that a cavity is a mixture over
+_CHUNK = 2000
+_LOOKED_AT = 2000
+_VAGUE = 1e3  # prior standard deviations of a recording that says nothing
+_LEAST = 0.02  # curvature of a description, in units of the tilted distribution's
+
+
+@dataclass(frozen=True)
+class Cavity:
+    """A mixture of normal distributions of one recording's coordinates, equally weighted.
+
+    Attributes
+    ----------
+    means : ndarray, shape (K, D)
+    whitening : ndarray, shape (K, D, D)
+        Inverses of the Cholesky factors of the covariances.
+    """
+
+    means: Floats = field(repr=False)
+    whitening: Floats = field(repr=False)
+
+    def __call__(self, x: Floats) -> Floats:
+        """Log density of points of shape (B, D); shape (B,)."""
+        parts = [self._density(x[start : start + _CHUNK]) for start in range(0, len(x), _CHUNK)]
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    def _density(self, x: Floats) -> Floats:
+        white = x @ self.whitening.transpose(0, 2, 1)
+        white -= (self.whitening @ self.means[:, :, None])[:, None, :, 0]
+        scale = np.log(np.diagonal(self.whitening, axis1=1, axis2=2)).sum(axis=1)
+        logs = scale[:, None] - 0.5 * np.einsum("kbd,kbd->kb", white, white)
+        return np.asarray(logsumexp(logs, axis=0) - np.log(len(logs)), float)
+
+    def moments(self) -> tuple[Floats, Floats]:
+        """Mean (D,) and covariance (D, D) of the mixture."""
+        mean = self.means.mean(axis=0)
+        roots = np.linalg.inv(self.whitening)
+        within = (roots @ roots.transpose(0, 2, 1)).mean(axis=0)
+        off = self.means - mean
+        return mean, within + off.T @ off / len(off)
+
+
+def cavity(hierarchy: Hierarchy, r: int, phi: Floats, rng: np.random.Generator) -> Cavity:
+    """The cavity of recording `r`.
+
+    Parameters
+    ----------
+    hierarchy : Hierarchy
+    r : int
+    phi : ndarray, shape (n, Q)
+        Draws of the hyperparameters given all recordings: each is weighed by how little this
+        recording had to do with it.  Of many some.
+    rng : numpy.random.Generator
+    """
+    own, sd = hierarchy.likelihoods[r], hierarchy.prior_sd
+    phi = phi[:: -(-len(phi) // _LOOKED_AT)]
+    nothing = replace(
+        own,
+        mean=hierarchy.prior_mean,
+        precision=np.diag((_VAGUE * sd) ** -2),
+        covariance=np.diag((_VAGUE * sd) ** 2),
+    )
+    others = list(hierarchy.likelihoods)
+    others[r] = nothing
+    without = replace(hierarchy, likelihoods=tuple(others))
+    given = without.given(phi)
+    mean, covariance = without.before(given, r)
+    covariance = covariance + given.spread[:, :, None] * np.eye(len(sd))
+    mean = mean + hierarchy.prior_mean
+    seen = covariance + own.covariance
+    off = own.mean - mean
+    far = np.einsum("bi,bi->b", off, np.linalg.solve(seen, off[..., None])[..., 0])
+    weight = flattened(0.5 * far + 0.5 * np.linalg.slogdet(seen)[1], 0.2)
+    chosen = rng.choice(len(phi), min(_COMPONENTS, len(phi)), p=weight)
+    return Cavity(mean[chosen], np.linalg.inv(np.linalg.cholesky(covariance[chosen])))
+
+
+def flattened(log_weight: Floats, least: float) -> Floats:
+    """Weights, flattened until a share of `least` of them counts: a few vectors say nothing."""
+    log_weight = log_weight - log_weight.max()
+    for power in 0.7 ** np.arange(20):
+        weight = np.exp(power * log_weight)
+        weight /= weight.sum()
+        if 1 / np.sum(weight**2) >= least * len(weight):
+            break
+    return np.asarray(weight, float)
+
+
+def described(x: Floats, rest: Cavity) -> GaussianLikelihood:
+    """The Gaussian likelihood that, with the cavity, has the moments of tilted draws `x` (n, D).
+
+    Its constant is arbitrary.
+    """
+    mean, covariance = x.mean(axis=0), np.cov(x.T)
+    before, wide = rest.moments()
+    precision, known = np.linalg.inv(covariance), np.linalg.inv(wide)
+    gradient = known @ (mean - before)  # of the likelihood at the mean: both slopes cancel there
+    unit = np.sqrt(np.diag(covariance))
+    return at_peak(mean, gradient, precision - known, 0.0, unit, _LEAST)

@@ -1,0 +1,143 @@
+"""A device along a configuration coordinate: the carriage's position, an arm's angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
+from bayeshaptic.inference.population.infer import common_model, prior_moments, study_coordinates
+from bayeshaptic.inference.population.path import Path
+from bayeshaptic.inference.population.reweighting import inside
+from bayeshaptic.inference.population.sampler import LevelChains, sample_level
+from bayeshaptic.inference.population.settling import settled
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampling.coordinates import Coordinates
+from bayeshaptic.models import Model
+from bayeshaptic.models.structures import HAND
+from bayeshaptic.threads import single_threaded
+from bayeshaptic.types import Floats, Progress
+
+FEWEST = 3  # configurations from which one is predicted between them
+_FIRST_STEPS = 200
+_BATCH = 2000
+_RARE = 0.2
+
+
+@dataclass(frozen=True)
+class Configurations:
+    """Posterior of a device's parameters along a coordinate.
+
+    Attributes
+    ----------
+    measured : ndarray, shape (C,)
+        Coordinates that were measured, in order, each once.
+    model : Model
+    chains : LevelChains
+        Of the amplitudes, the scatters and the length.
+    notices : tuple of Notice
+    """
+
+    measured: Floats
+    model: Model = field(repr=False)
+    chains: LevelChains = field(repr=False)
+    notices: tuple[Notice, ...] = ()
+    _path: Path | None = field(default=None, repr=False)
+    _here: Coordinates | None = field(default=None, repr=False)
+
+    def grid(self, points: int) -> Floats:
+        """At least `points` coordinates between the outermost measured ones, these among them."""
+        even = np.linspace(self.measured[0], self.measured[-1], points)
+        gap = np.ptp(self.measured) / (points - 1)
+        near = np.abs(even[:, None] - self.measured).min(axis=1) < 0.4 * gap
+        return np.sort(np.concatenate([even[~near], self.measured]))
+
+    def predict(self, coordinate: Floats, rng: np.random.Generator, count: int) -> Floats:
+        """Parameters along `coordinate` (G,), `count` joint draws of them: (count, G, P).
+
+        Natural values in the order of `model.names`.
+        """
+        assert self._path is not None and self._here is not None
+        low = np.where(self._here.log, -np.inf, self._here.low)
+        parts: list[Floats] = []
+        mirrored = False
+        while sum(map(len, parts)) < count:
+            x = self._path.draw(self.chains.thinned(_BATCH, rng), coordinate, rng)
+            good = np.all(x >= low, axis=(1, 2))
+            # Paths on which no damper is negative; where there are hardly any, mirrored at zero.
+            mirrored = mirrored or (not parts and good.mean() < _RARE)
+            parts.append(x if mirrored else x[good])
+        found = np.concatenate(parts)[:count]
+        flat = inside(found.reshape(-1, self.model.size), self._here)
+        return self._here.natural(flat).reshape(count, len(coordinate), -1)
+
+
+@single_threaded
+def infer_configurations(
+    posteriors: Sequence[Posterior],
+    coordinate: Sequence[float],
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Configurations:
+    """Infer how the parameters change along a configuration coordinate.
+
+    Parameters
+    ----------
+    posteriors : sequence of Posterior
+        One a recording, of models with the same parameters.
+    coordinate : sequence of float
+        Of each recording.
+    seed : int
+    progress : callable, optional
+        Called with the share done and a word about it.
+
+    Returns
+    -------
+    Configurations
+
+    Raises
+    ------
+    InputError
+        With fewer than three different configurations, or different models.
+    """
+    report = progress or (lambda share, word: None)
+    measured = np.unique(np.asarray(coordinate, float))
+    if len(coordinate) != len(posteriors):
+        raise InputError(
+            f"{len(posteriors)} posteriors, but {len(coordinate)} configurations: give one each."
+        )
+    if len(measured) < FEWEST:
+        raise InputError(
+            f"{len(measured)} different configurations cannot say how the device changes between "
+            f"them; record at least {FEWEST}."
+        )
+    model = common_model(posteriors)
+    here = study_coordinates(model)
+    mean, sd = prior_moments(model, here)
+    path = Path(
+        tuple(gaussian_likelihood(one, here) for one in posteriors),
+        np.asarray(coordinate, float),
+        np.isin(model.names, HAND),
+        mean,
+        sd,
+    )
+    tune, run, rest = np.random.SeedSequence(seed).spawn(3)
+    report(0.0, "configurations: first look")
+    path = settled(path, posteriors, here, path.guess()[0])
+    chains = sample_level(path, tune, steps=_FIRST_STEPS)
+    report(0.5, "configurations: sampling")
+    middle = np.median(chains.thinned(1000, np.random.default_rng(rest)), axis=0)
+    path = settled(path, posteriors, here, middle)
+    chains = sample_level(path, run, chains)
+    notices = chains.notices
+    if len(measured) < 5:
+        who = "held" if any(name in HAND for name in model.names) else "nobody holding it"
+        text = (
+            f"{len(measured)} configurations ({who}) say little about what is between them: how "
+            "fast the device changes is half belief."
+        )
+        notices = (*notices, Notice("note", "configurations", text))
+    return Configurations(measured, model, chains.resting(), notices, path, here)

@@ -1,0 +1,152 @@
+"""One recording's likelihood as a Gaussian function of the parameters, fitted where it matters.
+
+Between the recordings of a study everything is Gaussian (logarithms of a hand's parameters over
+people, small differences of one device), so that with Gaussian likelihoods the levels below the
+population can be integrated in closed form.  A likelihood is described by a quadratic function
+fitted to its logarithm over a cloud of points: not by the moments of the posterior, which would
+carry the prior along and know nothing of dampers that cannot be negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampling.coordinates import Coordinates
+from bayeshaptic.types import Floats
+
+_MOST_POINTS = 5000
+STEP = 0.05  # of a derivative, in posterior standard deviations
+# Least curvature in units of these, and of a cloud: where the data say nothing, or a ridge is bent.
+_LEAST, _LEAST_OF_CLOUD = 1e-3, 0.3
+
+
+@dataclass(frozen=True)
+class GaussianLikelihood:
+    """log p(recording | x) = constant - (x - mean) precision (x - mean) / 2.
+
+    Attributes
+    ----------
+    mean : ndarray, shape (D,)
+        In the coordinates of the study.
+    precision, covariance : ndarray, shape (D, D)
+    constant : float
+    """
+
+    mean: Floats
+    precision: Floats
+    covariance: Floats
+    constant: float
+
+    def __call__(self, x: Floats) -> Floats:
+        """Log likelihood of points of shape (B, D); shape (B,)."""
+        off = x - self.mean
+        return self.constant - 0.5 * np.einsum("bi,ij,bj->b", off, self.precision, off)
+
+
+def gaussian_likelihood(posterior: Posterior, here: Coordinates) -> GaussianLikelihood:
+    """The likelihood of a recording, described over the draws of its own posterior."""
+    every = -(-len(posterior.draws) // _MOST_POINTS)
+    x = here.coordinate(posterior.draws[::every])
+    return fit_quadratic(x, posterior.log_likelihood.ravel()[::every])
+
+
+def exact_likelihood(posterior: Posterior, here: Coordinates, x: Floats) -> Floats | None:
+    """Log likelihood at points of shape (B, D), by the model; None without the measurement."""
+    if posterior.windows is None:
+        return None
+    with np.errstate(all="ignore"):  # far-away points may overflow: they are refused
+        value = Likelihood(posterior.model, posterior.windows)(here.natural(x))
+    return np.where(np.isfinite(value), value, -np.inf)
+
+
+def linearised(
+    posterior: Posterior, here: Coordinates, x: Floats, step: Floats
+) -> GaussianLikelihood | None:
+    """The likelihood around one point, with the model linear there.
+
+    None without the measurement, and where there is no such model.  Each window's curvature is
+    exact but for second derivatives of the model, and never negative.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    here : Coordinates
+    x, step : ndarray, shape (D,)
+        Where, and how far to go for the derivatives.
+    """
+    if posterior.windows is None:
+        return None
+    windows = posterior.windows
+    around = np.concatenate([x[None], x + np.diag(step), x - np.diag(step)])
+    with np.errstate(all="ignore"):
+        left = Likelihood(posterior.model, windows).deviations(here.natural(around))
+    if not np.isfinite(left).all():
+        return None
+    size = len(x)
+    slopes = (left[1 : size + 1] - left[size + 1 :]) / (2 * step[:, None, None])
+    rows = np.concatenate([slopes.real, slopes.imag], axis=2)  # (D, W, 2 k)
+    middle = np.concatenate([left[0].real, left[0].imag], axis=1)
+    power = np.sum(middle**2, axis=1)
+    total = windows.scatter + power
+    weight = 2 * (windows.lines - 1) / total
+    along = np.einsum("wk,dwk->dw", middle, rows)
+    gradient = -along @ weight
+    curvature = np.einsum("dwk,ewk,w->de", rows, rows, weight, optimize=True)
+    # The logarithm bends the other way along the deviation itself.
+    back = np.minimum(2 / total, 1 / np.maximum(power, 1e-300))
+    curvature -= (along * (weight * back)) @ along.T
+    value = float(-np.sum((windows.lines - 1) * np.log(total)))
+    return at_peak(x, gradient, curvature, value, step / STEP, _LEAST)
+
+
+def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
+    """Fit a quadratic function to the log likelihood of points of shape (B, D), shape (B,).
+
+    Directions that it does not fall off in get next to no curvature, so that the description is a
+    (very wide) distribution.
+    """
+    middle = x.mean(axis=0)
+    values, vectors = np.linalg.eigh(np.cov(x.T))
+    width = np.sqrt(np.maximum(values, 1e-12 * values.max()))
+    v = (x - middle) @ (vectors / width)
+    first, second = np.triu_indices(x.shape[1])
+    terms = np.column_stack([np.ones(len(v)), v, v[:, first] * v[:, second]])
+    level = log_likelihood.mean()
+    found = np.linalg.lstsq(terms, log_likelihood - level, rcond=None)[0]
+    size = x.shape[1]
+    curvature = np.zeros((size, size))
+    curvature[first, second] = -found[size + 1 :]
+    curvature = curvature + curvature.T
+    slope = found[1 : size + 1]
+    value = float(level + found[0])
+    own = at_peak(np.zeros(size), slope, curvature, value, np.ones(size), _LEAST_OF_CLOUD)
+    out, back = vectors / width, (vectors * width).T
+    return GaussianLikelihood(
+        middle + own.mean @ back,
+        out @ own.precision @ out.T,
+        back.T @ own.covariance @ back,
+        own.constant,
+    )
+
+
+def at_peak(
+    x: Floats, gradient: Floats, curvature: Floats, value: float, unit: Floats, least: float
+) -> GaussianLikelihood:
+    """The quadratic function around `x` written around its peak.
+
+    Its curvature is at least `least` in every direction, with coordinates in units of `unit`.
+    """
+    bends, axes = np.linalg.eigh(curvature * np.outer(unit, unit))
+    bends = np.maximum(bends, least)
+    slope = axes.T @ (gradient * unit)
+    out, back = axes / unit[:, None], axes * unit[:, None]
+    return GaussianLikelihood(
+        x + back @ (slope / bends),
+        (out * bends) @ out.T,
+        (back / bends) @ back.T,
+        float(value + 0.5 * np.sum(slope**2 / bends)),
+    )

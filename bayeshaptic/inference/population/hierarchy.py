@@ -1,0 +1,213 @@
+"""The levels of a study: people over recordings, one device under all of them.
+
+Coordinates x_r of recording r, D of them, H of the hand and the others of the device:
+
+    x_r = A_r beta + E v_u(r) + t_r,    v_u ~ N(0, Sigma),    t_r ~ N(0, T),
+
+beta holds the mean hand and the device (once a configuration), v_u is how the hand of the person u
+differs from the mean hand, and T is diagonal: the spread of the device between recordings, and of
+one person between trials.  With Gaussian likelihoods everything but Sigma and T is integrated in
+closed form; the Gaussian factors are those of D. W. Hogg, A. D. Myers, J. Bovy, "Inferring the
+eccentricity distribution", Astrophysical Journal 725 (2010), with integrals instead of sums over
+draws, because the device is known far better from all recordings than from any one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood
+from bayeshaptic.inference.population.hyperparameters import Hyperparameters, Layout
+from bayeshaptic.types import Floats, Ints
+
+_SCATTER = (0.05, 1.0)  # of hands, that a first guess stays within
+
+
+@dataclass(frozen=True)
+class Hierarchy:
+    """The recordings of a study, described, and how they share their parameters.
+
+    Attributes
+    ----------
+    likelihoods : tuple of GaussianLikelihood
+        R of them.
+    user : ndarray of int, shape (R,)
+        Who held the device, 0 .. U - 1.
+    place : ndarray of int, shape (R,)
+        In which configuration, 0 .. C - 1.
+    hand, device : ndarray of int, shape (H,), (D - H,)
+        Which coordinates are the hand's and which are the device's.
+    prior_mean, prior_sd : ndarray, shape (D,)
+        Of the mean hand and of the device.
+    """
+
+    likelihoods: Sequence[GaussianLikelihood] = field(repr=False)
+    user: Ints
+    place: Ints
+    hand: Ints
+    device: Ints
+    prior_mean: Floats
+    prior_sd: Floats
+
+    @cached_property
+    def layout(self) -> Layout:
+        repeated = len(self.user) > len(np.unique(self.user))
+        return Layout(len(self.hand), len(self.device), repeated)
+
+    @cached_property
+    def mean(self) -> Floats:
+        """Peaks of the likelihoods, less the prior's mean; shape (R, D)."""
+        return np.stack([one.mean for one in self.likelihoods]) - self.prior_mean
+
+    @cached_property
+    def covariance(self) -> Floats:
+        return np.stack([one.covariance for one in self.likelihoods])
+
+    @cached_property
+    def design(self) -> Floats:
+        """A_r: which entries of beta the coordinates of a recording are; shape (R, D, q)."""
+        hand, device = len(self.hand), len(self.device)
+        places = int(self.place.max()) + 1
+        design = np.zeros((len(self.user), hand + device, hand + places * device))
+        design[:, self.hand, np.arange(hand)] = 1.0
+        for r, place in enumerate(self.place):
+            design[r, self.device, hand + place * device + np.arange(device)] = 1.0
+        return design
+
+    @cached_property
+    def beta_sd(self) -> Floats:
+        """Prior standard deviation of beta, whose mean is the origin; shape (q,)."""
+        places = int(self.place.max()) + 1
+        return np.concatenate([self.prior_sd[self.hand], *[self.prior_sd[self.device]] * places])
+
+    @cached_property
+    def members(self) -> Floats:
+        """Which recordings are whose, shape (U, R)."""
+        return np.equal.outer(np.arange(int(self.user.max()) + 1), self.user).astype(float)
+
+    def guess(self) -> tuple[Floats, Floats]:
+        """Middle and width of phi by the scatter of the recordings' own estimates."""
+        seen = self.mean[:, self.hand].std(axis=0)
+        return self.layout.guess(np.clip(seen, *_SCATTER))
+
+    def spread(self, level: Hyperparameters) -> Floats:
+        """Diagonal of T, shape (B, D)."""
+        spread = np.empty((len(level.trial_sd), len(self.prior_mean)))
+        spread[:, self.hand] = level.trial_sd[:, None] ** 2
+        spread[:, self.device] = level.device_sd**2
+        return spread
+
+    def _by_user(self, values: Floats) -> Floats:
+        """Values of recordings, shape (B, R, ...), summed over those of each user."""
+        flat = self.members @ values.reshape(*values.shape[:2], -1)
+        return flat.reshape(len(values), len(self.members), *values.shape[2:])
+
+    def log_density(self, phi: Floats) -> Floats:
+        """Log posterior density of hyperparameters phi of shape (B, Q), up to a constant."""
+        value = np.full(len(phi), -np.inf)
+        sane = self.layout.sane(phi)
+        if sane.any():
+            value[sane] = self.given(phi[sane]).log_density
+        return value
+
+    def expected(self, phi: Floats) -> tuple[Floats, Floats]:
+        """Mean and covariance of recordings' coordinates given one phi, (R, D) and (R, D, D)."""
+        given = self.given(phi[None])
+        spread = given.spread[0]
+        means, covariances = [], []
+        for r, seen in enumerate(self.mean):
+            mean, covariance = (part[0] for part in self.before(given, r))
+            gain = spread[:, None] * given.weight[0, r]
+            kept = np.eye(len(spread)) - gain
+            means.append(mean + gain @ (seen - mean))
+            covariances.append(kept @ covariance @ kept.T + kept * spread)
+        return np.stack(means) + self.prior_mean, np.stack(covariances)
+
+    def before(self, given: Given, r: int) -> tuple[Floats, Floats]:
+        """Mean, less the prior's, and covariance of A_r beta + E v_u; shapes (B, D), (B, D, D)."""
+        own = given.own_covariance[:, self.user[r]]
+        slope = np.tile(self.design[r], (len(own), 1, 1))
+        slope[:, self.hand] -= given.gain[:, self.user[r]]
+        mean = np.einsum("bdq,bq->bd", slope, given.beta)
+        mean[:, self.hand] += np.einsum("bij,bj->bi", own, given.own_score[:, self.user[r]])
+        covariance = slope @ np.linalg.solve(given.precision, slope.transpose(0, 2, 1))
+        covariance[:, self.hand[:, None], self.hand] += own
+        return mean, covariance
+
+    def given(self, phi: Floats) -> Given:
+        """Everything below the hyperparameters phi of shape (B, Q)."""
+        level = self.layout.read(phi)
+        spread = self.spread(level)
+        marginal = self.covariance + spread[:, None, :, None] * np.eye(spread.shape[1])
+        root = np.linalg.cholesky(marginal)
+        weight = inverse(marginal)  # (B, R, D, D)
+        log_det = 2 * np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=(1, 2))
+        pull = (weight @ self.mean[:, :, None])[..., 0]
+        seen = weight @ self.design  # (B, R, D, q)
+        count, people, hand = len(phi), len(self.members), len(self.hand)
+        flat = self.design.reshape(-1, self.design.shape[2])
+        precision = flat.T @ seen.reshape(count, *flat.shape)
+        score = pull.reshape(count, -1) @ flat
+        chi = pull.reshape(count, -1) @ self.mean.ravel()
+        # People: v_u has precision K_u and, given beta, the mean K_u^-1 (score_u - seen_u beta).
+        own = self._by_user(weight[:, :, self.hand][..., self.hand]) + level.precision[:, None]
+        own_score = self._by_user(pull[..., self.hand])
+        own_seen = self._by_user(seen[:, :, self.hand])
+        own_covariance = inverse(own)
+        gain = own_covariance @ own_seen
+        gains = gain.reshape(count, people * hand, -1).transpose(0, 2, 1)
+        precision -= gains @ own_seen.reshape(count, people * hand, -1)
+        score -= (gains @ own_score.reshape(count, -1, 1))[..., 0]
+        chi -= np.sum(own_score * (own_covariance @ own_score[..., None])[..., 0], axis=(1, 2))
+        precision += np.diag(1 / self.beta_sd**2)
+        beta = np.asarray(np.linalg.solve(precision, score[..., None])[..., 0], np.float64)
+        root_diagonal = np.diagonal(level.correlation_root, axis1=1, axis2=2) * level.hand_sd
+        log_det += 2 * people * np.log(root_diagonal).sum(axis=1)
+        log_det += np.linalg.slogdet(own)[1].sum(axis=1) + np.linalg.slogdet(precision)[1]
+        value = level.log_prior - 0.5 * (log_det + chi - np.sum(score * beta, axis=1))
+        return Given(level, spread, weight, precision, beta, own_covariance, own_score, gain, value)
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the recordings say below given hyperparameters, B of them.
+
+    Attributes
+    ----------
+    level : Hyperparameters
+    spread : ndarray, shape (B, D)
+        Diagonal of T.
+    weight : ndarray, shape (B, R, D, D)
+        Inverse of V_r + T.
+    precision, beta : ndarray, shape (B, q, q), (B, q)
+        Of beta, whose prior mean is the origin: precision and mean.
+    own_covariance, own_score, gain : ndarray, shape (B, U, H, H), (B, U, H), (B, U, H, q)
+        Of v_u given beta: the mean is own_covariance own_score - gain beta.
+    log_density : ndarray, shape (B,)
+    """
+
+    level: Hyperparameters
+    spread: Floats
+    weight: Floats
+    precision: Floats
+    beta: Floats
+    own_covariance: Floats
+    own_score: Floats
+    gain: Floats
+    log_density: Floats
+
+    def draw_people(self, beta: Floats, rng: np.random.Generator) -> Floats:
+        """v_u for beta of shape (B, q); shape (B, U, H)."""
+        mean = np.einsum("buij,buj->bui", self.own_covariance, self.own_score)
+        mean -= np.einsum("buiq,bq->bui", self.gain, beta)
+        root = np.linalg.cholesky(self.own_covariance)
+        return mean + np.einsum("buij,buj->bui", root, rng.standard_normal(mean.shape))
+
+
+def inverse(matrices: Floats) -> Floats:
+    """Inverses of matrices of shape (..., n, n)."""
+    return np.asarray(np.linalg.inv(matrices), np.float64)

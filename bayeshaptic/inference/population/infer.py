@@ -1,0 +1,304 @@
+"""A population of users: hands differ from person to person, the device hardly."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.population.below import Below, draw_below
+from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
+from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.inference.population.reweighting import (
+    ALONE,
+    Reweighted,
+    inside,
+    redescribed,
+    reweight,
+)
+from bayeshaptic.inference.population.sampler import LevelChains, sample_level
+from bayeshaptic.inference.population.settling import settled
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampling.coordinates import Coordinates, coordinates
+from bayeshaptic.models import Model
+from bayeshaptic.models.structures import HAND
+from bayeshaptic.threads import single_threaded
+from bayeshaptic.types import Floats, Progress
+
+DRAWS = 36_000  # with them 20 lie below the stiffness of 0.1 % risk, in the hands of each user
+_SOME = 2000
+_FIRST_STEPS = 200
+_DESCRIPTIONS = 2  # rounds of describing recordings better, at most
+
+
+@dataclass(frozen=True)
+class Population:
+    """Posterior of a population of hands, and of the device that they held.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Names of the hand's parameters, H of them.
+    log_mean, log_sd : ndarray, shape (n, H)
+        Of the logarithms over people.
+    correlation : ndarray, shape (n, H, H)
+        Of the logarithms over people.
+    users : tuple of str
+    places : tuple
+        Configurations that people were measured in; (None,) without.
+    model : Model
+    recordings : tuple of Reweighted
+        Every recording's parameters given all recordings, in the order that they came.
+    notices : tuple of Notice
+    seconds : float
+    chains : LevelChains or None
+        Of the spreads and correlations, with what it takes to trust them.
+    walkers : int
+        Number of chains that the draws consist of, one after the other.
+    """
+
+    parameters: tuple[str, ...]
+    log_mean: Floats = field(repr=False)
+    log_sd: Floats = field(repr=False)
+    correlation: Floats = field(repr=False)
+    users: tuple[str, ...]
+    places: tuple[float | str | None, ...]
+    model: Model = field(repr=False)
+    recordings: tuple[Reweighted, ...] = field(repr=False)
+    notices: tuple[Notice, ...] = ()
+    seconds: float = 0.0
+    chains: LevelChains | None = field(default=None, repr=False)
+    walkers: int = 1
+    _here: Coordinates | None = field(default=None, repr=False)
+    _hierarchy: Hierarchy | None = field(default=None, repr=False)
+    _below: Below | None = field(default=None, repr=False)
+
+    @property
+    def device_parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that all recordings share up to a small spread."""
+        return tuple(name for name in self.model.names if name not in self.parameters)
+
+    @property
+    def device_spread(self) -> Floats:
+        """Spread between recordings: of logarithms, or in prior widths; shape (n, D - H)."""
+        assert self._below is not None
+        return self._below.level.device_sd
+
+    def of_user(self, user: str) -> tuple[Reweighted, ...]:
+        """The recordings of one user."""
+        return tuple(one for one in self.recordings if one.user == user)
+
+    def new_person(self, rng: np.random.Generator, each: int = 1, place: int = 0) -> Floats:
+        """Parameters of people not yet seen: `each` from every draw of the population.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+        each : int
+            People a draw of the population; draw after draw.
+        place : int
+            Index into `places`.
+
+        Returns
+        -------
+        ndarray, shape (n * each, P)
+            Natural values in the order of `model.names`.
+        """
+        assert self._here is not None and self._hierarchy is not None and self._below is not None
+        hierarchy, level = self._hierarchy, self._below.level
+        count, hand = self.log_mean.shape
+        x = np.empty((count, each, self.model.size))
+        normal = rng.standard_normal((count, each, self.model.size))
+        root = level.hand_sd[:, :, None] * level.correlation_root
+        people = np.einsum("nij,nej->nei", root, normal[..., :hand])
+        trial = level.trial_sd[:, None, None] * rng.standard_normal(people.shape)
+        x[:, :, hierarchy.hand] = self.log_mean[:, None] + people + trial
+        device = len(hierarchy.device)
+        start = hand + place * device
+        middle = self._below.beta[:, None, start : start + device]
+        x[:, :, hierarchy.device] = middle + level.device_sd[:, None] * normal[..., hand:]
+        return self._here.natural(inside(x.reshape(-1, self.model.size), self._here))
+
+
+@single_threaded
+def infer_population(
+    posteriors: Sequence[Posterior],
+    users: Sequence[str],
+    places: Sequence[float | str | None] | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Population:
+    """Infer a population of hands from one posterior a recording.
+
+    The logarithms of a hand's parameters are normal over people, with any mean and covariance; the
+    device is the same in all recordings of a configuration, up to a small spread that is inferred;
+    a person recorded twice has the same hand, up to a spread between trials.
+
+    Parameters
+    ----------
+    posteriors : sequence of Posterior
+        Of grasped models with the same parameters.
+    users : sequence of str
+        Who held the device in each.
+    places : sequence, optional
+        In which configuration each was recorded.
+    seed : int
+    progress : callable, optional
+        Called with the share done and a word about it.
+
+    Returns
+    -------
+    Population
+
+    Raises
+    ------
+    InputError
+        Without recordings, or where their models have different parameters or no hand.
+
+    Notes
+    -----
+    Each recording's likelihood is described by a Gaussian function (`gaussian_likelihood`) where
+    all recordings together say that its parameters are, in two rounds (`settled`), and by moments
+    where that is poor (`redescribed`).  emcee samples the spreads and correlations, all else is
+    integrated out (`hierarchy`); in the end each recording's own parameters are drawn by its exact
+    likelihood (`reweight`).
+    """
+    began = time.perf_counter()
+    report = progress or (lambda share, word: None)
+    model = common_model(posteriors)
+    if not any(name in HAND for name in model.names):
+        raise InputError(f"the {model.name} model has no hand: give posteriors of held devices.")
+    here = study_coordinates(model)
+    hierarchy, names, spots = _hierarchy(posteriors, users, places or [None] * len(users), here)
+    tune, again, run, first, last, rest = np.random.SeedSequence(seed).spawn(6)
+    rng = np.random.default_rng(rest)
+    report(0.0, "population: first look")
+    hierarchy = settled(hierarchy, posteriors, here, hierarchy.guess()[0])
+    chains = sample_level(hierarchy, tune, steps=_FIRST_STEPS)
+    hierarchy = settled(hierarchy, posteriors, here, np.median(chains.thinned(_SOME, rng), axis=0))
+    chains = sample_level(hierarchy, again, chains, steps=_FIRST_STEPS)
+    report(0.3, "population: describing recordings")
+    for own_seed in first.spawn(_DESCRIPTIONS):
+        phi = chains.thinned(_SOME, rng)
+        better = redescribed(hierarchy, posteriors, users, phi, here, own_seed)
+        if better is hierarchy:
+            break
+        hierarchy = better
+        chains = sample_level(hierarchy, again, chains, steps=_FIRST_STEPS)
+    report(0.5, "population: sampling")
+    chains = sample_level(hierarchy, run, chains)
+    report(0.8, "population: users")
+    phi, walkers = chains.in_order(DRAWS)
+    draws = draw_below(hierarchy, phi, here.low, rng)
+    own = reweight(posteriors, users, hierarchy, draws, phi, here, last)
+    draws = replace(draws, recordings=draws.recordings[:0])  # many, and no longer needed
+    root = draws.level.correlation_root
+    return Population(
+        tuple(name for name in model.names if name in HAND),
+        draws.beta[:, : len(hierarchy.hand)],
+        draws.level.hand_sd,
+        root @ root.transpose(0, 2, 1),
+        names,
+        spots,
+        model,
+        own,
+        (*chains.notices, *_notices(own, names)),
+        time.perf_counter() - began,
+        chains.resting(),
+        walkers,
+        here,
+        hierarchy,
+        draws,
+    )
+
+
+def study_coordinates(model: Model) -> Coordinates:
+    """Coordinates that recordings share: hands always as logarithms, the others by their priors."""
+    here = coordinates(model)
+    hand = np.isin(model.names, HAND)
+    low = np.where(hand, -np.inf, here.low)
+    return replace(here, log=here.log | hand, scale=np.where(hand, 1.0, here.scale), low=low)
+
+
+def prior_moments(model: Model, here: Coordinates) -> tuple[Floats, Floats]:
+    """Middle and width of the priors in the coordinates `here`; shape (D,) each.
+
+    Of a damper that may be zero the wall is the middle: its half-normal is one half of a normal.
+    So it is for one of which a single recording believes that it is near zero.
+    """
+    priors = [model.prior(name) for name in model.names]
+    low, middle, high = (
+        here.coordinate(np.array([float(prior.quantile(p)) for prior in priors])[None])[0]
+        for p in (0.16, 0.5, 0.84)
+    )
+    scales = np.array([getattr(prior, "scale", np.nan) for prior in priors]) / here.scale
+    half = np.isfinite(scales) & ~here.log
+    mean = np.where(half, 0.0, middle)
+    sd = np.where(half, scales, 0.5 * (high - low))
+    return mean, np.where(here.log, np.minimum(sd, high - middle), sd)
+
+
+def common_model(posteriors: Sequence[Posterior]) -> Model:
+    """The model that all recordings were fitted with; an InputError where there are several."""
+    if not posteriors:
+        raise InputError("no recording: a study's levels need at least one.")
+    model = posteriors[0].model
+    for number, posterior in enumerate(posteriors):
+        if posterior.names != model.names:
+            raise InputError(
+                f"posterior {number + 1} has the parameters {', '.join(posterior.names)}, but the "
+                f"first has {', '.join(model.names)}: the same model, with the same effects, is "
+                "needed in all recordings."
+            )
+    return model
+
+
+def _hierarchy(
+    posteriors: Sequence[Posterior],
+    users: Sequence[str],
+    places: Sequence[float | str | None],
+    here: Coordinates,
+) -> tuple[Hierarchy, tuple[str, ...], tuple[float | str | None, ...]]:
+    """The levels with their first description; users and configurations as they first come."""
+    if not len(users) == len(places) == len(posteriors):
+        raise InputError(
+            f"{len(posteriors)} posteriors, but {len(users)} users and {len(places)} "
+            "configurations: give one of each for every posterior."
+        )
+    names, spots = tuple(dict.fromkeys(users)), tuple(dict.fromkeys(places))
+    model = posteriors[0].model
+    is_hand = np.isin(model.names, HAND)
+    mean, sd = prior_moments(model, here)
+    hierarchy = Hierarchy(
+        tuple(gaussian_likelihood(one, here) for one in posteriors),
+        np.array([names.index(user) for user in users]),
+        np.array([spots.index(place) for place in places]),
+        np.flatnonzero(is_hand),
+        np.flatnonzero(~is_hand),
+        mean,
+        sd,
+    )
+    return hierarchy, names, spots
+
+
+def _notices(recordings: Sequence[Reweighted], users: tuple[str, ...]) -> tuple[Notice, ...]:
+    notices = []
+    alone = [one for one in recordings if one.how == ALONE]
+    if alone:
+        names = ", ".join(dict.fromkeys(one.user for one in alone))
+        text = (
+            f"{len(alone)} of {len(recordings)} recordings (of {names}) could not be joined with "
+            "the others: their parameters given all people could not be sampled. They are shown "
+            "by themselves, and the population knows them only roughly."
+        )
+        notices.append(Notice("warning", "population", text))
+    if len(users) < 4:
+        text = (
+            f"{len(users)} user(s) say little about how much people differ: the prior decides, and "
+            "the interval of a new person is wide; record at least six people."
+        )
+        notices.append(Notice("warning", "population", text))
+    return tuple(notices)

@@ -1,0 +1,286 @@
+"""Every recording's parameters given the whole study, by its exact likelihood.
+
+Three ways, the cheapest first; all of them lead to the same distribution, the recording's exact
+likelihood times what the others say (`population_cavity`):
+
+- draws of the levels, weighed by exact over described likelihood: where the study knows more than
+  the recording does, and the description is good;
+- the recording's own draws, weighed by what the others say over the recording's own prior, as in
+  Hogg, Myers and Bovy (2010): where the recording knows more than the study does;
+- sampling with what the others say as the prior: a Student t mixture is fitted by emcee ensembles,
+  and its draws are weighed, or, where that is poor, the ensembles go on as for one recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bayeshaptic.inference.population.below import Below, draw_below
+from bayeshaptic.inference.population.cavity import Cavity, cavity, described, flattened
+from bayeshaptic.inference.population.gaussian_likelihood import exact_likelihood
+from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.inference.population.sampler import TOLERABLE, run_ensembles
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampling.coordinates import Coordinates
+from bayeshaptic.inference.sampling.ensembles import warmed_up
+from bayeshaptic.inference.sampling.importance import adapt
+from bayeshaptic.numerics.mixture import student
+from bayeshaptic.numerics.pareto import pareto_k
+from bayeshaptic.types import Floats
+
+POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
+_FEW = 1000  # effective draws that are too few
+_HARMLESS = 0.5  # share of effective draws from which a heavy tail is harmless
+_SAMPLED = 2000.0  # effective draws to sample
+_ENOUGH, _MOST = 21_000, 22_000  # draws, for risks down to 0.1 %
+_PROPOSED = 2.0  # draws of a proposal for each that is wanted
+_MOST_OWN = 40_000
+_START = 3000
+DESCRIBED, OWN, SAMPLED, ALONE = "described", "own", "sampled", "alone"
+
+
+@dataclass(frozen=True)
+class Reweighted:
+    """One recording's parameters given all recordings of the study.
+
+    Attributes
+    ----------
+    user : str
+    draws : ndarray, shape (n, P)
+        Natural values, equally weighted.
+    effective : float
+        Kish's effective number of the weighted draws that these were chosen from; of chains their
+        least effective number.
+    pareto_k : float
+        Shape of the tail of the weights: above 0.7 they are not to be trusted; nan without weights.
+    how : {"described", "own", "sampled", "alone"}
+        Draws of the levels weighed, the recording's own weighed, sampled; or the recording by
+        itself, where none of these came out.
+    share : float
+        Effective number over that of the draws that were weighed.
+    """
+
+    user: str
+    draws: Floats = field(repr=False)
+    effective: float
+    pareto_k: float
+    how: str = DESCRIBED
+    share: float = 1.0
+
+    @property
+    def good(self) -> bool:
+        """Whether there are enough effective draws, with weights that can be trusted."""
+        if self.how == ALONE:
+            return False
+        light = not self.pareto_k > POOR_K or self.share > _HARMLESS
+        return light and (self.effective >= _FEW or self.share > _HARMLESS)
+
+
+def reweight(
+    posteriors: Sequence[Posterior],
+    users: Sequence[str],
+    hierarchy: Hierarchy,
+    below: Below,
+    phi: Floats,
+    here: Coordinates,
+    seed: np.random.SeedSequence,
+) -> tuple[Reweighted, ...]:
+    """Draws of every recording given the study.
+
+    Parameters
+    ----------
+    posteriors : sequence of Posterior
+    users : sequence of str
+    hierarchy : Hierarchy
+    below : Below
+        Draws of what lies below the hyperparameters `phi`, shape (n, Q).
+    here : Coordinates
+    seed : numpy.random.SeedSequence
+    """
+    return tuple(
+        _one(posterior, user, r, hierarchy, below, phi, here, own)
+        for r, (posterior, user, own) in enumerate(
+            zip(posteriors, users, seed.spawn(len(users)), strict=True)
+        )
+    )
+
+
+def redescribed(
+    hierarchy: Hierarchy,
+    posteriors: Sequence[Posterior],
+    users: Sequence[str],
+    phi: Floats,
+    here: Coordinates,
+    seed: np.random.SeedSequence,
+) -> Hierarchy:
+    """The levels with a better description of each likelihood whose first one is poor.
+
+    That is the Gaussian function which, with what the others say, has the moments of the exact
+    distribution (one round of expectation propagation): near a wall, or on a ridge that is bent,
+    the model is not linear over the width of what is known.
+    """
+    first, last = seed.spawn(2)
+    below = draw_below(hierarchy, phi, here.low, np.random.default_rng(first))
+    found, changed = list(hierarchy.likelihoods), False
+    for r, own in enumerate(reweight(posteriors, users, hierarchy, below, phi, here, last)):
+        if posteriors[r].windows is not None and own.how in (OWN, SAMPLED):
+            rest = cavity(hierarchy, r, phi, np.random.default_rng(first))
+            found[r], changed = described(here.coordinate(own.draws), rest), True
+    return replace(hierarchy, likelihoods=tuple(found)) if changed else hierarchy
+
+
+def _one(
+    posterior: Posterior,
+    user: str,
+    r: int,
+    hierarchy: Hierarchy,
+    below: Below,
+    phi: Floats,
+    here: Coordinates,
+    seed: np.random.SeedSequence,
+) -> Reweighted:
+    rng = np.random.default_rng(seed)
+    count = len(below.recordings)
+    first = _from_levels(posterior, user, r, hierarchy, below, here, rng)
+    if posterior.windows is None or (first is not None and _enough(first, count)):
+        return first or _alone(posterior, user, count)
+    rest = cavity(hierarchy, r, phi, rng)
+    second = _from_own(posterior, user, rest, here, count, rng)
+    if _enough(second, count):
+        return second
+    third = _sampled(posterior, user, rest, here, count, rng, seed.spawn(1)[0])
+    good = [one for one in (first, second, third) if one is not None and one.good]
+    return max(good, key=lambda one: one.effective, default=_alone(posterior, user, count))
+
+
+def _enough(found: Reweighted, count: int) -> bool:
+    """Whether nothing better is worth looking for: 20 draws below 0.1 % risk are enough."""
+    wanted = _ENOUGH if count > _ENOUGH else _HARMLESS * count
+    return found.good and found.effective >= wanted
+
+
+def _from_levels(
+    posterior: Posterior,
+    user: str,
+    r: int,
+    hierarchy: Hierarchy,
+    below: Below,
+    here: Coordinates,
+    rng: np.random.Generator,
+) -> Reweighted | None:
+    """Draws of the levels inside the walls, weighed by exact over described likelihood."""
+    x = below.recordings[:, r]
+    x = x[np.all(x >= walls(here), axis=1)]
+    exact = exact_likelihood(posterior, here, x) if len(x) else None
+    if posterior.windows is not None and (exact is None or not np.isfinite(exact).any()):
+        return None
+    log_weight = np.zeros(len(x)) if exact is None else exact - hierarchy.likelihoods[r](x)
+    return _resampled(x, log_weight, user, here, len(below.recordings), rng, DESCRIBED)
+
+
+def _from_own(
+    posterior: Posterior,
+    user: str,
+    rest: Cavity,
+    here: Coordinates,
+    count: int,
+    rng: np.random.Generator,
+) -> Reweighted:
+    """The recording's own draws, weighed by the cavity over its own prior."""
+    x = _own(posterior, here, _MOST_OWN)
+    return _resampled(x, _own_weight(posterior, rest, here, x), user, here, count, rng, OWN)
+
+
+def _own(posterior: Posterior, here: Coordinates, most: int) -> Floats:
+    every = -(-len(posterior.draws) // most)
+    return here.coordinate(posterior.draws[::every])
+
+
+def _own_weight(posterior: Posterior, rest: Cavity, here: Coordinates, x: Floats) -> Floats:
+    prior = posterior.model.log_prior(here.natural(x)) + here.log_jacobian(x)
+    return np.asarray(rest(x) - prior, float)
+
+
+def _resampled(
+    x: Floats,
+    log_weight: Floats,
+    user: str,
+    here: Coordinates,
+    count: int,
+    rng: np.random.Generator,
+    how: str,
+) -> Reweighted:
+    """Each of `x` as often as its weight says (systematic resampling)."""
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    effective = float(1 / np.sum(weight**2))
+    # No more than there are to choose from: draws that come again and again would count as many.
+    count = int(np.ceil(min(count, effective, _MOST)))
+    steps = (np.arange(count) + rng.uniform()) / count
+    chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(x) - 1)
+    draws = here.natural(x[rng.permutation(chosen)])
+    k = pareto_k(log_weight[np.isfinite(log_weight)])
+    return Reweighted(user, draws, effective, k, how, effective / len(x))
+
+
+def _sampled(
+    posterior: Posterior,
+    user: str,
+    rest: Cavity,
+    here: Coordinates,
+    count: int,
+    rng: np.random.Generator,
+    seed: np.random.SeedSequence,
+) -> Reweighted | None:
+    """Draws from exact likelihood times cavity; None where the sampler does not converge."""
+    low = walls(here)
+
+    def density(x: Floats) -> Floats:
+        value = np.full(len(x), -np.inf)
+        inside = np.all((x >= low) & (np.abs(x) < 600), axis=1)
+        if inside.any():
+            exact = exact_likelihood(posterior, here, x[inside])
+            assert exact is not None
+            value[inside] = exact + rest(x[inside])
+        return value
+
+    x = _own(posterior, here, _START)
+    weight = flattened(_own_weight(posterior, rest, here, x), 0.05)
+    mean = weight @ x
+    off = x - mean
+    first = student(mean, (weight[:, None] * off).T @ off, 8.0)
+    ensembles = warmed_up(density, adapt(density, first, rng), seed)
+    proposal = ensembles[0].proposal
+    y = proposal.mixture.sample(rng, int(_PROPOSED * count))
+    x = proposal.straightening.bent(y)
+    found = _resampled(
+        x, density(x) - proposal.mixture.log_density(y), user, here, count, rng, SAMPLED
+    )
+    if found.good:
+        return found
+    chains = run_ensembles(ensembles, np.random.default_rng(seed.spawn(1)[0]), _SAMPLED)
+    if chains.diagnostics.rhat.max() > TOLERABLE or chains.diagnostics.ess < _FEW:
+        return None
+    draws = here.natural(chains.thinned(min(count, int(chains.diagnostics.ess)), rng))
+    return Reweighted(user, draws, chains.diagnostics.ess, float("nan"), SAMPLED)
+
+
+def _alone(posterior: Posterior, user: str, count: int) -> Reweighted:
+    """The recording by itself."""
+    draws = posterior.draws[:: -(-len(posterior.draws) // count)]
+    return Reweighted(user, draws, float(posterior.effective), float("nan"), ALONE)
+
+
+def walls(here: Coordinates) -> Floats:
+    """Lowest value of each coordinate; -inf where it is a logarithm."""
+    return np.where(here.log, -np.inf, here.low)
+
+
+def inside(x: Floats, here: Coordinates) -> Floats:
+    """Mirrored at the walls, so that no damper is negative."""
+    low = walls(here)
+    with np.errstate(invalid="ignore"):
+        return np.where(x < low, 2 * low - x, x)

@@ -1,0 +1,76 @@
+"""Describing each likelihood where all recordings together say that its parameters are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from bayeshaptic.inference.population.below import walled
+from bayeshaptic.inference.population.gaussian_likelihood import STEP, linearised
+from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.inference.population.path import Path
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.sampling.coordinates import Coordinates
+from bayeshaptic.types import Floats
+
+L = TypeVar("L", Hierarchy, Path)
+_ROUNDS = 8
+_BEYOND = 2.0  # posterior standard deviations that an expectation may lie outside its own draws
+_DRAWS = 400
+_SETTLED = 0.02  # move, in posterior standard deviations, that is none
+
+
+def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: Floats) -> L:
+    """A study's levels with likelihoods linearised at the expected parameters given `phi`.
+
+    Ridges of one recording are bent and far longer than what the study leaves of them: each
+    expectation is found with the model linear there, in turns (Newton's method, as in an iterated
+    extended Kalman filter), near its own draws, a standard deviation at a time at most, and every
+    second move half as far so that two points cannot take turns.
+
+    Parameters
+    ----------
+    level : Hierarchy or Path
+    posteriors : sequence of Posterior
+        Those without their measurement keep the description that they have.
+    here : Coordinates
+    phi : ndarray, shape (Q,)
+        Hyperparameters.
+    """
+    own = [here.coordinate(one.draws) for one in posteriors]
+    sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
+    walls = np.where(here.log, -np.inf, here.low)
+    low, high = np.maximum(low - _BEYOND * sd, walls), high + _BEYOND * sd
+    x = np.clip(_expected(level, phi, walls), low, high)
+    for number in range(_ROUNDS):
+        found = [
+            linearised(one, here, x[r], STEP * sd[r]) or level.likelihoods[r]
+            for r, one in enumerate(posteriors)
+        ]
+        level = replace(level, likelihoods=tuple(found))
+        move = np.clip(_expected(level, phi, walls), low, high) - x
+        far = np.max(np.abs(move) / sd, axis=1, keepdims=True)
+        if np.all(far < _SETTLED):
+            break
+        x = x + (0.5 if number % 2 else 1.0) * move / np.maximum(far, 1.0)
+    return level
+
+
+def _expected(level: Hierarchy | Path, phi: Floats, walls: Floats) -> Floats:
+    """The expected coordinates of every recording where none is below its wall, shape (R, D).
+
+    Without the walls the point would run off to where there is no device, dampers below zero, and
+    all that goes with them along a ridge would follow.
+    """
+    mean, covariance = level.expected(phi)
+    if not np.isfinite(walls).any():
+        return mean
+    rng = np.random.default_rng(0)  # the same numbers in every round, which must come to rest
+    many = [
+        walled(np.tile(m, (_DRAWS, 1)), np.tile(c, (_DRAWS, 1, 1)), walls, rng).mean(axis=0)
+        for m, c in zip(mean, covariance, strict=True)
+    ]
+    return np.stack(many)

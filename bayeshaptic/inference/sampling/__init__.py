@@ -1,0 +1,1 @@
+"""How the posterior is sampled: coordinates, proposals, ensembles."""

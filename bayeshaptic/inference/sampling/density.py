@@ -1,0 +1,68 @@
+"""The posterior density in sampling coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.sampling.coordinates import Coordinates
+from bayeshaptic.types import Floats
+
+
+@dataclass(frozen=True)
+class Density:
+    """log p(phi | data) up to a constant, for batches phi of shape (B, P)."""
+
+    likelihood: Likelihood
+    coordinates: Coordinates
+
+    def __call__(self, phi: Floats) -> Floats:
+        phi = np.atleast_2d(phi)
+        out = np.full(len(phi), -np.inf)
+        inside = self.coordinates.inside(phi)
+        inside &= np.all(np.abs(self.coordinates.own(phi)) < 600, axis=1)
+        if inside.any():
+            out[inside] = self._log_prior(phi[inside])
+            with np.errstate(all="ignore"):  # far-away proposals may overflow: they are refused
+                out[inside] += self.likelihood(self.coordinates.natural(phi[inside]))
+        return np.where(np.isfinite(out), out, -np.inf)
+
+    def _log_prior(self, phi: Floats) -> Floats:
+        theta = self.coordinates.natural(phi)
+        return self.likelihood.model.log_prior(theta) + self.coordinates.log_jacobian(phi)
+
+    def beyond_walls(self, phi: Floats) -> Floats:
+        """The density with the walls taken away: each prior there goes on as it begins.
+
+        For Laplace's approximation, whose peak may lie behind a wall.  A half-normal goes on as
+        its mirror image, a cut-off normal as the normal, a uniform one as a constant.
+        """
+        phi = np.atleast_2d(phi)
+        low = self.coordinates.low
+        walls = self.coordinates.walls
+        own = self.coordinates.own(phi)
+        behind = np.where(walls, np.minimum(own - low, 0.0), 0.0)
+        inner = phi - behind
+        wall = np.where(walls, low * self.coordinates.scale, -np.inf)
+        theta = np.maximum(self.coordinates.natural(inner), wall)
+        value = self.likelihood.model.log_prior(theta) + self.coordinates.log_jacobian(inner)
+        for index in np.flatnonzero(walls):
+            if np.any(behind[:, index] < 0):
+                slope, bend = self._prior_at_wall(int(index))
+                value += slope * behind[:, index] + 0.5 * bend * behind[:, index] ** 2
+        with np.errstate(all="ignore"):
+            value += self.likelihood(self.coordinates.natural(phi))
+        return np.where(np.isfinite(value), value, -np.inf)
+
+    def _prior_at_wall(self, index: int) -> tuple[float, float]:
+        """First and second derivative of the log prior just inside the wall of one parameter."""
+        name = self.likelihood.model.names[index]
+        prior = self.likelihood.model.prior(name)
+        scale = self.coordinates.scale[index]
+        step = 1e-3
+        points = (self.coordinates.low[index] + step * np.arange(3)) * scale
+        f = prior.log_density(points)
+        bend = float((f[2] - 2 * f[1] + f[0]) / step**2)
+        return float((f[1] - f[0]) / step - 0.5 * step * bend), bend

@@ -1,0 +1,91 @@
+"""Coordinates for parameters of which a recording says no more than that they are next to zero.
+
+The prior `NearZero` has as much probability on every scale: only a logarithm shows all of it.
+But what the data know, sums of dampers before all, are lines in the natural values, hundreds of
+times longer than they are thick, and a logarithm would bend them.  So the others are measured from
+where they follow the small one to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.inference.least_squares import Fit, weighted_residuals
+from bayeshaptic.inference.sampling.coordinates import Coordinates
+from bayeshaptic.models import NearZero, draw
+from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.types import Floats
+
+Redraw = Callable[[Floats, np.random.Generator], tuple[Floats, Floats]]
+"""From points (B, P) to proposed points, with log density of proposing the way back over there."""
+_SEEN = 5.0  # standard deviations from zero, from which a parameter is sampled as it is
+_BEGIN = 0.3  # quantile of the prior at which to begin: zero is an end
+
+
+def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
+    """`here` with logarithms for the `NearZero` parameters that `fit` does not see.
+
+    How the others follow them is the direction in which the fit suffers least.
+    """
+    priors = [fit.model.prior(name) for name in fit.model.names]
+    # At the lower bound nothing is seen, at the upper one (a misfit's) too much.
+    middle = np.array([float(prior.quantile(0.5)) for prior in priors])
+    seen = np.where(np.isnan(fit.sd), fit.theta > middle, fit.theta > _SEEN * fit.sd)
+    found = {i: p for i, p in enumerate(priors) if isinstance(p, NearZero) and not seen[i]}
+    if not found:
+        return here
+    small = list(found)
+    others = np.setdiff1d(np.arange(len(priors)), small)
+    slope = jacobian(weighted_residuals(fit.likelihood, here), here.coordinate(fit.theta)[None])[0]
+    known = slope[:, others].T @ slope[:, others] + np.eye(len(others))
+    follow = np.zeros((len(priors), len(small)))
+    follow[others] = -np.linalg.solve(known, slope[:, others].T @ slope[:, small])
+    chosen = np.isin(np.arange(len(priors)), small)
+    return replace(
+        here,
+        log=here.log | chosen,
+        scale=np.where(chosen, 1.0, here.scale),
+        low=np.where(chosen, 0.0, here.low),
+        high=np.where(chosen, np.inf, here.high),
+        walls=here.walls & ~chosen,
+        near_zero=tuple(small),
+        floor=np.array([prior.floor for prior in found.values()]),
+        follow=follow / here.scale[small],
+    )
+
+
+def start_of(here: Coordinates, fit: Fit) -> Floats:
+    """The fit in the coordinates `here`, shape (P,), small parameters inside their support."""
+    phi = here.coordinate(fit.theta)
+    for index in here.near_zero:  # the others follow
+        inner = fit.theta.copy()
+        inner[index] = float(fit.model.prior(fit.model.names[index]).quantile(_BEGIN))
+        phi[index] = max(phi[index], here.coordinate(inner)[index])
+    return phi
+
+
+def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:
+    """A proposal of small parameters from their priors, the others held where they are.
+
+    Where the data prefer a little to nothing, there is a hump beside the plateau next to zero, and
+    mixtures of a few components leave out corners of the plateau.
+    """
+    if not here.near_zero:
+        return None
+    priors = [fit.model.prior(fit.model.names[index]) for index in here.near_zero]
+
+    def log_density(phi: Floats) -> Floats:
+        theta = here.natural(phi)
+        columns = zip(here.near_zero, priors, strict=True)
+        return np.sum([p.log_density(theta[:, i]) + phi[:, i] for i, p in columns], axis=0)
+
+    def propose(phi: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        theta = np.stack([draw(prior, rng, len(phi)) for prior in priors], axis=1)
+        drawn = phi.copy()
+        drawn[:, here.near_zero] = np.log1p(theta / here.floor)
+        return drawn, log_density(phi) - log_density(drawn)
+
+    return propose

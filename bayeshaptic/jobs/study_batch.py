@@ -1,0 +1,221 @@
+"""From the recordings of a study to the report of its device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.report.reported import Reported
+
+if TYPE_CHECKING:
+    from bayeshaptic.jobs.batch import Job, Progress
+    from bayeshaptic.jobs.executors import Executor, Outcome
+    from bayeshaptic.recordings.study import Study
+    from bayeshaptic.study.analysis import StudyAnalysis
+
+_RECORDINGS = 0.8  # share of the progress that the recordings take
+_WRITING = 0.95
+
+
+def report_study(job: Job, progress: Progress | None, workers: int = 1) -> tuple[Reported, ...]:
+    """The report of every recording, then that of the device.
+
+    Parameters
+    ----------
+    job : Job
+        Whose source is a study.
+    progress : callable or None
+    workers : int
+        Processes for the recordings.
+
+    Returns
+    -------
+    tuple of Reported
+        Of the recordings in their order, and of the device where any of them could be used.
+
+    Raises
+    ------
+    InputError
+        Where the study or the settings cannot be used.
+    """
+    study = _read(job)
+    pages: dict[int, Reported] = {}
+
+    def executor(analyse: Callable[..., Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
+        names = [Path(folder).name for folder in folders_of(tasks, job.folder)]
+        work = partial(analyse_and_report, analyse, folders_of(tasks, job.folder))
+        for outcome in _executor(progress, names, workers)(work, tasks):
+            number = outcome.item.number
+            if outcome.error is None:
+                result, pages[number] = outcome.result
+                yield type(outcome)(outcome.item, result)
+            else:
+                pages[number] = Reported(names[number], error=outcome.error)
+                yield outcome
+
+    analysed = _analysed(study, job, progress, executor)
+    done = tuple(pages[number] for number in sorted(pages))
+    return (*done, *_device(analysed, job.folder, done, progress))
+
+
+def report_population(
+    job: Job, progress: Progress | None, workers: int = 1
+) -> tuple[Reported, ...]:
+    """The population part of a study alone: no reports of the recordings.
+
+    Parameters
+    ----------
+    job : Job
+        Whose source is a study.
+    progress : callable or None
+    workers : int
+        Processes for the recordings.
+
+    Returns
+    -------
+    tuple of Reported
+        Of recordings that failed, and of the device where any of them could be used.
+
+    Raises
+    ------
+    InputError
+        Where the source is no study, or the settings cannot be used.
+    """
+    if job.source.suffix.lower() != ".toml":
+        raise InputError(
+            f"{job.source}: a population needs a study (.toml) that names the recordings and "
+            "their users; for a single recording there is 'bayeshaptic report'"
+        )
+    study = _read(job)
+
+    def executor(analyse: Callable[..., Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
+        names = [Path(folder).name for folder in folders_of(tasks, job.folder)]
+        yield from _executor(progress, names, workers)(analyse, tasks)
+
+    analysed = _analysed(study, job, progress, executor)
+    failed = tuple(Reported(one.name, error=one.error) for one in analysed.failed)
+    return (*failed, *_device(analysed, job.folder, None, progress))
+
+
+def analyse_and_report(
+    analyse: Callable[..., Any], folders: Sequence[Path], task: Any, part: Progress | None = None
+) -> tuple[Any, Reported]:
+    """Analyse one recording and write its report: in whatever process this runs.
+
+    Parameters
+    ----------
+    analyse : callable
+        From a task to its analysis.
+    folders : sequence of Path
+        Of the reports, by the number of the task.
+    task : Task
+    part : callable, optional
+        Progress of this recording.
+    """
+    from bayeshaptic.jobs.batch import reported
+
+    folder = folders[task.number]
+    result = analyse(task, part)
+    return result, reported(folder.name, result, folder)
+
+
+def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:
+    """A folder for each recording, numbered where two have the same name."""
+    from bayeshaptic.recordings.read import recording_name
+
+    names = [recording_name(task.entry.path) for task in tasks]
+    return tuple(
+        parent / (name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}")
+        for index, name in enumerate(names)
+    )
+
+
+def _read(job: Job) -> Study:
+    from bayeshaptic.jobs.batch import refuse_file
+    from bayeshaptic.recordings.study import read_study
+
+    refuse_file(job.folder)
+    for option in ("columns", "period_s", "encoder_resolution"):
+        if getattr(job.settings, option) is not None:
+            raise InputError(
+                f"--{option.replace('_', '-')} is for a single recording; for a study write it in "
+                f"{job.source}, in the table [device]"
+            )
+    return read_study(job.source)
+
+
+def _analysed(
+    study: Study, job: Job, progress: Progress | None, executor: Executor
+) -> StudyAnalysis:
+    from bayeshaptic.devices import load_device
+    from bayeshaptic.study.analysis import analyse_study
+
+    settings = job.settings
+    return analyse_study(
+        study,
+        settings.model,
+        close_loop=settings.close_loop,
+        device=None if settings.device is None else load_device(settings.device),
+        delay_s=settings.delay_s,
+        delay_sd_s=settings.delay_sd_s,
+        band_hz=settings.band_hz,
+        seed=settings.seed,
+        progress=None if progress is None else _scaled(progress, _WRITING),
+        executor=executor,
+    )
+
+
+def _device(
+    study: StudyAnalysis,
+    folder: Path,
+    done: Sequence[Reported] | None,
+    progress: Progress | None,
+) -> tuple[Reported, ...]:
+    """The page of the device, shorter without reports; none where no recording could be used."""
+    from bayeshaptic.report.study.headline import study_headline
+    from bayeshaptic.report.study.write import write_study_report
+
+    if study.limit is None:
+        return ()
+    if progress is not None:
+        progress(_WRITING, f"{study.name}: writing the report")
+    pages = {one.name: one.page for one in done or () if one.page is not None}
+    page = write_study_report(study, folder, pages, walls=done is not None)
+    warnings = tuple(
+        n.text for n in study.notices if n.level == "warning" and n.topic != "recordings"
+    )
+    return (Reported(study.name, page, study_headline(study), warnings=warnings),)
+
+
+def _executor(progress: Progress | None, names: Sequence[str], workers: int) -> Executor:
+    """Processes, or one recording after the other with the progress of each."""
+    from bayeshaptic.jobs import executors
+
+    if workers > 1 and len(names) > 1:
+        return executors.processes(workers)
+
+    def run(job: Callable[..., Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
+        for task in tasks:
+            part = _part(progress, task.number, len(tasks), names[task.number])
+            yield from executors.serial(partial(_with_progress, job, part), [task])
+
+    return run
+
+
+def _with_progress(job: Callable[..., Any], part: Progress | None, task: Any) -> Any:
+    return job(task, part)
+
+
+def _part(progress: Progress | None, index: int, count: int, name: str) -> Progress | None:
+    """The progress of one recording as that of the whole study."""
+    if progress is None:
+        return None
+    whole = _scaled(progress, _WRITING * _RECORDINGS)
+    return lambda share, word: whole((index + share) / count, f"{name}: {word}")
+
+
+def _scaled(progress: Progress, most: float) -> Progress:
+    return lambda share, word: progress(most * share, word)

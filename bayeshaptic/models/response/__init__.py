@@ -1,0 +1,1 @@
+"""From masses and links to the sampled response and the motion."""

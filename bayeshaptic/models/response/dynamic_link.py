@@ -1,0 +1,41 @@
+"""Linear forces between masses that no spring and damper make: delayed, hysteretic, relaxing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.types import Complexes, Floats
+
+Index = slice | NDArray[np.bool_] | NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class DynamicLink:
+    """A force between two masses, or a mass and the ground (None), by its dynamic stiffness.
+
+    Attributes
+    ----------
+    first, second : int, int or None
+    law : callable
+        ``law(s, *values)``: force over stretch at points `s`, which broadcast with the values
+        (their axis last).  It must be analytic to the right of the imaginary axis, real on the
+        positive real axis, and grow more slowly than s^2.
+    values : tuple of ndarray, each of shape (B,)
+    """
+
+    first: int
+    second: int | None
+    law: Callable[..., Complexes]
+    values: tuple[Floats, ...]
+
+    def stiffness(self, s: Complexes) -> Complexes:
+        """Force over stretch, shape (..., B)."""
+        return self.law(s, *self.values)
+
+    def rows(self, index: Index) -> DynamicLink:
+        """A part of the batch."""
+        return replace(self, values=tuple(value[index] for value in self.values))

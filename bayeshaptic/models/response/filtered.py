@@ -1,0 +1,108 @@
+r"""Sampled response behind filters that are too fast for the series over aliases.
+
+By partial fractions at the filters' poles q_j, with mechanism N/D and filters M/F,
+
+.. math:: \frac{N M}{D F} = \sum_j \frac{c_j}{s - q_j} + \frac{R}{D}, \qquad
+          c_j = \frac{N(q_j) M(q_j)}{D(q_j) F'(q_j)}, \qquad R = \frac{N M - D C}{F},
+
+C the numerator of the sum over j.  The poles have the closed form, and R/D has no poles but the
+mechanism's.  The division for R begins at the lowest power, where F is 1 + small terms.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.models.response.sampled import from_poles, from_polynomials
+from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
+from bayeshaptic.types import Complexes, Floats
+
+if TYPE_CHECKING:
+    from bayeshaptic.models.response.system import LinearSystem
+
+
+_APART = 1e-4  # poles of one filter nearer to each other than this, relatively, are moved apart
+_FAST = 1.0  # |q| T
+
+
+def behind_fast_filters(
+    system: LinearSystem, frequency_hz: Floats, period_s: float
+) -> tuple[Complexes, NDArray[np.bool_]]:
+    """Sampled response of a system whose filters have poles of their own, beside its mechanism's.
+
+    Returns
+    -------
+    response : ndarray of complex, shape (B, L)
+    good : ndarray of bool, shape (B,)
+        False where the mechanism itself is too fast.
+    """
+    numerator, denominator = system.mechanism.transfer()
+    bottom = np.ones((1, system.batch))
+    for factor in system.filters:
+        numerator = multiply(numerator, factor.numerator)
+        bottom = multiply(bottom, factor.denominator)
+    poles = np.concatenate([_simple_roots(factor.denominator) for factor in system.filters])
+    gaps = poles[:, None] - poles[None, :]
+    gaps[np.arange(len(poles)), np.arange(len(poles))] = 1.0
+    slope = bottom[-1] * gaps.prod(axis=1)
+    residues = evaluate(numerator, poles) / (evaluate(denominator, poles) * slope)
+    rest = _divided(
+        _difference(numerator, multiply(denominator, _sum(poles, residues, bottom[-1]))), bottom
+    )
+    rest = rest[: len(denominator) - 1]
+    response, good = from_polynomials(rest, denominator, system.delay_s, frequency_hz, period_s)
+    response += from_poles(poles.T, residues.T, system.delay_s, frequency_hz, period_s)
+    return response, good
+
+
+def fast_filters(system: LinearSystem, period_s: float) -> NDArray[np.bool_]:
+    """Where a filter is faster than the series over aliases bears, shape (B,)."""
+    found = np.zeros(system.batch, bool)
+    for factor in system.filters:
+        found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > _FAST
+    return found
+
+
+def _simple_roots(polynomial: Polynomial) -> Complexes:
+    """Its roots, moved apart about their mean where two coincide, shape (degree, B)."""
+    found = roots(polynomial).T
+    for j in range(1, len(found)):
+        mean = 0.5 * (found[j] + found[j - 1])
+        near = np.abs(found[j] - found[j - 1]) < _APART * np.abs(mean)
+        found[j - 1] = np.where(near, mean * (1 - _APART / 2), found[j - 1])
+        found[j] = np.where(near, mean * (1 + _APART / 2), found[j])
+    return found
+
+
+def _sum(poles: Complexes, residues: Complexes, lead: Floats) -> Polynomial:
+    """Numerator of the sum of the partial fractions over a denominator with this leading factor."""
+    total = np.zeros((len(poles), poles.shape[1]), complex)
+    for j in range(len(poles)):
+        term = (residues[j] * lead)[None]
+        for i in range(len(poles)):
+            if i != j:
+                longer = np.zeros((len(term) + 1, term.shape[1]), complex)
+                longer[1:] += term
+                longer[:-1] -= poles[i] * term
+                term = longer
+        total += term
+    return np.asarray(total.real)
+
+
+def _difference(a: Polynomial, b: Polynomial) -> Polynomial:
+    out = np.zeros((max(len(a), len(b)), b.shape[1]))
+    out[: len(a)] += a
+    out[: len(b)] -= b
+    return out
+
+
+def _divided(dividend: Polynomial, divisor: Polynomial) -> Polynomial:
+    """The power series of a quotient, as many terms as the dividend has."""
+    quotient = np.zeros_like(dividend)
+    for k in range(len(dividend)):
+        known = sum(divisor[j] * quotient[k - j] for j in range(1, min(k, len(divisor) - 1) + 1))
+        quotient[k] = (dividend[k] - known) / divisor[0]
+    return quotient

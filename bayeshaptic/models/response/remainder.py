@@ -1,0 +1,193 @@
+r"""What dynamic links add to a response that is otherwise rational.
+
+With A(s) the dynamic stiffness matrix of the mechanism alone, a link of dynamic stiffness
+lambda(s) between two masses is an update of rank one, and by Sherman and Morrison
+
+.. math:: \Delta P = - \frac{\lambda h_{0e}^2}{1 + \lambda h_{ee}},
+
+h the compliances of A between the drive and the link's own pair of masses, which are ratios of
+polynomials.  Several links are added one after the other.
+
+`Delta P` falls off so quickly (s^-4 or faster) that its aliases, in
+
+.. math:: \Delta G = \frac{1 - e^{-sT}}{T} \sum_k e^{-s_k t_d} \frac{\Delta P(s_k)}{s_k},
+          \qquad s_k = s + j \frac{2 \pi k}{T},
+
+can be summed term by term, and so smoothly where no pole is near the Nyquist frequency that the sum
+without k = 0 is a short Chebyshev series in the frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
+from bayeshaptic.models.response.sampled import fastest_pole, laurent, nodes_at
+from bayeshaptic.numerics.polynomial import Polynomial, evaluate
+
+if TYPE_CHECKING:
+    from bayeshaptic.models.response.system import Filter, LinearSystem
+
+Floats = NDArray[Any]
+Complexes = NDArray[Any]
+
+_ALIASES = 8  # on either side
+_TERMS = 16  # of the Chebyshev series
+_REACH = 5.2  # |p_max| T + theta up to which it converges to 1e-8 of itself
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """The response of a system minus that of its rational part, both without delay and hold.
+
+    Attributes
+    ----------
+    links : tuple of DynamicLink
+    compliances : mapping of (int, int) to ndarray
+        Numerators of the compliances between the drive (number 0) and the links' pairs of masses
+        (from 1 on), the smaller number first.
+    denominator : ndarray, shape (degree + 1, B)
+        Of all of them.
+    filters : tuple of Filter
+    """
+
+    links: tuple[DynamicLink, ...]
+    compliances: Mapping[tuple[int, int], Polynomial]
+    denominator: Polynomial
+    filters: tuple[Filter, ...]
+
+    def rows(self, index: Index) -> Remainder:
+        """A part of the batch."""
+        return Remainder(
+            tuple(link.rows(index) for link in self.links),
+            {pair: numerator[:, index] for pair, numerator in self.compliances.items()},
+            self.denominator[:, index],
+            tuple(factor.rows(index) for factor in self.filters),
+        )
+
+    def at(
+        self, s: Complexes, polynomial: Callable[[Polynomial], Complexes] | None = None
+    ) -> Complexes:
+        """Values at points `s` of shape (..., 1) or (..., B); shape (..., B).
+
+        `polynomial`, where given, evaluates polynomials at `s` faster than Horner's rule.
+        """
+        value = polynomial or (lambda coefficients: evaluate(coefficients, s))
+        total, _ = self._add_links(s, value)
+        for factor in self.filters:
+            total *= value(factor.numerator) / value(factor.denominator)
+        return total
+
+    def return_difference(self, s: Complexes) -> Complexes:
+        """Characteristic function with the links over that without, at points as in `at`."""
+        return self._add_links(s, lambda coefficients: evaluate(coefficients, s))[1]
+
+    def _add_links(
+        self, s: Complexes, value: Callable[[Polynomial], Complexes]
+    ) -> tuple[Complexes, Complexes]:
+        inverse: Complexes = 1 / value(self.denominator)
+        h: dict[tuple[int, int], Complexes] = {
+            pair: value(numerator) * inverse for pair, numerator in self.compliances.items()
+        }
+        total: Complexes = np.zeros_like(inverse)
+        difference: Complexes = np.ones_like(inverse)
+        for number, link in enumerate(self.links, start=1):
+            stiffness = link.stiffness(s)
+            pivot = 1 + stiffness * h[number, number]
+            difference *= pivot
+            gain = stiffness / pivot
+            total -= gain * h[0, number] ** 2
+            for i, j in h:
+                if j > number and (i == 0 or i > number):
+                    first = h[min(i, number), max(i, number)]
+                    h[i, j] = h[i, j] - gain * first * h[number, j]
+        return total, difference
+
+
+def remainder_of(system: LinearSystem) -> Remainder:
+    """What the dynamic links of `system` add to its rational part."""
+    mechanism = system.mechanism
+    pairs = [mechanism.drive, *((link.first, link.second) for link in system.dynamic_links)]
+    compliances = {
+        (i, j): mechanism.mutual(pairs[i], pairs[j])
+        for j in range(1, len(pairs))
+        for i in range(j + 1)
+    }
+    denominator = mechanism.transfer()[1]
+    return Remainder(system.dynamic_links, compliances, denominator, system.filters)
+
+
+@dataclass(frozen=True)
+class Aliases:
+    """The sum over k != 0 of e^{-j 2 pi k td / T} Delta P(s_k) / s_k, for 0 <= w T <= top.
+
+    Attributes
+    ----------
+    coefficients : ndarray of complex, shape (_TERMS, B)
+        Chebyshev series in the angle w T.
+    top : float
+    """
+
+    coefficients: Complexes
+    top: float
+
+    def at(self, theta: Floats, index: Index) -> Complexes:
+        """Values at angles of shape (..., B') for the part `index` of the batch."""
+        x = 2 * theta / self.top - 1
+        return np.asarray(chebyshev.chebval(x, self.coefficients[:, index], tensor=False))
+
+
+def aliases(remainder: Remainder, top: float, delay_s: Floats, period_s: float) -> Aliases:
+    """The sum as a Chebyshev series; only where `smooth_aliases` says so."""
+    x, inverse = _chebyshev_nodes()
+    sums = alias_sums(remainder, (x + 1) * top / 2, delay_s, period_s)
+    return Aliases(inverse @ sums, top)
+
+
+def smooth_aliases(fastest: Floats, top: float) -> NDArray[np.bool_]:
+    """Where they are so up to the angle `top`, for mechanisms with |p T| <= `fastest`."""
+    return fastest + top < _REACH
+
+
+def alias_sums(remainder: Remainder, theta: Floats, delay_s: Floats, period_s: float) -> Complexes:
+    """The same sum, term by term, at angles of shape (L,) or (..., B); shape (L, B) or (..., B)."""
+    shared = theta.ndim == 1
+    total: Complexes | float = 0.0
+    for k in (*range(-_ALIASES, 0), *range(1, _ALIASES + 1)):
+        omega = (theta + 2 * np.pi * k) / period_s
+        table = nodes_at(omega / (2 * np.pi), period_s).polynomial if shared else None
+        s = 1j * (omega[:, None] if shared else omega)
+        total = total + np.exp(-2j * np.pi * k * delay_s / period_s) * remainder.at(s, table) / s
+    return np.asarray(total)
+
+
+@cache
+def _chebyshev_nodes() -> tuple[Floats, Floats]:
+    """Nodes in [-1, 1], and the matrix from values there to coefficients."""
+    x = chebyshev.chebpts1(_TERMS)
+    return x, np.linalg.inv(chebyshev.chebvander(x, _TERMS - 1))
+
+
+def sampled_remainder(system: LinearSystem, frequency_hz: Floats, period_s: float) -> Complexes:
+    """Delta G at frequencies of shape (L,), with hold and delay; shape (B, L)."""
+    remainder = remainder_of(system)
+    nodes = nodes_at(frequency_hz, period_s)
+    theta = nodes.s.imag * period_s
+    s = nodes.s[:, None]
+    total = remainder.at(s, nodes.polynomial) / s
+    top = float(np.max(theta))
+    fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
+    if len(theta) > _TERMS and np.all(smooth_aliases(fastest, top)):
+        series = aliases(remainder, top, system.delay_s, period_s)
+        total = total + chebyshev.chebvander(2 * theta / top - 1, _TERMS - 1) @ series.coefficients
+    else:
+        total = total + alias_sums(remainder, theta, system.delay_s, period_s)
+    hold = nodes.hold[:, None] / period_s
+    return np.asarray((hold * np.exp(-s * system.delay_s) * total).T)

@@ -1,0 +1,72 @@
+"""Determinants of networks of masses, springs and dampers, without a single subtraction.
+
+The dynamic stiffness matrix of masses joined by springs is a grounded Laplacian: its determinant is
+the sum over all spanning trees of the product of their edges (Kirchhoff's matrix-tree theorem),
+where a mass is an edge m s^2 to the ground.  All coefficients are sums of positive products, so
+they are right to the last digits, and a zero (the rigid-body pole of a device that nobody holds)
+is an exact zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+
+from bayeshaptic.numerics.polynomial import Polynomial, add, multiply
+
+GROUND = -1
+Pair = tuple[int, int]
+Edges = Mapping[Pair, Polynomial]
+"""Two nodes, the smaller first, to the dynamic stiffness between them."""
+
+
+def with_edge(edges: Edges, first: int, second: int, stiffness: Polynomial) -> Edges:
+    """`edges` and one more, beside what joins the two nodes already."""
+    pair = (min(first, second), max(first, second))
+    known = edges.get(pair)
+    return {**edges, pair: stiffness if known is None else add(known, stiffness)}
+
+
+def merged(edges: Edges, nodes: tuple[int, ...]) -> Edges:
+    """The network with some nodes made one, which goes by the name of the smallest of them."""
+    keep = min(nodes)
+    out: Edges = {}
+    for (i, j), stiffness in edges.items():
+        i, j = keep if i in nodes else i, keep if j in nodes else j
+        if i != j:
+            out = with_edge(out, i, j, stiffness)
+    return out
+
+
+def spanning_trees(edges: Edges) -> Polynomial:
+    """The sum over all spanning trees of the products of their edges.
+
+    Node by node, that with the fewest neighbours first: the trees in which it has exactly certain
+    neighbours are those of the rest with these neighbours made one.
+    """
+    neighbours: dict[int, list[int]] = {}
+    for i, j in edges:
+        neighbours.setdefault(i, []).append(j)
+        neighbours.setdefault(j, []).append(i)
+    inner = [node for node in neighbours if node != GROUND]
+    if not inner:
+        return np.ones((1, 1))
+    node = min(inner, key=lambda n: len(neighbours[n]))
+    own = {other: edges[min(node, other), max(node, other)] for other in neighbours[node]}
+    rest = {pair: stiffness for pair, stiffness in edges.items() if node not in pair}
+    total: Polynomial | None = None
+    for size in range(2, len(own) + 1):
+        for chosen in combinations(own, size):
+            term = spanning_trees(merged(rest, chosen))
+            for other in chosen:
+                term = multiply(term, own[other])
+            total = term if total is None else add(total, term)
+    single = spanning_trees(rest)
+    for_one = None
+    for stiffness in own.values():
+        for_one = stiffness if for_one is None else add(for_one, stiffness)
+    assert for_one is not None
+    term = multiply(for_one, single)
+    return term if total is None else add(total, term)

@@ -1,0 +1,97 @@
+"""Least squares from many starts at once: damped Gauss-Newton steps on a batch, within bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bayeshaptic.types import Floats
+
+Residuals = Callable[[Floats], Floats]
+_STEP = 1e-6
+
+
+def jacobian(residuals: Residuals, phi: Floats, at: Floats | None = None) -> Floats:
+    """Forward differences: from (B, P) to (B, N, P), in one call for the whole batch."""
+    count, size = phi.shape
+    at = residuals(phi) if at is None else at
+    moved = np.repeat(phi, size, axis=0)
+    moved[np.arange(count * size), np.tile(np.arange(size), count)] += _STEP
+    shifted = residuals(moved).reshape(count, size, -1)
+    return np.transpose((shifted - at[:, None, :]) / _STEP, (0, 2, 1))
+
+
+def minimise(
+    residuals: Residuals, start: Floats, low: Floats, high: Floats, steps: int, tolerance: float
+) -> tuple[Floats, Floats]:
+    """Minimise the sum of squares from every start.
+
+    Levenberg's damping, raised where a step does not help and lowered where it does.  A parameter
+    on a bound that the gradient pushes outwards is left there for the step.
+
+    Parameters
+    ----------
+    residuals : callable
+        From (B, P) to (B, N).
+    start : ndarray, shape (B, P)
+    low, high : ndarray, shape (P,)
+    steps : int
+        At most so many.
+    tolerance : float
+        A start rests when it gains less than this in half its sum of squares.
+
+    Returns
+    -------
+    phi : ndarray, shape (B, P)
+    cost : ndarray, shape (B,)
+        Half the sum of squares.
+    """
+    phi = np.clip(start, low, high)
+    value = residuals(phi)
+    cost = _half_square(value)
+    damping = np.full(len(phi), 1e-2)
+    open_ = np.arange(len(phi))  # starts that still move
+    for _ in range(steps):
+        here, there = phi[open_], value[open_]
+        slope = jacobian(residuals, here, there)
+        step = _damped_step(slope, there, damping[open_], here, low, high)
+        trial = np.clip(here + step, low, high)
+        trial_value = residuals(trial)
+        gain = cost[open_] - _half_square(_finite(trial_value))
+        better = gain > 0
+        won = open_[better]
+        phi[won], value[won] = trial[better], trial_value[better]
+        cost[won] -= gain[better]
+        damping[open_] *= np.where(better, 0.2, 8.0)
+        settled = np.where(better, gain < tolerance, damping[open_] > 1e6)
+        open_ = open_[~settled]
+        if not len(open_):
+            break
+    return phi, cost
+
+
+def _finite(value: Floats) -> Floats:
+    """A step into the impossible counts as an infinitely bad one."""
+    return np.where(np.isfinite(value), value, 1e150)
+
+
+def _half_square(value: Floats) -> Floats:
+    return 0.5 * np.einsum("bn,bn->b", value, value)
+
+
+def _damped_step(
+    slope: Floats, value: Floats, damping: Floats, phi: Floats, low: Floats, high: Floats
+) -> Floats:
+    size = slope.shape[2]
+    normal = slope.transpose(0, 2, 1) @ slope
+    gradient = np.einsum("bnp,bn->bp", slope, value)
+    held = ((phi <= low) & (gradient > 0)) | ((phi >= high) & (gradient < 0))
+    diagonal = np.einsum("bpp->bp", normal) + 1e-12
+    normal[:, np.arange(size), np.arange(size)] = diagonal * (1 + damping[:, None])
+    normal = np.where(held[:, :, None] | held[:, None, :], 0.0, normal)
+    normal[:, np.arange(size), np.arange(size)] += np.where(held, 1.0, 1e-300)
+    gradient = np.where(held, 0.0, gradient)
+    step = np.linalg.solve(normal, -gradient[:, :, None])[:, :, 0]
+    # Logarithmic coordinates: no more than a factor e a step.
+    return np.clip(step, -1.0, 1.0)

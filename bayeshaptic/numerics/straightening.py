@@ -1,0 +1,100 @@
+"""Straightening a curved posterior: coordinates in which its ridges are lines.
+
+Along a ridge that the data hardly decide (the hand's mass against its spring, say) the other
+parameters follow along a curve, often a hundred times longer than it is thick.  In principal
+components v, the wide ones first, each component is freed from a polynomial of the second degree in
+those before it,
+
+    y_k = v_k - q_k(v_1 .. v_{k-1}),
+
+which keeps volumes as they are, so that densities carry over without a Jacobian.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.types import Floats
+
+_RIDGE = 1e-3
+_POINTS_A_TERM = 30  # fewer points than that cannot decide a coefficient
+
+
+@dataclass(frozen=True)
+class Straightening:
+    """A map between points x and straight coordinates y, both of shape (B, P).
+
+    Attributes
+    ----------
+    mean : ndarray, shape (P,)
+    whiten, colour : ndarray, shape (P, P)
+        v = (x - mean) @ whiten, and back.
+    constant : ndarray, shape (P,)
+    linear : ndarray, shape (P, P)
+    quadratic : ndarray, shape (P, P, P)
+        q_k = constant_k + linear_k v + v quadratic_k v; only entries below k differ from zero.
+    """
+
+    mean: Floats
+    whiten: Floats
+    colour: Floats
+    constant: Floats
+    linear: Floats
+    quadratic: Floats
+
+    def straight(self, x: Floats) -> Floats:
+        """Straight coordinates of `x`."""
+        v = (x - self.mean) @ self.whiten
+        y = v - self.constant - v @ self.linear.T
+        for k, matrix in enumerate(self.quadratic):
+            below = v[:, :k]
+            y[:, k] -= np.sum((below @ matrix[:k, :k]) * below, axis=1)
+        return y
+
+    def bent(self, y: Floats) -> Floats:
+        """The points whose straight coordinates are `y`."""
+        v = y + self.constant
+        with np.errstate(over="ignore", invalid="ignore"):  # far out there is nothing to find
+            for k, matrix in enumerate(self.quadratic):
+                below = v[:, :k]
+                v[:, k] += below @ self.linear[k, :k]
+                v[:, k] += np.sum((below @ matrix[:k, :k]) * below, axis=1)
+            return v @ self.colour + self.mean
+
+
+def nothing_to_straighten(size: int) -> Straightening:
+    """The identity for `size` parameters."""
+    eye = np.eye(size)
+    none = np.zeros((size, size, size))
+    return Straightening(np.zeros(size), eye, eye, none[0, 0], none[0], none)
+
+
+def straighten(x: Floats) -> Straightening:
+    """Fit the map to draws `x` of shape (B, P), by regression."""
+    mean, sd = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-300)
+    values, vectors = np.linalg.eigh(np.cov(((x - mean) / sd).T))
+    order = np.argsort(-values)
+    width = np.sqrt(np.maximum(values[order], 1e-12 * values.max()))
+    whiten = vectors[:, order] / sd[:, None] / width
+    colour = (vectors[:, order] * width).T * sd
+    v = (x - mean) @ whiten
+    size = x.shape[1]
+    constant, linear = np.zeros(size), np.zeros((size, size))
+    quadratic = np.zeros((size, size, size))
+    for k in range(1, size):
+        # Principal components are uncorrelated, but not with each other's squares where skewed.
+        first, second = np.triu_indices(_how_many(k, len(x)))
+        terms = np.column_stack([np.ones(len(v)), v[:, :k], v[:, first] * v[:, second]])
+        normal = terms.T @ terms + _RIDGE * len(v) * np.eye(terms.shape[1])
+        found = np.linalg.solve(normal, terms.T @ v[:, k])
+        constant[k], linear[k, :k] = found[0], found[1 : k + 1]
+        quadratic[k, first, second] = found[k + 1 :]
+    return Straightening(mean, whiten, colour, constant, linear, quadratic)
+
+
+def _how_many(before: int, points: int) -> int:
+    """Of the components before this one, how many the points can decide products of."""
+    affordable = points / _POINTS_A_TERM
+    return min(before, int((np.sqrt(1 + 8 * affordable) - 1) / 2))

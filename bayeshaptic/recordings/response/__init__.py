@@ -1,0 +1,1 @@
+"""The measured frequency response: estimates, their spectra, and the windows of the likelihood."""

@@ -1,0 +1,112 @@
+"""The band to use: where the force has power and the response stands out of the noise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.response.spectra import RandomSpectra
+
+# A force that fell by more within an octave was cut off there: 13 dB is more than what a
+# second-order filter does, less than a third-order one.
+CUT_OFF = 20.0
+# Power, relative to the strongest or the mean, below which there is nothing but rounding.
+NO_POWER = 1e-10
+
+
+def choose_band(spectra: RandomSpectra, name: str) -> tuple[float, float]:
+    """Choose the band from the data.
+
+    Parameters
+    ----------
+    spectra : RandomSpectra
+        Of the widest band there is.
+    name : str
+        What to call the recording.
+
+    Returns
+    -------
+    (low, high)
+        Hz.
+
+    Raises
+    ------
+    InputError
+        When the position follows the force nowhere.
+    """
+    windows, power = spectra.windows(), spectra.force_power
+    low, high = driven_range(windows.frequency_hz[:, 1], power)
+    # Share of the power explained, against what three columns explain of noise.
+    n = windows.lines
+    explained = np.sum(np.abs(windows.target) ** 2, axis=1)
+    share = explained / (explained + windows.scatter)
+    excess = (share - 3 / n) / np.sqrt(3 * (n - 3) / (n**2 * (n + 1)))
+    last = responds_until(excess[low : high + 1])
+    if last is None:
+        raise InputError(
+            f"{name}: the position does not follow the force at any frequency; check which column "
+            "is which, or record with more force"
+        )
+    high = low + last
+    # The last window may reach beyond the end of the force's power.
+    lines = slice(spectra.edges[low], spectra.edges[high + 1])
+    driven = np.abs(spectra.force[lines]) ** 2 > power[max(high - 1, low)] / CUT_OFF
+    frequency = spectra.frequency_hz[lines]
+    return float(frequency[0]), float(frequency[np.flatnonzero(driven)[-1]])
+
+
+def driven_range(frequency_hz: NDArray[Any], power: NDArray[Any]) -> tuple[int, int]:
+    """First and last window of the range around the strongest where the force has power.
+
+    The range ends where the power falls by more than 13 dB in an octave, at either side: a steeper
+    slope than that of coloured noise that is meant to be there.
+
+    Parameters
+    ----------
+    frequency_hz, power : ndarray, shape (W,)
+        Centres of windows and mean power of the force in them.
+    """
+    # A running median keeps edges where they are, and evens out the noise of single windows.
+    power = np.median(sliding_window_view(np.pad(power, 2, mode="edge"), 5), axis=1)
+    floor = NO_POWER * power.max()
+    log_power, log_frequency = np.log(np.maximum(power, floor)), np.log(frequency_hz)
+    octave = np.log(2)
+    below = np.interp(log_frequency - octave, log_frequency, log_power)
+    above = np.interp(log_frequency + octave, log_frequency, log_power)
+    peak, window = int(np.argmax(power)), np.arange(len(power))
+    cut_high = (below - log_power > np.log(CUT_OFF)) | (power <= floor)
+    cut_low = (above - log_power > np.log(CUT_OFF)) | (power <= floor)
+    low = int(np.max(window[cut_low & (window < peak)], initial=-1)) + 1
+    high = int(np.min(window[cut_high & (window > peak)], initial=len(power))) - 1
+    return low, high
+
+
+def responds_until(excess: NDArray[Any], reach: int = 4) -> int | None:
+    """The last window in which the response stands out of the noise.
+
+    Only the upper end is judged: at the lower end, where a hand wanders, even a faint answer is
+    all that is known about the hand, and the likelihood weighs it rightly.
+
+    Parameters
+    ----------
+    excess : ndarray, shape (W,)
+        How far the response stands out, in standard deviations of what noise alone gives.
+    reach : int
+        Neighbours on each side that are judged together, so that an antiresonance or one noisy
+        window does not end the range.
+
+    Returns
+    -------
+    int or None
+        None where nothing stands out by four standard deviations.
+    """
+    reach = min(reach, (len(excess) - 1) // 2)
+    kernel = np.ones(2 * reach + 1)
+    total = np.convolve(excess, kernel, mode="same")
+    count = np.convolve(np.ones_like(excess), kernel, mode="same")
+    found = np.flatnonzero(total / np.sqrt(count) > 4)
+    return int(found[-1]) if len(found) else None

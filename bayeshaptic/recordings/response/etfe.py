@@ -1,0 +1,177 @@
+"""The ETFE: the empirical transfer function estimate of a recording, with an honest variance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.periodic_excitation import estimate_periodic
+from bayeshaptic.recordings.response.random_excitation import estimate_random
+from bayeshaptic.recordings.response.spectra import (
+    PeriodicSpectra,
+    RandomSpectra,
+    Spectra,
+    TableSpectra,
+)
+from bayeshaptic.threads import single_threaded
+
+__all__ = ["Etfe", "PeriodicSpectra", "RandomSpectra", "TableSpectra", "estimate_etfe"]
+
+
+@dataclass(frozen=True)
+class Etfe:
+    """The measured frequency response from commanded force to position.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (L,)
+        What a person sees: one point a window (random excitation), an excited line (periodic
+        excitation) or a row (table).
+    value : complex ndarray, shape (L,)
+        Estimated response, position unit over force unit.
+    variance : ndarray, shape (L,)
+        E|estimate - truth|^2; the real and the imaginary part have half of it each. Where it is
+        estimated, the error over its root has unit variance.
+    coherence : ndarray, shape (L,)
+        Share of the position's power that the force explains, 0..1; nan where it makes no sense.
+    period_s : float
+        Sampling period in seconds.
+    band_hz : (float, float)
+        Lowest and highest frequency used.
+    force_unit, position_unit : str
+    spectra : RandomSpectra or PeriodicSpectra or TableSpectra
+        What `compress` needs: the windows can be built from it with any reference.
+    recording : Recording or None
+        None for a table.
+    period_lines : int or None
+        Number of excited lines; None when the excitation is not periodic.
+    notices : tuple of Notice
+    """
+
+    frequency_hz: NDArray[Any]
+    value: NDArray[Any]
+    variance: NDArray[Any]
+    coherence: NDArray[Any]
+    period_s: float
+    band_hz: tuple[float, float]
+    force_unit: str
+    position_unit: str
+    spectra: Spectra = field(repr=False)
+    recording: Recording | None = field(default=None, repr=False)
+    period_lines: int | None = None
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def lines(self) -> int:
+        """Number of DFT lines (or rows of a table) behind the estimate."""
+        return self.spectra.lines
+
+    @property
+    def relative_sd(self) -> NDArray[Any]:
+        """Standard deviation over the magnitude of the estimate, shape (L,)."""
+        return np.sqrt(self.variance) / np.abs(self.value)
+
+    @property
+    def kind(self) -> str:
+        """ "translational" or "rotational", by the unit of the position."""
+        return "rotational" if self.position_unit == "rad" else "translational"
+
+    @property
+    def stiffness_unit(self) -> str:
+        return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
+
+    @property
+    def gain_db(self) -> NDArray[Any]:
+        """20 log10 of the magnitude, dB re position unit over force unit, shape (L,)."""
+        return 20 * np.log10(np.abs(self.value))
+
+    @property
+    def phase_deg(self) -> NDArray[Any]:
+        """Unwrapped phase in degrees, shape (L,)."""
+        return np.degrees(np.unwrap(np.angle(self.value)))
+
+
+@single_threaded
+def estimate_etfe(
+    recording: Recording,
+    band_hz: tuple[float, float] | None = None,
+    *,
+    minimum_lines: int | None = None,
+) -> Etfe:
+    """Estimate the response from commanded force to position, with its variance.
+
+    Parameters
+    ----------
+    recording : Recording
+    band_hz : (low, high), optional
+        Frequencies to use, Hz. By default chosen from the data: where the force has power and
+        the response stands out of the noise.
+    minimum_lines : int, optional
+        DFT lines in the narrowest window of a random excitation, at least 10. By default 24, and 12
+        where the recording is shorter than 10 s.
+
+    Returns
+    -------
+    Etfe
+        With one point a window (random excitation) or an excited line (periodic).
+
+    Raises
+    ------
+    InputError
+        When the recording is too short, the force has no power, or the band makes no sense.
+    """
+    _check(recording, band_hz)
+    if minimum_lines is not None and minimum_lines < 10:
+        raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
+    found = estimate_periodic(recording, band_hz)
+    spectra: PeriodicSpectra | RandomSpectra
+    if found is not None:
+        spectra, points, notices = found
+    else:
+        spectra, points, notices = estimate_random(recording, band_hz, minimum_lines)
+    return Etfe(
+        frequency_hz=points.frequency_hz,
+        value=points.value,
+        variance=points.variance,
+        coherence=points.coherence,
+        period_s=recording.period_s,
+        band_hz=(float(spectra.frequency_hz[0]), float(spectra.frequency_hz[-1])),
+        force_unit=recording.force_unit,
+        position_unit=recording.position_unit,
+        spectra=spectra,
+        recording=recording,
+        period_lines=spectra.lines if found is not None else None,
+        notices=notices,
+    )
+
+
+def _check(recording: Recording, band_hz: tuple[float, float] | None) -> None:
+    """What no estimate can be made from."""
+    for name, values in (("force", recording.force), ("position", recording.position)):
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"{recording.name}: {name} is {values[bad[0]]} in sample {bad[0] + 1} "
+                f"({len(bad)} such samples)"
+            )
+        if np.ptp(values) == 0:
+            raise InputError(
+                f"{recording.name}: the {name} is {values[0]:g} in all {len(values)} samples; "
+                "a frequency response needs a force that varies and a position that answers"
+            )
+    if band_hz is None:
+        return
+    low, high = band_hz
+    nyquist = 0.5 / recording.period_s
+    if not 0 < low < high:
+        raise InputError(f"band {low:g} to {high:g} Hz: it must be 0 < low < high")
+    if not high <= nyquist * (1 + 1e-9):
+        raise InputError(
+            f"band {low:g} to {high:g} Hz: it ends above the Nyquist frequency, {nyquist:g} Hz "
+            f"at a period of {recording.period_s:g} s"
+        )

@@ -1,0 +1,205 @@
+"""A frequency response without its recording: a table of gain, phase and uncertainty."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.columns import FRF_ROLES, Column, parse_columns, pick
+from bayeshaptic.recordings.readers import Arrays, read_arrays
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.spectra import TableSpectra
+from bayeshaptic.recordings.units import base_unit, choose_units
+
+FEWEST_ROWS = 10
+
+
+def read_frf(
+    path: str | os.PathLike[str],
+    period_s: float | None = None,
+    columns: str | Mapping[str, str] | None = None,
+    force_unit: str | None = None,
+    position_unit: str | None = None,
+    kind: str | None = None,
+) -> Etfe:
+    r"""A measured frequency response from a table.
+
+    Columns (a header, or `columns` names them): ``frequency_hz``, ``gain_db`` (20 log10 of position
+    over force, in base units), ``phase_deg``, and one of
+
+    - ``sd``: the standard deviation of the complex response in absolute units (position over
+      force, not dB): :math:`\sqrt{E|\hat G - G|^2}`, real and imaginary part together. It is
+      taken as known.
+    - ``coherence`` and ``averages``, the sample coherence and the number of independent segments
+      behind it (a column, or one number). With n averages the scatter about the estimate has
+      n - 1 complex degrees of freedom, hence without bias
+
+      .. math:: E|\hat G - G|^2 = |\hat G|^2 (1 - \gamma^2) / (\gamma^2 (n - 1))
+
+      (for large n Bendat and Piersol, *Random Data*, section 9.2: their relative error of the
+      magnitude, :math:`\sqrt{1 - \gamma^2} / (|\gamma| \sqrt{2 n})`, is one of two components).
+
+    Parameters
+    ----------
+    path : str or path
+    period_s : float
+        Sampling period of the loop, which a table cannot say.
+    columns : str, mapping or None
+        ``"frequency=f,gain_db=mag,phase_deg=ph,coherence=coh,averages=n"``; the gain's unit,
+        position over force, may be written: ``gain_db=mag[rad/A]``; `sd` is then in that unit too.
+    force_unit : {"N", "Nm", "A"} or None
+    position_unit : {"m", "rad"} or None
+    kind : {"translational", "rotational"} or None
+        Decides where no units are given.
+
+    Returns
+    -------
+    Etfe
+        With the rows in the order of their frequencies.
+
+    Raises
+    ------
+    InputError
+        For missing columns, NaN, frequencies that repeat or lie beyond the Nyquist frequency,
+        impossible standard deviations, coherences and averages, and fewer than ten rows.
+    """
+    path = Path(path)
+    arrays, mapping = read_arrays(path), parse_columns(columns)
+    return frf_from_arrays(path, arrays, mapping, period_s, force_unit, position_unit, kind)
+
+
+def frf_from_arrays(
+    path: Path,
+    arrays: Arrays,
+    mapping: Mapping[str, Column],
+    period_s: float | None,
+    force_unit: str | None = None,
+    position_unit: str | None = None,
+    kind: str | None = None,
+) -> Etfe:
+    """`read_frf` for a file whose arrays and mapping are there already."""
+    if period_s is None:
+        raise InputError(
+            f"{path}: a frequency response does not say the loop's sampling period; give --period-s"
+        )
+    if not (np.isfinite(period_s) and period_s > 0):
+        raise InputError(f"{path}: the period must be a number of seconds above 0, not {period_s}")
+    columns = _columns(path, arrays, mapping)
+    frequency = columns["frequency"]
+    _check_frequencies(path, frequency, period_s)
+    factor = 1.0
+    written = mapping["gain_db"].unit if "gain_db" in mapping else None
+    if written is not None:
+        position_unit, force_unit, factor = _units_of_gain(path, written)
+    units = choose_units(force_unit, position_unit, kind)
+    notices: tuple[Notice, ...] = ()
+    if force_unit is None and position_unit is None:
+        text = f"No units were given: the gain is taken to be in {units[1]}/{units[0]}."
+        notices = (Notice("note", "units", text),)
+    value = 10 ** (columns["gain_db"] / 20) * np.exp(1j * np.radians(columns["phase_deg"]))
+    variance, averages = _variance(path, columns, value)
+    spectra = TableSpectra(frequency, value * factor, variance * factor**2, averages)
+    return Etfe(
+        frequency_hz=frequency,
+        value=spectra.value,
+        variance=spectra.variance,
+        coherence=columns.get("coherence", np.full(len(value), np.nan)),
+        period_s=float(period_s),
+        band_hz=(float(frequency[0]), float(frequency[-1])),
+        force_unit=units[0],
+        position_unit=units[1],
+        spectra=spectra,
+        notices=notices,
+    )
+
+
+def _columns(
+    path: Path, arrays: Arrays, mapping: Mapping[str, Column]
+) -> dict[str, NDArray[np.float64]]:
+    """The table's columns by role, finite and equally long, in the order of the frequencies.
+
+    A single number fills its column.
+    """
+    for role in set(mapping) - set(FRF_ROLES):
+        raise InputError(f"{path}: '{role}' belongs to a recording, not to a frequency response")
+    columns: dict[str, NDArray[np.float64]] = {}
+    for role in FRF_ROLES:
+        found = pick(arrays, role, mapping, path, required=role in FRF_ROLES[:3])
+        if found is not None:
+            columns[role] = found[0]
+    if "sd" not in columns and not {"coherence", "averages"} <= set(columns):
+        there = "coherence without averages" if "coherence" in columns else "neither"
+        raise InputError(
+            f"{path}: the response needs its uncertainty, a column sd or the columns coherence and "
+            f"averages; there is {there}"
+        )
+    rows = len(columns["frequency"])
+    for role, values in columns.items():
+        if len(values) not in (1, rows):
+            raise InputError(f"{path}: {role} has {len(values)} rows, frequency has {rows}")
+        values = np.broadcast_to(values, rows).copy()
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(f"{path}: {role} is {values[bad[0]]} in row {bad[0] + 1}")
+        columns[role] = values
+    if rows < FEWEST_ROWS:
+        raise InputError(f"{path}: {rows} rows; a model needs at least {FEWEST_ROWS} frequencies")
+    order = np.argsort(columns["frequency"], kind="stable")
+    return {role: values[order] for role, values in columns.items()}
+
+
+def _check_frequencies(path: Path, frequency: NDArray[np.float64], period_s: float) -> None:
+    nyquist = 0.5 / period_s
+    bad = np.flatnonzero((frequency <= 0) | (frequency > nyquist * (1 + 1e-9)))
+    if len(bad):
+        raise InputError(
+            f"{path}: frequency {frequency[bad[0]]:g} Hz is not above 0 and up to the Nyquist "
+            f"frequency, {nyquist:g} Hz at a period of {period_s:g} s; remove such rows "
+            f"({len(bad)})"
+        )
+    twice = np.flatnonzero(np.diff(frequency) == 0)
+    if len(twice):
+        raise InputError(
+            f"{path}: frequency {frequency[twice[0]]:g} Hz is there twice; average the rows, or "
+            "remove one"
+        )
+
+
+def _variance(
+    path: Path, columns: Mapping[str, NDArray[np.float64]], value: NDArray[Any]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Complex variance of the response, and the averages behind it."""
+
+    def check(role: str, good: NDArray[np.bool_], expected: str) -> None:
+        bad = np.flatnonzero(~good)
+        if len(bad):
+            raise InputError(
+                f"{path}: {role} is {columns[role][bad[0]]:g} at {columns['frequency'][bad[0]]:g} "
+                f"Hz; it must be {expected}"
+            )
+
+    if "sd" in columns:
+        check("sd", columns["sd"] > 0, "above 0 (position over force, not dB)")
+        return columns["sd"] ** 2, np.full(len(value), np.inf)
+    coherence, averages = columns["coherence"], columns["averages"]
+    check("coherence", (coherence > 0) & (coherence < 1), "between 0 and 1")
+    check("averages", averages >= 2, "at least 2, or the scatter cannot be known")
+    return np.abs(value) ** 2 * (1 - coherence) / (coherence * (averages - 1)), averages
+
+
+def _units_of_gain(path: Path, written: str) -> tuple[str, str, float]:
+    """Base units of position and force, and the factor to them, for ``mm/N`` and the like."""
+    position, slash, force = written.partition("/")
+    if not slash:
+        raise InputError(
+            f"{path}: the gain's unit is position over force, as in [m/N], not [{written}]"
+        )
+    position_unit, position_factor = base_unit("position", position)
+    force_unit, force_factor = base_unit("force", force)
+    return position_unit, force_unit, position_factor / force_factor

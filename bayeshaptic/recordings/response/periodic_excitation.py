@@ -1,0 +1,242 @@
+"""ETFE of a recording whose force repeats itself: excited lines, noise from the lines between.
+
+The DFT of M whole periods holds the response in every M-th line. The lines between are what does
+not repeat: noise, drift, and what is left of the transient. Their local polynomial gives the
+leakage below an excited line, their scatter its noise. After R. Pintelon, G. Vandersteen,
+L. De Locht, Y. Rolain and J. Schoukens, "Experimental characterization of operational amplifiers",
+IEEE Trans. Instrumentation and Measurement 53(3), 854-862, 2004, and the fast method in their book.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.band import responds_until
+from bayeshaptic.recordings.response.local_polynomial import LEAKAGE_TERMS, leakage_terms
+from bayeshaptic.recordings.response.points import Points
+from bayeshaptic.recordings.response.spectra import PeriodicSpectra
+from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
+from bayeshaptic.recordings.signals.rounding import hidden_rounding
+
+FEWEST_LINES = 5
+FEWEST_BETWEEN, MOST_BETWEEN = 20, 60
+
+
+def estimate_periodic(
+    recording: Recording, band_hz: tuple[float, float] | None
+) -> tuple[PeriodicSpectra, Points, tuple[Notice, ...]] | None:
+    """Spectra, and what a person sees, of a recording with periodic excitation.
+
+    Parameters
+    ----------
+    recording : Recording
+    band_hz : (low, high) or None
+        All excited lines where the response stands out when None.
+
+    Returns
+    -------
+    tuple or None
+        None where the force does not repeat itself for two whole periods.
+
+    Raises
+    ------
+    InputError
+        When fewer than `FEWEST_LINES` excited lines are in the band.
+    """
+    repetition = find_repetition(recording.force)
+    if repetition is None:
+        return None
+    force, position = _periods(recording, repetition)
+    if len(position) < 2:
+        return None
+    harmonics = excited_lines(force)
+    frequency = harmonics / (repetition.period * recording.period_s)
+    if band_hz is not None:
+        inside = (frequency >= band_hz[0] * (1 - 1e-9)) & (frequency <= band_hz[1] * (1 + 1e-9))
+        harmonics = harmonics[inside]
+    _check_count(recording, harmonics, band_hz)
+    transient = transient_periods(position, harmonics)
+    kept = position[transient:]
+    spectra = _spectra(recording, force, kept, harmonics)
+    if band_hz is None:
+        spectra = _responding(spectra, recording)
+    return spectra, points(spectra), _notices(recording, spectra, repetition, position, transient)
+
+
+def points(spectra: PeriodicSpectra) -> Points:
+    """Response, variance and coherence in each excited line.
+
+    The scatter has n - 1 complex degrees of freedom; over n - 2 the error over the standard
+    deviation, a Student t, has unit variance.
+    """
+    noise = spectra.scatter / (spectra.freedom - 1)
+    value = spectra.position / spectra.force
+    answer = np.maximum(np.abs(spectra.position) ** 2 - noise, 0)
+    return Points(
+        frequency_hz=spectra.frequency_hz,
+        value=value,
+        variance=spectra.scatter / (spectra.freedom - 2) / np.abs(spectra.force) ** 2,
+        coherence=answer / (answer + spectra.periods * noise),
+    )
+
+
+def transient_periods(position: NDArray[Any], harmonics: NDArray[np.int64]) -> int:
+    """How many of the first periods differ from the later half by more than that half scatters.
+
+    Parameters
+    ----------
+    position : ndarray, shape (M, p)
+    harmonics : ndarray of int, shape (L,)
+    """
+    count, samples = position.shape
+    if count < 3:
+        return 0
+    # A drift is no transient: each period without the slope between its neighbours.
+    slope = np.gradient(position.mean(axis=1)) / samples
+    ramp = np.arange(samples) - (samples - 1) / 2
+    lines = np.fft.rfft(position - slope[:, None] * ramp, axis=1)[:, harmonics]
+    half = max(2, count - count // 2)
+    late = lines[-half:]
+    departure = np.abs(lines - late.mean(axis=0)) ** 2
+    departure[:-half] /= 1 + 1 / half
+    departure[-half:] /= 1 - 1 / half
+    width = min(21, len(harmonics))
+    variance = np.convolve(departure[-half:].mean(axis=0), np.ones(width) / width, mode="same")
+    floor = np.finfo(float).eps * np.abs(late).max()
+    distance = np.mean(departure / np.maximum(variance, floor**2), axis=1)
+    limit = distance[-half:].max() * (1 + 4 / np.sqrt(len(harmonics)))
+    return int(np.argmax(distance <= limit))
+
+
+def _periods(recording: Recording, repetition: Repetition) -> tuple[NDArray[Any], NDArray[Any]]:
+    """One period of the force, shape (p,), and whole periods of the position, shape (M, p).
+
+    The position of a sample answers the forces before it: it may go on for one sample more.
+    """
+    start, period = repetition.start, repetition.period
+    stop = min(repetition.stop + 1, recording.samples)
+    count = (stop - start) // period
+    first = stop - count * period
+    force = recording.force[first : first + period]
+    return force, recording.position[first:stop].reshape(count, period)
+
+
+def _check_count(
+    recording: Recording, harmonics: NDArray[np.int64], band_hz: tuple[float, float] | None
+) -> None:
+    if len(harmonics) >= FEWEST_LINES:
+        return
+    where = "" if band_hz is None else f" in the band {band_hz[0]:g} to {band_hz[1]:g} Hz"
+    cure = "excite more frequencies" if band_hz is None else "widen the band"
+    raise InputError(
+        f"{recording.name}: the periodic force excites {len(harmonics)} lines{where}, a model "
+        f"needs {FEWEST_LINES}; {cure}"
+    )
+
+
+def _spectra(
+    recording: Recording,
+    force: NDArray[Any],
+    position: NDArray[Any],
+    harmonics: NDArray[np.int64],
+) -> PeriodicSpectra:
+    count, samples = position.shape
+    whole = position.ravel() - position.mean()
+    spectrum = np.fft.rfft(whole) / np.sqrt(whole.size)
+    line = harmonics * count
+    between = np.arange(1, (whole.size + 1) // 2)
+    between = between[between % count != 0]
+    width = int(np.clip(count - 1, FEWEST_BETWEEN, MOST_BETWEEN))
+    if len(between) < width:
+        raise InputError(
+            f"{recording.name}: {count} periods of {samples} samples are too few to tell the "
+            "response from noise; record longer"
+        )
+    first = np.searchsorted(between, line) - width // 2
+    near = between[np.clip(first, 0, len(between) - width)[:, None] + np.arange(width)]
+    below, residual, leverage = _leakage(spectrum[near], near, line)
+    # Leakage is known from the lines between only: its error adds to the noise of the line.
+    shrink = 1 / np.sqrt(1 + leverage)
+    freedom = width - LEAKAGE_TERMS + 1
+    floor = hidden_rounding(position, recording.encoder_resolution)
+    return PeriodicSpectra(
+        frequency_hz=harmonics / (samples * recording.period_s),
+        force=np.fft.rfft(force)[harmonics] * np.sqrt(count / samples) * shrink,
+        position=(spectrum[line] - below) * shrink,
+        scatter=np.sum(np.abs(residual) ** 2, axis=1) + (freedom - 1) * floor,
+        freedom=np.full(len(line), float(freedom)),
+        periods=count,
+    )
+
+
+def _leakage(
+    values: NDArray[Any], near: NDArray[np.int64], line: NDArray[np.int64]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Leakage at a line (L,) from the values (L, w) of lines near it, their residual, leverage."""
+    centre = line[:, None].astype(float)
+    scale = np.max(np.abs(near - centre), axis=1, keepdims=True)
+    terms = leakage_terms((near - centre) / scale, near.astype(float), centre)
+    at_line = leakage_terms(np.zeros_like(centre), centre, centre)[:, 0]
+    q, r = np.linalg.qr(terms)
+    along = np.einsum("lwt,lw->lt", q, values)
+    weights = np.linalg.solve(np.swapaxes(r, -1, -2), at_line[..., None])[..., 0]
+    residual = values - np.einsum("lwt,lt->lw", q, along)
+    return np.sum(weights * along, axis=1), residual, np.sum(weights**2, axis=1)
+
+
+def _responding(spectra: PeriodicSpectra, recording: Recording) -> PeriodicSpectra:
+    """Only the lines up to where the response stands out."""
+    noise = spectra.scatter / (spectra.freedom - 1)
+    last = responds_until(np.abs(spectra.position) ** 2 / noise - 1)
+    if last is None or last + 1 < FEWEST_LINES:
+        raise InputError(
+            f"{recording.name}: the position does not follow the periodic force; check which "
+            "column is which, or record with more force"
+        )
+    kept = slice(0, last + 1)
+    return PeriodicSpectra(
+        frequency_hz=spectra.frequency_hz[kept],
+        force=spectra.force[kept],
+        position=spectra.position[kept],
+        scatter=spectra.scatter[kept],
+        freedom=spectra.freedom[kept],
+        periods=spectra.periods,
+    )
+
+
+def _notices(
+    recording: Recording,
+    spectra: PeriodicSpectra,
+    repetition: Repetition,
+    position: NDArray[Any],
+    transient: int,
+) -> tuple[Notice, ...]:
+    seconds = repetition.period * recording.period_s
+    rest = recording.samples - position.size
+    unused = f" ({rest} samples more are in no whole period)" if rest else ""
+    dropped = (
+        f"the first {transient} are transient and dropped"
+        if transient
+        else "none of them transient"
+    )
+    text = (
+        f"The force repeats every {seconds:.6g} s ({repetition.period} samples): "
+        f"{len(position)} whole periods, {dropped}, {spectra.periods} kept{unused}. "
+        f"{spectra.lines} excited lines, "
+        f"{spectra.frequency_hz[0]:.4g} to {spectra.frequency_hz[-1]:.4g} Hz."
+    )
+    notices = [Notice("note", "periods", text)]
+    if len(position) < 3:
+        notices.append(
+            Notice(
+                "warning",
+                "periods",
+                "With two periods nothing shows whether the first is still transient; record more.",
+            )
+        )
+    return tuple(notices)

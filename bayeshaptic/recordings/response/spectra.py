@@ -1,0 +1,248 @@
+"""The spectra behind an ETFE: from each kind the windows of the likelihood can be rebuilt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.recordings.response.local_polynomial import (
+    LEAKAGE_TERMS,
+    NODES,
+    interpolation,
+    leakage_terms,
+)
+from bayeshaptic.recordings.response.windows import Reference, Windows
+
+
+class Spectra(Protocol):
+    """What every kind of spectra offers."""
+
+    @property
+    def lines(self) -> int:
+        """Number of DFT lines, or rows of a table."""
+
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
+        """The windows of the likelihood."""
+
+
+class _Block(NamedTuple):
+    """Windows of similar width side by side, padded with lines that weigh nothing."""
+
+    window: slice
+    line: NDArray[Any]  # (W, w) which line; padding repeats the last
+    force: NDArray[Any]  # (W, w) zero in the padding
+    position: NDArray[Any]  # (W, w) leakage projected out
+    leakage: NDArray[Any]  # (W, w, 5) orthonormal
+    weights: NDArray[Any]  # (W, w, 3) of the nodes
+    inside: NDArray[Any]  # (W, w) False in the padding
+
+
+@dataclass(frozen=True)
+class RandomSpectra:
+    """DFT lines of a recording with random excitation, and where its windows begin and end.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (L,)
+        Consecutive lines of the DFT of the whole record, without a taper.
+    force, position : complex ndarray, shape (L,)
+        DFT over sqrt(N), so that white noise has the variance of a sample in each line.
+    edges : ndarray of int, shape (W + 1,)
+        Window w holds the lines edges[w]:edges[w + 1].
+    floor : float
+        Variance of a line that rounding alone leaves.
+    reference : callable
+        The reference to use when none is given.
+    """
+
+    frequency_hz: NDArray[Any] = field(repr=False)
+    force: NDArray[Any] = field(repr=False)
+    position: NDArray[Any] = field(repr=False)
+    edges: NDArray[Any] = field(repr=False)
+    floor: float
+    reference: Reference = field(repr=False)
+
+    @property
+    def lines(self) -> int:
+        return len(self.frequency_hz)
+
+    @cached_property
+    def force_power(self) -> NDArray[Any]:
+        """Mean power of the force in each window, shape (W,)."""
+        return np.add.reduceat(np.abs(self.force) ** 2, self.edges[:-1]) / np.diff(self.edges)
+
+    @cached_property
+    def nodes_hz(self) -> NDArray[Any]:
+        """Frequencies of the nodes, shape (W, 3)."""
+        low = self.frequency_hz[self.edges[:-1], None]
+        high = self.frequency_hz[self.edges[1:] - 1, None]
+        return (low + high) / 2 + (high - low) / 2 * NODES
+
+    @cached_property
+    def _blocks(self) -> list[_Block]:
+        # Padding costs less than a call a window: a block spans widths up to a factor 1.5.
+        width = np.maximum.accumulate(np.diff(self.edges))
+        blocks, first = [], 0
+        while first < len(width):
+            last = int(np.searchsorted(width, 1.5 * width[first], side="right"))
+            blocks.append(self._block(slice(first, last)))
+            first = last
+        return blocks
+
+    def _block(self, window: slice) -> _Block:
+        start, width = self.edges[:-1][window, None], np.diff(self.edges)[window, None]
+        offset = np.arange(width.max())
+        inside = offset < width
+        line = start + np.minimum(offset, width - 1)
+        x = 2 * (line - start) / (width - 1) - 1
+        frequency = self.frequency_hz[line]
+        terms = leakage_terms(x, frequency, frequency.mean(axis=1, keepdims=True))
+        leakage = np.linalg.qr(terms * inside[..., None])[0]
+        position = self.position[line] * inside
+        return _Block(
+            window=window,
+            line=line,
+            force=self.force[line] * inside,
+            position=_project_out(leakage, position[..., None])[..., 0],
+            leakage=leakage,
+            weights=interpolation(x),
+            inside=inside,
+        )
+
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
+        """The windows of the likelihood.
+
+        The ratio of the response to the reference is a parabola in each window, through its
+        values at three Chebyshev nodes; what leakage may be is projected out.
+
+        Parameters
+        ----------
+        reference : callable, optional
+        inputs : complex ndarray, shape (J, L), optional
+            Further columns at the lines: motions that add to the position with a coefficient each.
+
+        Returns
+        -------
+        Windows
+            With k = 3 nodes a window.
+        """
+        reference = reference or self.reference
+        at_lines = np.asarray(reference(self.frequency_hz))
+        at_nodes = np.asarray(reference(self.nodes_hz.ravel())).reshape(self.nodes_hz.shape)
+        further = np.zeros((0, self.lines), complex) if inputs is None else np.asarray(inputs)
+        count, k = len(self.nodes_hz), self.nodes_hz.shape[1] + len(further)
+        design = np.empty((count, k, k), dtype=complex)
+        target = np.empty((count, k), dtype=complex)
+        scatter = np.empty(count)
+        for block in self._blocks:
+            response = at_lines[block.line, None] * block.weights / at_nodes[block.window, None, :]
+            columns = [block.force[..., None] * response]
+            # The padding of a block has no force and must have no input either.
+            columns += [(row[block.line] * block.inside)[..., None] for row in further]
+            column = _project_out(block.leakage, np.concatenate(columns, axis=-1))
+            q, design[block.window] = np.linalg.qr(column)
+            z = np.einsum("wlk,wl->wk", q.conj(), block.position)
+            rest = block.position - np.einsum("wlk,wk->wl", q, z)
+            target[block.window] = z
+            scatter[block.window] = np.sum(np.abs(rest) ** 2, axis=1)
+        lines = np.diff(self.edges) - LEAKAGE_TERMS
+        return Windows(
+            frequency_hz=self.nodes_hz,
+            design=design,
+            target=target,
+            scatter=scatter + lines * self.floor,
+            lines=lines.astype(float),
+        )
+
+
+def _project_out(basis: NDArray[Any], columns: NDArray[Any]) -> NDArray[Any]:
+    """What is left of the columns (..., w, c) outside the span of the basis (..., w, b)."""
+    return columns - basis @ (np.swapaxes(basis.conj(), -1, -2) @ columns)
+
+
+@dataclass(frozen=True)
+class PeriodicSpectra:
+    """Excited lines of a periodic excitation.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (L,)
+    force, position : complex ndarray, shape (L,)
+        DFT over all kept periods, over the square root of the number of samples, leakage removed;
+        scaled so that the noise of a position has the variance scatter / (freedom - 1).
+    scatter : ndarray, shape (L,)
+        Sum of the squares of the noise beside the line.
+    freedom : ndarray, shape (L,)
+        One more than the degrees of freedom of `scatter`.
+    periods : int
+        Number of kept periods.
+    """
+
+    frequency_hz: NDArray[Any] = field(repr=False)
+    force: NDArray[Any] = field(repr=False)
+    position: NDArray[Any] = field(repr=False)
+    scatter: NDArray[Any] = field(repr=False)
+    freedom: NDArray[Any] = field(repr=False)
+    periods: int
+
+    @property
+    def lines(self) -> int:
+        return len(self.frequency_hz)
+
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
+        """One window an excited line; the reference is not needed."""
+        columns = [self.force] if inputs is None else [self.force, *inputs]
+        return Windows(
+            frequency_hz=self.frequency_hz[:, None],
+            design=np.stack(columns, axis=-1)[:, None, :],
+            target=self.position[:, None],
+            scatter=self.scatter,
+            lines=self.freedom,
+        )
+
+
+@dataclass(frozen=True)
+class TableSpectra:
+    """Rows of a frequency-response table.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (L,)
+    value : complex ndarray, shape (L,)
+    variance : ndarray, shape (L,)
+        E|value - truth|^2.
+    averages : ndarray, shape (L,)
+        Number of averages behind the variance; infinite where it is known exactly.
+    """
+
+    frequency_hz: NDArray[Any] = field(repr=False)
+    value: NDArray[Any] = field(repr=False)
+    variance: NDArray[Any] = field(repr=False)
+    averages: NDArray[Any] = field(repr=False)
+
+    @property
+    def lines(self) -> int:
+        return len(self.frequency_hz)
+
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
+        """One window a row; the reference is not needed, and there can be no inputs."""
+        lines = np.minimum(self.averages, 1e6)
+        return Windows(
+            frequency_hz=self.frequency_hz[:, None],
+            design=np.ones((self.lines, 1, 1), dtype=complex),
+            target=self.value[:, None],
+            scatter=(lines - 1) * self.variance,
+            lines=lines,
+        )

@@ -1,0 +1,81 @@
+"""The compressed form of a measurement that a likelihood needs: a few model values a window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from bayeshaptic.recordings.response.etfe import Etfe
+
+Reference = Callable[[NDArray[Any]], NDArray[Any]]
+"""A frequency response: frequencies in Hz, shape (L,), to complex values, shape (L,)."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    r"""Windows of neighbouring DFT lines, each compressed to k linear combinations and a scatter.
+
+    With g the model's values at the nodes of a window, and the variance of the window's noise
+    integrated out,
+
+    .. math:: \log p(Y \mid \theta) = -\sum_w (n_w - 1) \log\left(s_{0,w} + |z_w - R_w g_w|^2\right)
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (W, k)
+        Nodes where the model is evaluated, Hz; k = 3 for random excitation, 1 otherwise.
+    design : complex ndarray, shape (W, r, k + J)
+        R; its last J columns are those of further inputs, whose coefficients follow g. r = k + J
+        for random excitation, 1 otherwise.
+    target : complex ndarray, shape (W, r)
+        z.
+    scatter : ndarray, shape (W,)
+        s0 > 0: what no smooth response explains.
+    lines : ndarray, shape (W,)
+        n: complex degrees of freedom of target and scatter together.
+    """
+
+    frequency_hz: NDArray[Any]
+    design: NDArray[Any]
+    target: NDArray[Any]
+    scatter: NDArray[Any]
+    lines: NDArray[Any]
+
+    @property
+    def inputs(self) -> int:
+        """J, the number of further inputs."""
+        return self.design.shape[2] - self.frequency_hz.shape[1]
+
+    def part(self, chosen: NDArray[Any]) -> Windows:
+        """Some of the windows, by a mask or an index."""
+        return Windows(
+            self.frequency_hz[chosen],
+            self.design[chosen],
+            self.target[chosen],
+            self.scatter[chosen],
+            self.lines[chosen],
+        )
+
+
+def compress(
+    etfe: Etfe, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+) -> Windows:
+    """The windows that the likelihood uses.
+
+    Parameters
+    ----------
+    etfe : Etfe
+    reference : callable, optional
+        A first fit, as a function of the frequency in Hz. In a window only the ratio to it has to
+        be a parabola, which matters beside resonances and at low frequencies. By default a
+        smooth estimate made from the data. It makes no difference for periodic excitation and
+        for tables.
+    inputs : complex ndarray, shape (J, L), optional
+        Motions that add to the position with a coefficient each, at the lines of `etfe.spectra` and
+        in the scale of its positions.
+    """
+    return etfe.spectra.windows(reference, inputs)

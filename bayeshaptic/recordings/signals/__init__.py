@@ -1,0 +1,1 @@
+"""Facts of the raw signals: excitation, causality, rounding, timing."""

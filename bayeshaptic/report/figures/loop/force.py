@@ -1,0 +1,129 @@
+"""The force that the linear model leaves over, drawn over the motion: what convinces a person."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bayeshaptic.recordings.response.etfe import RandomSpectra
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.quantities import scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.diagnosis.residuals.force_curve import ForceCurve
+
+_TITLES = {
+    "velocity": "velocity",
+    "position": "position",
+    "stretch": "stretch",
+    "command": "command",
+}
+_VAGUE = 6.0  # times the usual error of a curve: such a point would only hide the others
+_BEFORE: dict[str, Any] = {
+    "color": style.OTHER,
+    "fmt": "s--",
+    "markerfacecolor": "white",
+    "label": "before: left over by the model as declared",
+}
+_FORCE: dict[str, Any] = {
+    "color": style.DATA,
+    "fmt": "^:",
+    "label": "the force found: what the new linear part leaves over",
+}
+_AFTER: dict[str, Any] = {"color": style.MODEL, "fmt": "o-", "label": "after: left over with it"}
+
+
+def is_shown(closed: Closed) -> bool:
+    """Where a nonlinear force was found, or is suspected, in a recording that can show it."""
+    etfe = closed.base.etfe
+    if etfe.recording is None or not isinstance(etfe.spectra, RandomSpectra):
+        return False
+    tests = (*closed.traced.before, *closed.traced.after)
+    return any(e.family == "nonlinear" for e in closed.effects) or any(
+        test.flagged and test.family == "nonlinear" for test in tests
+    )
+
+
+def draw(closed: Closed) -> Figure:
+    """A panel for each motion, one unit of force for all."""
+    curves = _curves(closed)
+    unit = closed.base.etfe.force_unit
+    highest = max(float(np.median(np.abs(c.force))) for row in curves.values() for c, _ in row)
+    force = scale(highest, unit)
+    figure = style.new_figure(3.1)
+    panels = figure.subplots(1, len(curves), sharey=True, squeeze=False)[0]
+    for axes, (over, row) in zip(panels, curves.items(), strict=True):
+        _panel(axes, closed, over, row, force.factor)
+    panels[0].set_ylabel(f"force, {force.unit}", fontsize=style.FONT)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper left",
+        ncols=1,
+        frameon=False,
+        fontsize=style.SMALL + 0.5,
+    )
+    return figure
+
+
+def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]]:
+    from bayeshaptic.diagnosis.residuals.force_curve import COMMAND, force_curve, motions
+
+    base, analysis = closed.base, closed.analysis
+    assert base.recording is not None
+    found = {}
+    nonlinear = any(effect.family == "nonlinear" for effect in closed.effects)
+    same = analysis.etfe.recording is not None and (
+        analysis.etfe.recording.samples == base.recording.samples
+    )
+    for over, motion in motions(base.fit, base.recording).items():
+        if over == COMMAND and not _saturates(closed):
+            continue
+        row = [(force_curve(base.fit, base.etfe, over, motion), _BEFORE)]
+        if nonlinear and same:
+            row.append((force_curve(analysis.fit, base.etfe, over, motion), _FORCE))
+        if closed.effects and same:
+            row.append((force_curve(analysis.fit, analysis.etfe, over, motion), _AFTER))
+        found[over] = row
+    return found
+
+
+def _saturates(closed: Closed) -> bool:
+    """Where something in the command, not in the motion, is still in question."""
+    return any(test.flagged and test.name == "u^3" for test in closed.traced.after)
+
+
+def _panel(
+    axes: Axes,
+    closed: Closed,
+    over: str,
+    row: list[tuple[ForceCurve, dict[str, Any]]],
+    factor: float,
+) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    etfe = closed.base.etfe
+    unit = etfe.position_unit + ("/s" if over == "velocity" else "")
+    unit = etfe.force_unit if over == "command" else unit
+    motion = scale(float(np.abs(row[0][0].motion).max()), unit)
+    style.panel(axes, f"{_TITLES[over]}, {motion.unit}")
+    axes.xaxis.set_major_locator(MaxNLocator(4, symmetric=True))  # numbers of a stretch are long
+    axes.axhline(0, color=style.PRIOR, linewidth=0.7)
+    for curve, look in row:
+        clear = curve.sd <= _VAGUE * np.median(curve.sd)
+        axes.errorbar(
+            curve.motion[clear] * motion.factor,
+            curve.force[clear] * factor,
+            yerr=2 * curve.sd[clear] * factor,
+            markersize=3.5,
+            linewidth=1.0,
+            elinewidth=0.7,
+            capsize=1.5,
+            **look,
+        )

@@ -1,0 +1,67 @@
+"""Inverse dynamics: the force that the motion does not explain, and the error term by term."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.quantities import scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.diagnosis.feedback.explain import ForceExplained
+
+_MOST_DOTS = 3000
+
+
+def draw(closed: Closed) -> Figure:
+    """Residual force over velocity on the left, held-out error on the right."""
+    assert closed.force is not None
+    etfe = closed.base.etfe
+    figure = style.new_figure(3.0)
+    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+    _residual(left, closed.force, etfe.force_unit, etfe.position_unit)
+    _errors(right, closed.force, etfe.force_unit)
+    return figure
+
+
+def _residual(axes: Axes, force: ForceExplained, force_unit: str, position_unit: str) -> None:
+    first, further = force.first, force.further
+    path = first.path
+    mass, damping, constant = (first[term.name][0] for term in first.terms[:3])
+    linear = mass * path.acceleration + damping * path.velocity + constant
+    row = scale(max(step.held_out_rms for step in further.steps), force_unit)
+    every = max(len(path.velocity) // _MOST_DOTS, 1)
+    for left, colour, marker, label in (
+        (first.force - linear, style.OTHER, "s", "mass, damper and constant force"),
+        (first.force - first.explained, style.CYCLE[1], "^", "with the first term added"),
+        (further.force - further.explained, style.MODEL, "o", "with all terms"),
+    ):
+        axes.plot(
+            path.velocity[::every],
+            row.factor * left[::every],
+            marker,
+            color=colour,
+            markersize=1.4,
+            label=label,
+            rasterized=True,
+        )
+    style.panel(axes, f"velocity, {position_unit}/s", f"force not explained, {row.unit}")
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.35 * (high - low))
+    style.legend(axes, loc="upper left", markerscale=4)
+
+
+def _errors(axes: Axes, force: ForceExplained, unit: str) -> None:
+    steps = force.further.steps
+    row = scale(max(step.held_out_rms for step in steps), unit)
+    errors = [row.factor * step.held_out_rms for step in steps]
+    names = ["linear", *(step.term.replace("_", " ") for step in steps[1:])]
+    bars = axes.barh(names, errors, color=style.MODEL, height=0.6)
+    axes.bar_label(bars, fmt="%.3g", fontsize=style.SMALL, padding=2)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1.15 * max(errors))
+    style.panel(axes, f"error on the other half, {row.unit} rms", grid=False)

@@ -1,0 +1,103 @@
+"""The residual before and after closing the loop, over frequency."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.residuals import third_octaves
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.inference.least_squares import Fit
+
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": style.OTHER, "marker": "s", "linestyle": "--", "markerfacecolor": "none"},
+    {"color": style.MODEL, "marker": "o", "linestyle": "-"},
+)
+
+
+def draw(closed: Closed) -> Figure:
+    """The rms in third octaves above, each window's score below; before and after."""
+    figure = style.new_figure(4.2)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    fits = {"before" if closed.effects else "model as declared": closed.base.fit}
+    if closed.effects:
+        fits["after, with what was added"] = closed.analysis.fit
+    style.panel(top, y="rms per third\noctave / noise")
+    style.panel(bottom, y="standard deviations\nabove noise")
+    bottom.axhspan(-2, 2, color="#bdbdbd", alpha=0.45, linewidth=0)
+    lowest, highest = 0.5, 1.5
+    for number, (fit, look) in enumerate(zip(fits.values(), _LOOKS, strict=False)):
+        frequency, residual = _sorted(fit)
+        bands = third_octaves(frequency, residual)
+        if number == 0:
+            _noise(top, bands)
+        label = list(fits)[number]
+        top.plot(bands.frequency_hz, bands.rms, label=label, linewidth=1.1, markersize=4, **look)
+        lowest = min(lowest, float(bands.rms.min()))
+        highest = max(highest, float(bands.rms.max()), float(bands.high.max()))
+        _scores(bottom, fit, look)
+    _axis(top, lowest, highest)
+    style.legend(top, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.1)
+    everywhere = closed.base.fit.frequency_hz
+    low, high = everywhere.min() / 1.05, everywhere.max() * 1.05
+    style.frequency_axis(top, low, high)
+    style.frequency_axis(bottom, low, high, "frequency, Hz")
+    figure.align_ylabels([top, bottom])
+    return figure
+
+
+def _sorted(fit: Fit) -> tuple[NDArray[Any], NDArray[Any]]:
+    order = np.argsort(fit.frequency_hz)
+    return fit.frequency_hz[order], fit.residual[order]
+
+
+def _noise(axes: Axes, bands: Any) -> None:
+    axes.fill_between(
+        bands.frequency_hz,
+        bands.low,
+        bands.high,
+        color="#bdbdbd",
+        alpha=0.45,
+        linewidth=0,
+        label="99 % of pure noise",
+    )
+
+
+def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> None:
+    """A point a window; those of a large misfit are pressed together."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    from bayeshaptic.diagnosis.residuals.residual import window_scores
+
+    if fit.windows is None:
+        return
+    centre = fit.windows.frequency_hz.mean(axis=1)
+    axes.plot(centre, window_scores(fit), **(look | {"linestyle": "none"}), markersize=2.6)
+    low, high = axes.get_ylim()
+    if high > 12:
+        axes.set_yscale("symlog", linthresh=4.0, linscale=1.0)
+        tens = [t for t in (10.0, 30.0, 100.0, 300.0) if t < 1.1 * high]
+        axes.yaxis.set_major_locator(FixedLocator([-2, 0, 2, *tens]))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+
+
+def _axis(axes: Axes, lowest: float, highest: float) -> None:
+    if highest > 6:
+        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+        axes.set_yscale("log")
+        axes.set_ylim(0.9 * lowest, 1.3 * highest)
+        axes.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        axes.set_ylim(0, 1.1 * highest)

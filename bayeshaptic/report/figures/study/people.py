@@ -1,0 +1,170 @@
+"""A person not yet seen above, everybody who was recorded below, on one axis in decibels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.estimates import RISKS, decibel
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.quantities import percent, pretty_unit
+from bayeshaptic.report.study.tables import has_draws, raw_limits
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.stability.cases import Case
+    from bayeshaptic.study.analysis import StudyAnalysis
+
+BINS = 60
+_ROW_IN = 0.26
+_NARROWEST_DB = 0.2  # of the axis: a population that does not differ is not to look as if it did
+
+
+def draw(study: StudyAnalysis) -> Figure:
+    """Histogram of a new person's limit by crossing, references beside it, and a row a user."""
+    rows = max(len(study.users), 1)
+    figure = style.new_figure(3.1 + _ROW_IN * rows)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 0.5 + _ROW_IN * rows))
+    _histogram(top, study)
+    _users(bottom, study)
+    unit = pretty_unit(study.users[0].limit.unit)
+    bottom.set_xlabel(f"critical stiffness, dB re 1 {unit}", fontsize=style.FONT)
+    return figure
+
+
+def in_db(case: Case) -> NDArray[Any]:
+    """Finite limits of a case in dB."""
+    samples = case.limit.samples
+    return 20 * np.log10(samples[np.isfinite(samples) & (samples > 0)])
+
+
+def _histogram(axes: Axes, study: StudyAnalysis) -> None:
+    style.panel(axes, y="probability density", grid=False)
+    axes.set_yticks([])
+    if not study.new_person:
+        axes.text(0.5, 0.5, "no person not yet seen", transform=axes.transAxes, ha="center")
+        return
+    case = study.new_person[0]
+    edges = _edges(study, in_db(case))
+    base = np.zeros(len(edges) - 1)
+    samples = case.limit.samples
+    for number, crossing in enumerate(case.limit.crossings):
+        use = (case.limit.group == number) & np.isfinite(samples) & (samples > 0)
+        part = 20 * np.log10(samples[use])
+        height = np.histogram(part, edges)[0] / (len(samples) * np.diff(edges))
+        colour = style.CYCLE[number % len(style.CYCLE)]
+        axes.stairs(
+            base + height,
+            edges,
+            baseline=base,
+            fill=True,
+            facecolor=colour,
+            alpha=0.55,
+            edgecolor=style.DATA,
+            linewidth=0.0,
+            hatch=style.HATCHES[number % len(style.HATCHES)],
+            label=f"{crossing.label}: {percent(crossing.probability)}",
+        )
+        axes.stairs(base + height, edges, baseline=base, color=colour, linewidth=0.8)
+        base = base + height
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_ylim(0, 1.25 * axes.get_ylim()[1])
+    _safe(axes, case)
+    _references(axes, study)
+    axes.set_title("a person not yet seen", fontsize=style.FONT, loc="left", fontweight="bold")
+    style.legend(axes, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4)
+
+
+def _edges(study: StudyAnalysis, values: NDArray[Any]) -> NDArray[Any]:
+    """Bins over nearly all of the distribution, and over everything that is drawn beside it."""
+    low, high = np.quantile(values, (0.001, 0.999))
+    known = [decibel(k) for r in study.study.references if r.held for k in r.critical_stiffness]
+    ends = [decibel(case.limit.quantile(p)) for case in study.users for p in (0.05, 0.95)]
+    inside = [value for value in (*known, *ends) if np.isfinite(value)]
+    low, high = min([low, *inside]), max([high, *inside])
+    margin = max(0.04 * (high - low), 0.5 * (_NARROWEST_DB - (high - low)))
+    return np.linspace(low - margin, high + margin, BINS + 1)
+
+
+def _safe(axes: Axes, case: Case) -> None:
+    for number, risk in enumerate(RISKS):
+        safe = case.limit.safe(risk)
+        if safe:
+            axes.axvline(
+                decibel(safe),
+                color=style.DATA,
+                linewidth=1.0,
+                linestyle=style.DASHES[1:][number],
+                label=f"{percent(risk)} risk for such a person",
+            )
+
+
+def _references(axes: Axes, study: StudyAnalysis) -> None:
+    """Limits known from elsewhere, as triangles near the top."""
+    for number, reference in enumerate(r for r in study.study.references if r.held):
+        values = [decibel(k) for k in reference.critical_stiffness]
+        axes.plot(
+            values,
+            np.full(len(values), (0.93 - 0.08 * number) * axes.get_ylim()[1]),
+            "v",
+            color=style.OTHER,
+            markersize=5.5,
+            markerfacecolor="white" if number else style.OTHER,
+            label=_wrapped(reference.label),
+            clip_on=False,
+        )
+
+
+def _wrapped(label: str, width: int = 30) -> str:
+    import textwrap
+
+    return "\n".join(textwrap.wrap(label, width))
+
+
+def _users(axes: Axes, study: StudyAnalysis) -> None:
+    style.panel(axes)
+    axes.grid(False, axis="y")
+    alone = raw_limits(study)
+    for place, case in enumerate(study.users):
+        for limit in alone[case.label]:
+            _bar(axes, limit, place + 0.17, "s", style.DATA, "white", 3.5, 1.0)
+        if has_draws(case):
+            _bar(axes, case.limit, place - 0.17, "o", style.MODEL, style.MODEL, 4.0, 1.8)
+    names = [case.label.removeprefix("user ") for case in study.users]
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
+    axes.plot([], [], "s-", color=style.DATA, markerfacecolor="white", label="own recording alone")
+    axes.plot([], [], "o-", color=style.MODEL, label="given all people")
+    axes.set_title("people recorded", fontsize=style.FONT, loc="left", fontweight="bold")
+    style.legend(axes, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4)
+
+
+def _bar(
+    axes: Axes,
+    limit: Any,
+    place: float,
+    marker: str,
+    colour: str,
+    face: str,
+    size: float,
+    width: float,
+) -> None:
+    """Median and 90 % interval of a limit in dB."""
+    low, middle, high = (decibel(limit.quantile(p)) for p in (0.05, 0.5, 0.95))
+    if not np.isfinite([low, middle, high]).all():
+        return
+    axes.errorbar(
+        [middle],
+        [place],
+        xerr=[[middle - low], [high - middle]],
+        fmt=marker,
+        color=colour,
+        markerfacecolor=face,
+        markersize=size,
+        linewidth=width,
+        capsize=2.5,
+    )

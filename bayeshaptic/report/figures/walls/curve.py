@@ -1,0 +1,133 @@
+"""The probability that a wall is stable over its stiffness, without damping."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.quantities import percent, scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.stability.walls.limit_table import LimitTable
+
+LOWEST_RISK = 5e-4
+LOG_BEYOND = 4.0  # limits further apart than this factor are drawn on a logarithmic axis
+SHOWN = 6  # cases with a curve of their own
+
+
+def draw(table: LimitTable) -> Figure:
+    """P(stable) on the left; P(unstable) on a logarithmic scale on the right."""
+    curves = _curves(table)
+    figure = style.new_figure(2.6 if len(curves) == 1 else 2.95)
+    left, right = figure.subplots(1, 2)
+    row = scale(float(np.median(_finite(table.samples))), table.unit)
+    for number, (label, samples) in enumerate(curves):
+        whole = number == 0
+        look: dict[str, Any] = {
+            "color": style.DATA if whole else style.CYCLE[(number - 1) % len(style.CYCLE)],
+            "linestyle": "-" if whole else style.DASHES[1:][(number - 1) % 6],
+            "linewidth": 1.2 if not whole else 1.8 if len(curves) == 1 else 4.0,
+            "alpha": 0.35 if whole and len(curves) > 1 else 1.0,
+        }
+        stiffness, below = _steps(samples)
+        left.plot(stiffness * row.factor, 1 - below, label=label, **look)
+        right.plot(stiffness * row.factor, below, **look)
+    for axes, name in ((left, "probability of being stable"), (right, "risk of instability")):
+        style.panel(axes, f"stiffness K, {row.unit}", name)
+    right.set_yscale("log")
+    right.set_ylim(LOWEST_RISK, 1.0)
+    _percentages(right)
+    _marks(right, table, row.factor)
+    left.set_ylim(-0.02, 1.02)
+    _reach(left, right, [samples for _, samples in curves], row.factor)
+    if len(curves) > 1:
+        figure.legend(
+            *left.get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=_columns(label for label, _ in curves),
+            fontsize=style.SMALL + 0.5,
+            frameon=False,
+        )
+    return figure
+
+
+def _columns(labels: Iterable[str]) -> int:
+    """How many entries of a legend stand side by side on the page's width."""
+    widest = 0.45 + 0.06 * max(len(label) for label in labels)
+    return min(max(int(style.WIDTH_IN / widest), 1), 4)
+
+
+def _curves(table: LimitTable) -> list[tuple[str, NDArray[Any]]]:
+    if len(table.cases) == 1:
+        return [(table.cases[0].label, table.cases[0].limit.samples)]
+    order = sorted(table.cases, key=lambda case: case.limit.quantile(0.05))
+    own = [(case.label, case.limit.samples) for case in order[:SHOWN]]
+    return [("in every case", table.samples), *own]
+
+
+def _finite(samples: NDArray[Any]) -> NDArray[Any]:
+    known = samples[np.isfinite(samples)]
+    return known if len(known) else np.ones(1)
+
+
+def _steps(samples: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Stiffness and the share of draws below it, thinned to what a figure can show."""
+    ordered = np.sort(samples)
+    share = (np.arange(len(ordered)) + 0.5) / len(ordered)
+    tail = np.geomspace(LOWEST_RISK, 0.02, 60)
+    wanted = np.unique(np.r_[tail, np.linspace(0.02, 1.0, 200)])
+    kept = np.unique(np.clip(np.searchsorted(share, wanted), 0, len(ordered) - 1))
+    kept = kept[np.isfinite(ordered[kept])]
+    return np.r_[0.0, ordered[kept]], np.r_[0.0, share[kept]]
+
+
+def _reach(left: Axes, right: Axes, curves: list[NDArray[Any]], factor: float) -> None:
+    """From where the first curve leaves the risk of 0.05 % to where the last one has ended."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+    ends = np.array([np.quantile(_finite(samples), (0.0005, 0.5, 0.9995)) for samples in curves])
+    low, high = ends[:, 0].min() * factor, ends[0, 2] * factor
+    for axes in (left, right):
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+    margin = 0.06 * (high - low) or 0.01 * high or 1.0
+    right.set_xlim(max(low - margin, 0.0), max(ends[0, 1] * factor, low) + margin)
+    high = ends[:, 2].max() * factor
+    if low > 0 and high > LOG_BEYOND * low:
+        left.set_xscale("log")
+        left.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
+        left.xaxis.set_major_formatter(FuncFormatter(style.plain))
+        left.xaxis.set_minor_formatter(NullFormatter())
+        left.set_xlim(low / 1.1, high * 1.1)
+    else:
+        left.set_xlim(max(low - margin, 0.0), high + margin)
+
+
+def _percentages(axes: Axes) -> None:
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+
+    axes.yaxis.set_major_locator(FixedLocator([0.001, 0.01, 0.05, 0.1, 0.5, 1.0]))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _marks(axes: Axes, table: LimitTable, factor: float) -> None:
+    for risk, stiffness in zip(table.risks, table.stiffness, strict=True):
+        if stiffness is not None:
+            axes.plot(
+                [stiffness * factor],
+                [risk],
+                "o",
+                color=style.OTHER,
+                markersize=4.5,
+                zorder=6,
+                label=f"{stiffness * factor:.4g} at {percent(risk)}",
+            )
+    if any(value is not None for value in table.stiffness):
+        style.legend(axes, loc="lower right", handlelength=1.0)

@@ -1,0 +1,106 @@
+"""The probability that a wall is stable over stiffness and damping, with the rules beside it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.quantities import percent, scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from bayeshaptic.report.walls.rules import Rules
+    from bayeshaptic.stability.walls.limit_table import FilterLimits, LimitTable
+
+# Stable with at least these probabilities, from the surest on.
+PROBABILITIES = (0.999, 0.99, 0.95, 0.75, 0.5, 0.25, 0.05, 0.01, 0.001)
+DARK, LIGHT = 0.62, 0.06
+
+
+def draw(table: LimitTable, rules: Rules | None) -> Figure:
+    """One panel for each way to get the velocity."""
+    count = len(table.filters)
+    figure = style.new_figure(3.5)
+    panels = np.atleast_1d(figure.subplots(1, count, sharey=False))
+    for axes, part in zip(panels, table.filters, strict=True):
+        _panel(axes, part, table, rules)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=3,
+        fontsize=style.SMALL + 0.5,
+        frameon=False,
+    )
+    return figure
+
+
+def _panel(axes: Axes, part: FilterLimits, table: LimitTable, rules: Rules | None) -> None:
+    top = float(part.quantile(0.999)[np.isfinite(part.quantile(0.999))].max(initial=0.0))
+    k, b = scale(top or 1.0, table.unit), scale(float(part.damping[-1]), table.damping_unit)
+    damping = part.damping * b.factor
+    style.panel(axes, f"damping B, {b.unit}", f"stiffness K, {k.unit}", title=part.kind.label)
+    below = np.zeros_like(damping)
+    shades = np.linspace(DARK, LIGHT, len(PROBABILITIES))
+    for probability, shade in zip(PROBABILITIES, shades, strict=True):
+        limit = np.minimum(part.quantile(1 - probability), 10 * top) * k.factor
+        limit = np.maximum(limit, below)
+        axes.fill_between(damping, below, limit, color=style.MODEL, alpha=shade, linewidth=0)
+        below = limit
+    for number, risk in enumerate(table.risks):
+        boundary = part.boundary(risk)
+        if boundary is not None:
+            reached = slice(0, np.count_nonzero(boundary.stiffness > 0) + 1)
+            axes.plot(
+                damping[reached],
+                boundary.stiffness[reached] * k.factor,
+                color=style.DATA,
+                linewidth=1.1,
+                linestyle=style.DASHES[number],
+                label=f"{percent(risk)} risk of instability",
+            )
+    axes.set_xlim(0, 1.04 * damping[-1] or 1.0)
+    axes.set_ylim(0, 1.12 * top * k.factor or 1.0)
+    if rules is not None:
+        _rules(axes, rules, part.damping[-1], b.factor, k.factor)
+
+
+def _rules(axes: Axes, rules: Rules, last: float, b: float, k: float) -> None:
+    """The rules of thumb; each is drawn as far as the panel reaches."""
+    damping: NDArray[Any] = np.linspace(0.0, last, 200)
+    axes.plot(
+        damping * b,
+        rules.rigid(damping) * k,
+        color=style.OTHER,
+        linewidth=1.3,
+        linestyle="--",
+        label="(b + B)/(T/2 + td)",
+    )
+    passive = damping <= rules.damping
+    ends = np.r_[damping[passive], rules.damping]
+    axes.plot(
+        ends * b,
+        rules.passive(ends) * k,
+        color=style.CYCLE[2],
+        linewidth=1.3,
+        linestyle="-.",
+        label="passive: b > K T/2 + |B|",
+    )
+    quantised = rules.quantised
+    if quantised is not None:
+        axes.plot(
+            [0.0],
+            [quantised * k],
+            ">",
+            color=style.CYCLE[3],
+            markersize=7,
+            clip_on=False,
+            zorder=6,
+            label="passive with friction and encoder",
+        )

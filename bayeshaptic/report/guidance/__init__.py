@@ -1,0 +1,1 @@
+"""The section about where the uncertainty comes from and what to do next."""

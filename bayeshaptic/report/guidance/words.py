@@ -1,0 +1,165 @@
+"""Sentences and rows about where the uncertainty comes from, and what to change or measure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bayeshaptic.report.figures.style import short
+from bayeshaptic.report.quantities import percent, pure, quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bayeshaptic.inference.next_experiment import Experiment
+    from bayeshaptic.stability.guidance.elasticities import Elasticities
+    from bayeshaptic.stability.guidance.guidance import Guidance
+    from bayeshaptic.stability.guidance.shares import Share, VarianceShares
+    from bayeshaptic.stability.guidance.sweep import Sweep
+
+_DB = 20 / np.log(10)
+_NAMED = 0.05  # shares that a sentence names
+_OVERLAP = 1.1
+_MOST = 4
+_KNOWN_DB = 0.05  # a limit known to this sd needs no further recording
+_FLAT = 0.02  # relative change that is none
+
+
+@dataclass(frozen=True)
+class Words:
+    """What `guidance.jinja` says."""
+
+    lead: str
+    overlap: str
+    raise_it: str
+    sweeps: tuple[str, ...]
+    next: str
+
+
+def words(guidance: Guidance, experiments: Sequence[Experiment]) -> Words:
+    """The sentences of the section."""
+    return Words(
+        _lead(guidance.shares),
+        _overlap(guidance.shares),
+        _raise(guidance.elasticities),
+        tuple(_sweep(one) for one in guidance.sweeps),
+        _next(guidance.shares, experiments),
+    )
+
+
+def experiment_rows(
+    shares: VarianceShares, experiments: Sequence[Experiment]
+) -> tuple[tuple[str, str, str], ...]:
+    """Further recordings: what, by how much narrower, and what the limit would be known to."""
+    return tuple(
+        (
+            one.title,
+            f"{100 * one.ratio:.0f} %",
+            f"± {pure(_DB * shares.log_sd * one.ratio, 2)} dB",
+        )
+        for one in experiments
+    )
+
+
+def _lead(shares: VarianceShares) -> str:
+    named = [share for share in shares.shares if share.share >= _NAMED][:_MOST]
+    parts = [f"{_name(share)} ({percent(round(share.share, 2))})" for share in named]
+    if shares.beyond >= _NAMED:
+        parts.append(f"effects and what is unexplained ({percent(round(shares.beyond, 2))})")
+    spread = f"± {pure(_DB * shares.log_sd, 2)} dB (one standard deviation)"
+    if not parts:
+        return f"The critical stiffness is known to {spread}; no parameter stands out in that."
+    return f"The uncertainty of K_CR, {spread}, comes from {_listed(parts)}."
+
+
+def _name(share: Share) -> str:
+    names = [short(name) for name in share.names]
+    if len(names) == 1:
+        return names[0]
+    return f"{_listed(names)} together"
+
+
+def _overlap(shares: VarianceShares) -> str:
+    text = (
+        "A share is the part of the variance that would go if this parameter were known. "
+        "Parameters whose ranks correlate beyond 0.7 are taken together, because the data fix a "
+        "combination of them and none by itself."
+    )
+    together = shares.together
+    if together > _OVERLAP:
+        return (
+            f"{text} The shares add up to {percent(together)}: what is told of one parameter is "
+            "told of others that correlate with it less than that, too."
+        )
+    return text
+
+
+def _raise(found: Sequence[Elasticities]) -> str:
+    sentences = []
+    for one in found[:2]:
+        if one.crossing.probability < _NAMED:
+            continue
+        middle = one.median
+        order = sorted(middle, key=lambda name: -abs(middle[name]))
+        parts = [
+            f"of {short(name)} by {middle[name]:+.2g} %".replace("-", "\N{MINUS SIGN}")
+            for name in order[:3]
+            if abs(middle[name]) > _FLAT
+        ]
+        if parts:
+            sentences.append(
+                f"Where the {_lower(one.crossing.label)} sets the limit (probability "
+                f"{percent(one.crossing.probability)}), it changes with 1 % more "
+                f"{', '.join(parts)}."
+            )
+    return " ".join(sentences)
+
+
+def _sweep(one: Sweep) -> str:
+    now = float(np.interp(one.now, one.values, one.middle))
+    unit = one.stiffness_unit
+    if one.added:
+        end = float(one.middle[-1])
+        added = quantity(float(one.values[-1] - one.values[0]), one.unit)
+        what = f"{added} more damping at {one.name}"
+    else:
+        end = float(np.interp(2 * one.now, one.values, one.middle))
+        what = f"Twice the stiffness {one.name}" if one.name[0] == "k" else f"Twice {one.name}"
+    text = f"{what} takes the median limit from {quantity(now, unit)} to {quantity(end, unit)}."
+    if abs(end / now - 1) < _FLAT:
+        text = f"{what} leaves the limit where it is ({quantity(now, unit)})."
+    for jump in one.jumps[:2]:
+        text += (
+            f" Above {one.name} = {quantity(jump.value, one.unit)} the {jump.after} at "
+            f"{quantity(jump.after_hz, 'Hz')} binds, below it the {jump.before} at "
+            f"{quantity(jump.before_hz, 'Hz')}."
+        )
+    return text
+
+
+def _next(shares: VarianceShares, experiments: Sequence[Experiment]) -> str:
+    if not experiments:
+        return ""
+    best = experiments[0]
+    spread = _DB * shares.log_sd
+    after = pure(spread * best.ratio, 2)
+    text = (
+        f"Of the further recordings below, each as long as this one, {best.title} would narrow "
+        f"K_CR most: from ± {pure(spread, 2)} dB to ± {after} dB."
+    )
+    if spread < _KNOWN_DB:
+        text += (
+            " But the limit is known better already than a wall needs: what the model lacks "
+            "matters more than what more data would say."
+        )
+    return text
+
+
+def _lower(label: str) -> str:
+    return label if label.startswith("Nyquist") else label[:1].lower() + label[1:]
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

@@ -1,0 +1,1 @@
+"""What closing the loop found, in words and tables."""

@@ -1,0 +1,95 @@
+"""What inverse dynamics says of a recording with feedback: sentences and rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bayeshaptic.report.quantities import pure, quantity, scale
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.feedback.explain import ForceExplained
+    from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics
+    from bayeshaptic.report.tables import Rows
+
+_DASH = "\N{EN DASH}"
+
+
+def found(force: ForceExplained, unit: str) -> str:
+    """One paragraph: what the motion explains of the force, and with which terms."""
+    linear, *added = force.further.steps
+    why = (
+        "The force was computed from the motion, so the measured response is biased, and so is all "
+        "that is read from it. The equation of motion holds in spite of the feedback: below "
+        f"{quantity(force.further.cutoff_hz, 'Hz')}, a mass with a damper and a constant force "
+        f"leaves {quantity(linear.held_out_rms, unit)} rms of the force unexplained"
+    )
+    if not added:
+        return f"{why}, and no further term lowers that."
+    first = titles(force.further)[added[0].term]
+    text = f"{why}. The model lacked {first}: it cuts that to "
+    text += quantity(added[0].held_out_rms, unit)
+    if len(added) > 1:
+        text += (
+            f"; {len(added) - 1} more term{'s' if len(added) > 2 else ''} to "
+            f"{quantity(added[-1].held_out_rms, unit)}"
+        )
+    return f"{text}. Each error is that of one half of the recording with the other half's numbers."
+
+
+def in_short(force: ForceExplained, unit: str) -> str:
+    """One sentence for the top of the page and the command line."""
+    linear, *added = force.further.steps
+    before = quantity(linear.held_out_rms, unit)
+    if not added:
+        return f"By inverse dynamics, a linear model leaves {before} rms of the force."
+    first = titles(force.further)[added[0].term]
+    return (
+        f"By inverse dynamics, which feedback does not bias, the model lacked {first}: the force "
+        f"that is not explained falls from {before} to {quantity(added[0].held_out_rms, unit)} rms "
+        "with it."
+    )
+
+
+def titles(found: InverseDynamics) -> dict[str, str]:
+    """What each term is, by its name."""
+    return {term.name: term.title for term in found.terms}
+
+
+def steps(force: ForceExplained, unit: str) -> Rows:
+    """A row a term, in the order in which they were added: (what was added, error)."""
+    named = titles(force.further)
+    start = ", ".join(term.title for term in force.further.terms[:3])
+    return tuple(
+        (named.get(step.term, start), quantity(step.held_out_rms, unit))
+        for step in force.further.steps
+    )
+
+
+def coefficients(force: ForceExplained) -> Rows:
+    """A row a coefficient: (what it is, with the first term only, with all terms)."""
+    inner = titles(force.first)
+    return tuple(
+        (
+            term.title,
+            _value(force.first, term.name, term.unit) if term.name in inner else _DASH,
+            _value(force.further, term.name, term.unit),
+        )
+        for term in force.further.terms
+    )
+
+
+def remains(force: ForceExplained) -> str:
+    """What is left of the force, all of it fitted."""
+    first, further = (pure(100 * f.relative_error, 3) for f in (force.first, force.further))
+    return (
+        f"What is left is {first} % of the force with the first term and {further} % with all of "
+        "them. The terms beyond the first describe this recording and are no law, and with them a "
+        "coefficient means something else than without. No limit follows from this: for a critical "
+        "stiffness, record with an external excitation."
+    )
+
+
+def _value(found: InverseDynamics, name: str, unit: str) -> str:
+    value, sd = found[name]
+    row = scale(value, unit)
+    return f"{row.number(value, sd)} ± {row.number(sd, sd)} {row.unit}".rstrip()

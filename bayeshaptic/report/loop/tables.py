@@ -1,0 +1,209 @@
+"""The rows of the tables of a closed loop, as text that needs no further formatting."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic.report.loop.words import parameter_words, shown_estimates
+from bayeshaptic.report.quantities import estimate, pure, quantity, scale
+from bayeshaptic.report.tables import ParameterRow, Rows
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.diagnosis.residuals.residual import Test
+    from bayeshaptic.diagnosis.state import Accepted
+
+_DASH = "\N{EN DASH}"
+_SHOWN = 8
+_TESTS = {
+    "bands": "residual, band by band",
+    "total": "residual over all frequencies",
+    "smooth change": "a smooth change of the response",
+    "sign(v)": "a force like sign(v), as dry friction",
+    "v|v|": "a force like v|v|, as drag",
+    "v^3": "a force like v\N{SUPERSCRIPT THREE}",
+    "x^3": "a force like x\N{SUPERSCRIPT THREE}, as a hardening spring",
+    "x^2": "a force like x\N{SUPERSCRIPT TWO}",
+    "u^3": "a command that acts like u\N{SUPERSCRIPT THREE}, as saturation",
+    "stretch^3": "a cubic force in the connection",
+    "clipped stretch": "a gap in the connection",
+    "a steady change": "a steady change during the recording",
+    "a change and back": "a change during the recording, and back",
+}
+
+
+@dataclass(frozen=True)
+class EffectRows:
+    """An accepted effect: its parameters, and what speaks for it.
+
+    Attributes
+    ----------
+    title, family : str
+    name : str
+        As in ``summary.json``.
+    parameters : rows of (what it is, estimate, 90 % interval)
+    evidence : str
+    ties : str
+        What this recording cannot tell from it; empty where there is nothing.
+    told_apart_by : str
+    """
+
+    title: str
+    name: str
+    family: str
+    parameters: Rows
+    evidence: str
+    ties: str
+    told_apart_by: str
+
+
+def found(closed: Closed) -> tuple[EffectRows, ...]:
+    """Every accepted effect, in the order in which it was found."""
+    return tuple(
+        EffectRows(
+            effect.title,
+            effect.name,
+            effect.family,
+            _parameters(closed, effect, known["parameters"]),
+            _sentence(effect.evidence),
+            ", ".join(name.replace("_", " ") for name in effect.ties),
+            _sentence(effect.told_apart_by),
+        )
+        for effect, known in zip(closed.effects, closed.diagnosis["effects"], strict=True)
+    )
+
+
+def candidates(closed: Closed) -> Rows:
+    """The candidates of each round, best first: (round, effect, score, what became of it)."""
+    rows: list[tuple[str, ...]] = []
+    tried = closed.traced.candidates
+    for number in sorted({c.round for c in tried}):
+        ranked = sorted((c for c in tried if c.round == number), key=lambda c: -c.score)
+        others = {t.name for t in closed.traced.rejected} if number == tried[-1].round else set()
+        for candidate in ranked[:_SHOWN]:
+            if candidate.accepted:
+                fate = "accepted"
+            elif candidate.name in others:
+                fate = "predicts too, but less or with more parameters"
+            else:
+                fate = "does not predict" if candidate.score <= 0 else "not accepted"
+            rows.append((str(number), candidate.title, _score(candidate.score), fate))
+    return tuple(rows)
+
+
+def unshown(closed: Closed) -> int:
+    """How many candidates the table leaves out."""
+    return len(closed.traced.candidates) - len(candidates(closed))
+
+
+def outcomes(closed: Closed) -> Rows:
+    """(what was asked, class, threshold, before, after), with a word where it is flagged."""
+    later = {test.name: test for test in closed.traced.after}
+    return tuple(
+        (
+            question(test),
+            test.family,
+            pure(test.threshold),
+            _outcome(test),
+            *([_outcome(later.get(test.name))] if closed.effects else []),
+        )
+        for test in closed.traced.before
+    )
+
+
+def question(test: Test) -> str:
+    """What a test asks."""
+    return _TESTS.get(test.name, test.name)
+
+
+def errors(closed: Closed) -> Rows:
+    """(what, before, after) of the error table of ``summary.json``."""
+    before, after, unit = closed.before, closed.after, closed.analysis.limit.unit
+
+    def row(title: str, key: str, suffix: str) -> tuple[str, ...]:
+        return (title, *(_number(e[key], suffix) for e in (before, after)))
+
+    def limits(e: Mapping[str, Any]) -> str:
+        q = e["critical_stiffness"]
+        if not all(math.isfinite(value) for value in q.values()):
+            return _DASH
+        return estimate(q["q50"], q["q05"], q["q95"], unit)
+
+    return (
+        row("residual over the noise, all data", "weighted_rms", ""),
+        row("residual over the noise, data held out", "held_out_weighted_rms", ""),
+        row("gain, model minus measurement (rms)", "gain_db_rms", " dB"),
+        row("phase, model minus measurement (rms)", "phase_deg_rms", "\N{DEGREE SIGN}"),
+        ("critical stiffness, median (90 %)", limits(before), limits(after)),
+        row("median, model minus the measurement's own", "critical_stiffness_db", " dB"),
+    )
+
+
+def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
+    """Rows for the parameter table: of effects whose numbers are not in the posterior."""
+    rows = []
+    for effect, known in zip(closed.effects, closed.diagnosis["effects"], strict=True):
+        for name in shown_estimates(effect):
+            value = known["parameters"][name]
+            row = scale(value["mean"], value["unit"])
+            sd = value["sd"]
+            error = f" ± {row.number(sd, sd)}" if sd else ""
+            spread = f"{row.number(value['q05'], sd)} to {row.number(value['q95'], sd)}"
+            rows.append(
+                ParameterRow(
+                    name,
+                    parameter_words(name),
+                    row.unit,
+                    _DASH,
+                    row.number(value["mean"], sd) + error,
+                    spread if sd else _DASH,
+                    _DASH,
+                    _DASH,
+                    _DASH,
+                    f"{effect.title}: estimated beside the posterior",
+                )
+            )
+    return tuple(rows)
+
+
+def _parameters(closed: Closed, effect: Accepted, known: Mapping[str, Any]) -> Rows:
+    rows = []
+    for name in (*effect.parameters, *shown_estimates(effect)):
+        value = known[name]
+        row = scale(value["mean"], value["unit"])
+        sd = value["sd"]
+        title = (
+            closed.model.parameter(name).title
+            if name in effect.parameters
+            else parameter_words(name)
+        )
+        error = f" ± {row.number(sd, sd)}" if sd else ""
+        middle = f"{row.number(value['mean'], sd)}{error} {row.unit}".rstrip()
+        ends = f"{row.number(value['q05'], sd)} to {row.number(value['q95'], sd)} {row.unit}"
+        rows.append((title, middle, ends.rstrip() if sd else _DASH))
+    return tuple(rows)
+
+
+def _sentence(text: str) -> str:
+    return text and f"{text[0].upper()}{text[1:].rstrip('.')}."
+
+
+def _outcome(test: Test | None) -> str:
+    if test is None:
+        return _DASH
+    return f"{_score(test.statistic)}{', flagged' if test.flagged else ''}"
+
+
+def _score(value: float) -> str:
+    """One decimal where the number is small, none where it is large."""
+    if not math.isfinite(value):
+        return _DASH
+    text = f"{value:,.1f}" if abs(value) < 99.95 else f"{value:,.0f}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def _number(value: float | None, suffix: str) -> str:
+    return _DASH if value is None or not math.isfinite(value) else quantity(value, "") + suffix

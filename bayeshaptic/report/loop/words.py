@@ -1,0 +1,266 @@
+"""What closing the loop found, in sentences."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bayeshaptic.diagnosis.loop import CONSISTENT, UNEXPLAINED
+from bayeshaptic.report.estimates import decibel
+from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.quantities import estimate, interval, pretty_unit, pure, quantity, scale
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.diagnosis.residuals.residual import Test
+    from bayeshaptic.diagnosis.state import Accepted
+
+_SAME = 0.005  # relative change of an error that is not worth a word
+_SAME_DB = 0.05
+_LESS = 0.9  # of the noise, to be worth a word
+_OVER = "_last_over_first"
+_WORST = "worst_part"  # the evidence says which
+_MOST_NUMBERS = 3
+# Titles with one of these words take no article.
+_UNCOUNTABLE = {"backlash", "damping", "delay", "drag", "friction", "quantisation", "stiffness"}
+_PLURAL = {"rows", "samples", "saturation", "steps"}
+
+MEASURE_NEXT = {
+    "linear": "Record the device with a known mass fixed to the part that you suspect: the mode "
+    "that moves belongs to it. An accelerometer on the base or on the handle shows motion that the "
+    "encoder does not see.",
+    "nonlinear": "Record at half and at twice the force: what changes with the level is not "
+    "linear. A relay experiment measures the limit itself, at its own amplitude.",
+    "time-varying": "Record for a shorter time, and with nobody holding the device: if it still "
+    "changes, look for warmth and play in the device, else at the grip.",
+    "measurement": "Record with the force at zero: what the encoder shows then is not the "
+    "device. Look at the resolution, the time stamps and the cable of the encoder.",
+}
+
+
+def verdict(closed: Closed) -> tuple[str, ...]:
+    """The paragraphs that open the section: what was found, and what it did."""
+    if closed.verdict == CONSISTENT:
+        return (_nothing(closed),)
+    found = (lacked(closed),) if closed.effects else ()
+    if closed.verdict == UNEXPLAINED:
+        return (*found, *_remainder(closed))
+    return (*found, "What is left is noise: no test finds anything more.")
+
+
+def lacked(closed: Closed) -> str:
+    """What was added and what it changed, in one paragraph."""
+    named = [f"{_with_article(e.title)}{_numbers(closed, e)}" for e in closed.effects]
+    count = sum(_count(effect) for effect in closed.effects)
+    it = "it" if len(named) == 1 else "them"
+    size = f" ({count} parameter{'' if count == 1 else 's'})" if count else ""
+    return (
+        f"The model lacked {' and '.join(named)}; adding {it}{size} {_error_change(closed)}"
+        f"{_noise_change(closed)}; {_limit_change(closed)}."
+    )
+
+
+def in_short(closed: Closed) -> str:
+    """One sentence for the top of the page."""
+    if closed.force is not None:
+        return force_words.in_short(closed.force, closed.base.etfe.force_unit)
+    if closed.verdict == CONSISTENT:
+        return "The model as declared explains the recording to within its noise."
+    if not closed.effects:
+        return ""
+    names = " and ".join(_with_article(effect.title) for effect in closed.effects)
+    return f"The model as declared lacked {names}; here it is in the model. {_moved(closed)}."
+
+
+def names(closed: Closed) -> str:
+    """The titles of what was found."""
+    return ", ".join(effect.title for effect in closed.effects)
+
+
+def scope(closed: Closed) -> str:
+    """What else is different in the rest of the page."""
+    families = {effect.family for effect in closed.effects}
+    found = []
+    if families & {"nonlinear", "measurement"}:
+        found.append("the measured response is drawn without what these add to it")
+    if "time-varying" in families:
+        found.append("of what changes over time, the worst part or state counts")
+    return "".join(f"; {text}" for text in found)
+
+
+def force_caption(closed: Closed) -> str:
+    """Under the curves of the force."""
+    if any(effect.family == "nonlinear" for effect in closed.effects):
+        return (
+            "Force that the linear model leaves over, with error bars of two standard deviations. "
+            "Before, the fit hides as much of it as it can in dampers and springs; the triangles "
+            "show all of it; after, nothing but noise should be left."
+        )
+    return (
+        "Force that the model leaves over, with error bars of two standard deviations; a "
+        "horizontal line at zero would be noise."
+    )
+
+
+def worst(tests: tuple[Test, ...]) -> Test | None:
+    """The test that is furthest beyond its threshold, or nearest to it."""
+    return max(tests, key=lambda test: test.excess, default=None)
+
+
+def parameter_words(name: str) -> str:
+    """What an estimate that is no parameter of the model is, from its name."""
+    if name.endswith(_OVER):
+        return f"{name.removesuffix(_OVER)}, last part of the recording over the first"
+    return name.replace("_", " ")
+
+
+def shown_estimates(effect: Accepted) -> tuple[str, ...]:
+    """Names of the numbers beside the posterior that say something by themselves."""
+    return tuple(name for name in effect.estimates if name != _WORST)
+
+
+def plus_minus(mean: float, sd: float | None, unit: str) -> str:
+    """A number with its error and unit: ``"0.590 ± 0.020 N"``."""
+    row = scale(mean, unit)
+    error = f" ± {row.number(sd, sd)}" if sd and math.isfinite(sd) else ""
+    return f"{row.number(mean, sd)}{error} {row.unit}".rstrip()
+
+
+def _nothing(closed: Closed) -> str:
+    tests = closed.traced.before
+    top = worst(tests)
+    nearest = "" if top is None else f" The nearest to its threshold: {top.text}."
+    return (
+        f"Nothing to find: {len(tests)} tests of the residual were made, and none found more than "
+        f"noise would give.{nearest} Nothing was added to the model."
+    )
+
+
+def _remainder(closed: Closed) -> tuple[str, ...]:
+    left = [test for test in closed.traced.after if test.flagged]
+    top = worst(tuple(left))
+    assert top is not None
+    families = dict.fromkeys(test.family for test in sorted(left, key=lambda t: -t.excess))
+    more = "more " if closed.effects else ""
+    where = "" if top.frequency_hz is None else f", around {quantity(top.frequency_hz, 'Hz')}"
+    first = (
+        f"There is something {more}here that has no name in the library. Its class is "
+        f"{' and '.join(families)}{where}: {top.text}, where {pure(top.threshold)} would raise "
+        f"suspicion. {_tried(closed)}"
+    )
+    advice = [MEASURE_NEXT[family] for family in families if family in MEASURE_NEXT]
+    if "linear" in families and closed.model.name == "grasped":
+        advice.append("Record it with nobody holding it, too: then the hand is not in question.")
+    return first, _widened(closed), f"What to measure next: {' '.join(advice)}"
+
+
+def _tried(closed: Closed) -> str:
+    # The last round is the one that found nothing for what is left.
+    last = max((c.round for c in closed.traced.candidates), default=0)
+    tried = [c for c in closed.traced.candidates if c.round == last and not c.accepted]
+    if not tried:
+        return "No effect of the library that could be behind it explains any of it."
+    names = ", ".join(c.title for c in sorted(tried, key=lambda c: -c.score))
+    return (
+        f"Tried without success, the best first: {names}. None of them predicts the part of the "
+        "recording that it was not fitted to well enough to be believed."
+    )
+
+
+def _widened(closed: Closed) -> str:
+    from bayeshaptic.stability.critical import critical_stiffness
+
+    limit = closed.analysis.limit
+    narrow = critical_stiffness(closed.analysis.posterior)
+    before = interval(narrow.quantile(0.05), narrow.quantile(0.95), limit.unit)
+    after = interval(limit.quantile(0.05), limit.quantile(0.95), limit.unit)
+    return (
+        f"The critical stiffness was widened for it: the 90 % interval goes from {before} to "
+        f"{after}. Use its lower end."
+    )
+
+
+def _count(effect: Accepted) -> int:
+    """Numbers that an effect adds; none are named where whole groups vary over time."""
+    if effect.family == "time-varying":
+        return 0
+    return len(effect.parameters) + len(effect.estimates)
+
+
+def _numbers(closed: Closed, effect: Accepted) -> str:
+    """The effect's parameters in brackets; of a drift the one that changed most."""
+    posterior = closed.analysis.posterior.summary()
+    model = closed.analysis.model
+    shown = [
+        f"{model.parameter(name).title} {plus_minus(found['mean'], found['sd'], found['unit'])}"
+        for name in effect.parameters
+        if (found := posterior.get(name)) is not None
+    ]
+    changed = {
+        name: value.mean
+        for name, value in effect.estimates.items()
+        if name.endswith(_OVER) and value.mean > 0
+    }
+    if changed:
+        most = max(changed, key=lambda name: abs(math.log(changed[name])))
+        shown.append(f"{most.removesuffix(_OVER)} ends at {pure(changed[most])} times its start")
+    else:
+        shown += [
+            f"{parameter_words(name)} {plus_minus(value.mean, value.sd, value.unit)}"
+            for name, value in effect.estimates.items()
+        ]
+    return f" ({', '.join(shown[:_MOST_NUMBERS])})" if shown else ""
+
+
+def _error_change(closed: Closed) -> str:
+    before, after = (e["held_out_weighted_rms"] for e in (closed.before, closed.after))
+    if abs(after / before - 1) < _SAME:
+        return f"left the held-out error at {_times(after)} times the noise"
+    verb = "cut" if after < before else "raised"
+    return f"{verb} the held-out error from {_times(before)} to {_times(after)} times the noise"
+
+
+def _noise_change(closed: Closed) -> str:
+    """What had passed for noise: a force that is not linear scatters the response."""
+    old, new = closed.base.fit, closed.analysis.fit
+    if old.windows is None or new.windows is None:
+        return ""
+    if len(old.windows.scatter) != len(new.windows.scatter):
+        return ""
+    ratio = new.likelihood.noise_variance / old.likelihood.noise_variance
+    share = float(np.sqrt(np.median(ratio)))
+    return f", and the noise itself to {pure(share, 2)} of what it seemed" if share < _LESS else ""
+
+
+def _times(error: float) -> str:
+    """Three digits, also where they are zeros."""
+    return quantity(error, "")
+
+
+def _limit_change(closed: Closed) -> str:
+    before, after = (e["critical_stiffness"] for e in (closed.before, closed.after))
+    unit = closed.analysis.limit.unit
+    old, new = before["q50"], after["q50"]
+    if not (old > 0 and new > 0 and math.isfinite(old) and math.isfinite(new)):
+        return f"K_CR went from {quantity(old, unit)} to {quantity(new, unit)}"
+    step = decibel(new) - decibel(old)
+    if abs(step) < _SAME_DB:
+        return f"K_CR stayed at {estimate(new, after['q05'], after['q95'], unit)}"
+    row = scale((old, new), unit)
+    gap = abs(new - old) / 20
+    change = f"{step:+.1f} dB".replace("-", "\N{MINUS SIGN}")
+    return f"K_CR moved from {row.number(old, gap)} to {row.number(new, gap)} {row.unit} ({change})"
+
+
+def _moved(closed: Closed) -> str:
+    text = _limit_change(closed)
+    return text.replace("K_CR", "With that the median limit", 1)
+
+
+def _with_article(title: str) -> str:
+    words = set(pretty_unit(title).lower().replace("(", "").replace(")", "").split())
+    if title.startswith(("a ", "an ", "the ")) or words & (_UNCOUNTABLE | _PLURAL):
+        return title
+    return f"{'an' if title[0].lower() in 'aeiou' else 'a'} {title}"

@@ -1,0 +1,79 @@
+"""The page of a study: one device, all its recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from bayeshaptic import __version__
+from bayeshaptic.report.assumptions import versions
+from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
+from bayeshaptic.report.html import LABELS, embedded, style, template, unique, written
+from bayeshaptic.report.study import tables as study_tables
+from bayeshaptic.report.study.assumptions import assumptions
+from bayeshaptic.report.study.headline import study_headline, what_binds
+from bayeshaptic.report.study.words import configurations, hands, missing, people
+
+if TYPE_CHECKING:
+    from bayeshaptic.study.analysis import StudyAnalysis
+
+
+def render_study(
+    study: StudyAnalysis,
+    pictures: Mapping[str, bytes],
+    pages: Mapping[str, str],
+    parts: Sequence[str] = (),
+) -> str:
+    """The page.
+
+    Parameters
+    ----------
+    study : StudyAnalysis
+    pictures : mapping of str to bytes
+        PNG by name.
+    pages : mapping of str to str
+        Where each recording's own report is, relative to this page.
+    parts : sequence of str
+        Further sections, as HTML.
+    """
+    head = study_headline(study)
+    words = {picture.name: picture.alternative for picture in STUDY_PICTURES}
+    return template("study.jinja").render(
+        study=study,
+        version=__version__,
+        style=style(),
+        headline=head,
+        label=LABELS[head.status],
+        notices=unique(tuple(n for n in study.notices if n.topic != "recordings")),
+        failed=study.failed,
+        tables=study_tables,
+        pages=dict(pages),
+        trials=any(
+            o.entry.trial is not None or o.entry.level is not None for o in study.recordings
+        ),
+        binds=what_binds(study) if study.limit is not None else "",
+        hands=hands(study),
+        people=people(study),
+        people_caption=_people_caption(study),
+        correlations=study_tables.correlations(study.population) if study.population else (),
+        configurations=configurations(study),
+        parts=tuple(parts),
+        lacking=missing(study),
+        pictures={name: embedded(name, png, words.get(name, "")) for name, png in pictures.items()},
+        assumptions=assumptions(study),
+        versions=versions(),
+        written=written(),
+    )
+
+
+def _people_caption(study: StudyAnalysis) -> str:
+    text = (
+        "Above: the critical stiffness for a person who was not recorded, one colour and hatching "
+        "for each crossing that may limit it."
+    )
+    if any(reference.held for reference in study.study.references):
+        text += " Triangles: limits known from elsewhere, which took no part in the analysis."
+    return (
+        f"{text} Below: everybody who was recorded, by their own recording alone and together with "
+        "what all people say; bars are 90 % intervals."
+    )

@@ -1,0 +1,230 @@
+"""The rows of a study's tables, as text that needs no further formatting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bayeshaptic.report.estimates import RISKS, decibel
+from bayeshaptic.report.quantities import interval, percent, pure, quantity, scale
+from bayeshaptic.report.study.words import spread_db
+from bayeshaptic.report.summary import QUANTILES
+from bayeshaptic.report.tables import Rows
+from bayeshaptic.stability.critical import ENOUGH_BELOW
+from bayeshaptic.study.recorded_cases import place_of
+
+if TYPE_CHECKING:
+    from bayeshaptic.inference.population.infer import Population
+    from bayeshaptic.stability.cases import Case
+    from bayeshaptic.study.analysis import Analysed, StudyAnalysis
+
+_DASH = "\N{EN DASH}"
+_LEVELS = tuple(QUANTILES.values())
+_MOST_CASES = 8
+_FEWEST = 20  # different draws, for an interval
+
+
+def device(study: StudyAnalysis) -> Rows:
+    """What the device is and what was recorded of it: (what, value)."""
+    found = study.device
+    users, places = study.study.users, _places(study)
+    rows = [
+        ("Device", f"{found.name} ({found.kind})"),
+        ("Study", study.study.path.name),
+        ("Recordings", str(len(study.recordings))),
+        ("Held by", ", ".join(users) or "nobody"),
+        ("Configurations", ", ".join(places) or "one, not named"),
+    ]
+    if found.period_s:
+        rows.append(("Sampling period", quantity(found.period_s, "s")))
+    if found.delay_s is not None:
+        rows.append(("Loop delay", quantity(found.delay_s, "s")))
+    if found.lever_m:
+        rows.append(("Lever arm", quantity(found.lever_m, "m")))
+    return tuple(rows)
+
+
+def _places(study: StudyAnalysis) -> list[str]:
+    places = {one.entry.configuration for one in study.recordings} - {None}
+    return [str(place) for place in sorted(places, key=lambda p: (isinstance(p, str), p))]
+
+
+def recordings(study: StudyAnalysis, pages: dict[str, str]) -> tuple[dict[str, Any], ...]:
+    """A row a recording that could be used; `page` links its own report where there is one."""
+    return tuple(
+        {
+            "name": one.name,
+            "page": pages.get(one.name),
+            "cells": _recording(one),
+        }
+        for one in study.recordings
+        if one.analysis is not None
+    )
+
+
+def _recording(one: Analysed) -> tuple[str, ...]:
+    analysis, entry = one.analysis, one.entry
+    assert analysis is not None
+    low, middle, high = analysis.limit.quantile(_LEVELS)
+    parts = [str(part) for part in (entry.trial, entry.level) if part is not None]
+    return (
+        entry.user or "nobody",
+        "" if entry.configuration is None else str(entry.configuration),
+        ", ".join(parts),
+        analysis.model.name,
+        ", ".join(effect.replace("_", " ") for effect in one.effects) or _DASH,
+        f"{decibel(middle):.2f}",
+        interval(low, high, analysis.limit.unit),
+    )
+
+
+def safe(study: StudyAnalysis) -> Rows:
+    """The stiffness at each risk: (risk, over all cases, dB, a person not yet seen)."""
+    assert study.limit is not None
+    unit = study.limit.unit
+    rows = []
+    for risk in RISKS:
+        value = study.limit.safe(risk)
+        row = [percent(risk), "not stated" if value is None else _four(value, unit)]
+        row.append(_DASH if not value else f"{decibel(value):.2f}")
+        if study.new_person:
+            person = study.new_person[0].limit.safe(risk)
+            row.append(_DASH if person is None else _four(person, unit))
+        rows.append(tuple(row))
+    return tuple(rows)
+
+
+def unstated(study: StudyAnalysis) -> str:
+    """Why there is no stiffness at some risk; empty where there is one at each."""
+    assert study.limit is not None
+    risk = next((risk for risk in RISKS if study.limit.safe(risk) is None), None)
+    if risk is None:
+        return ""
+    probable = {found.case for found in study.limit.binding if found.probability > 0}
+    binding = [case for case in study.cases if case.label in probable]
+    case = min(binding, key=lambda one: one.limit.effective_below(risk))
+    below = case.limit.effective_below(risk)
+    if below >= ENOUGH_BELOW:
+        return "Not stated where less than 20 effective draws of all cases together lie below."
+    return (
+        f"Not stated where less than {ENOUGH_BELOW} effective draws lie below: at {percent(risk)} "
+        f"there are {below:.0f} for {case.label}."
+    )
+
+
+def binding(study: StudyAnalysis) -> Rows:
+    """Every case: (case, group, median in dB, 90 % interval, probability that it binds)."""
+    assert study.limit is not None
+    cases = {case.label: case for case in study.cases}
+    rows = []
+    for found in study.limit.binding[:_MOST_CASES]:
+        limit = cases[found.case].limit
+        low, middle, high = limit.quantile(_LEVELS)
+        rows.append(
+            (
+                found.case,
+                f"{decibel(middle):.2f}",
+                interval(low, high, limit.unit),
+                percent(found.probability),
+            )
+        )
+    return tuple(rows)
+
+
+def unshown_cases(study: StudyAnalysis) -> int:
+    """How many cases the table leaves out."""
+    assert study.limit is not None
+    return max(len(study.limit.binding) - _MOST_CASES, 0)
+
+
+def users(study: StudyAnalysis) -> Rows:
+    """Every user: (user, own recording alone in dB, given all people in dB, sd of each)."""
+    alone = raw_limits(study)
+    rows = []
+    for case in study.users:
+        own = alone.get(case.label, ())
+        given: tuple[str, ...] = ("too few draws to say", _DASH, _DASH, _DASH)
+        if has_draws(case):
+            given = (
+                *(f"{decibel(case.limit.quantile(p)):.2f}" for p in (0.5, 0.05, 0.95)),
+                pure(spread_db(case), 2),
+            )
+        middles = ", ".join(f"{decibel(one.quantile(0.5)):.2f}" for one in own)
+        rows.append((case.label.removeprefix("user "), middles or _DASH, *given))
+    return tuple(rows)
+
+
+def has_draws(case: Case) -> bool:
+    """Whether a case has enough different draws for an interval, and not a few weighted ones."""
+    return len(np.unique(case.limit.samples)) >= _FEWEST
+
+
+def raw_limits(study: StudyAnalysis) -> dict[str, tuple[Any, ...]]:
+    """Limits of each user's recordings by themselves, by the label of the user's case."""
+    found: dict[str, tuple[Any, ...]] = {}
+    for case in study.users:
+        found[case.label] = tuple(
+            one.analysis.limit
+            for one in study.recordings
+            if one.analysis is not None and one.entry.user is not None and belongs(one, case)
+        )
+    return found
+
+
+def belongs(one: Analysed, case: Case) -> bool:
+    """Whether a recording is of the user, and the configuration, of a case."""
+    user = f"user {one.entry.user}"
+    return case.label in (user, user + place_of(one.entry.configuration))
+
+
+def population(found: Population) -> Rows:
+    """Every hand parameter: (name, what it is, typical person, 90 %, spread between people)."""
+    rows = []
+    for number, name in enumerate(found.parameters):
+        unit, title = found.model.unit(name), found.model.parameter(name).title
+        low, middle, high = np.exp(np.quantile(found.log_mean[:, number], _LEVELS))
+        row = scale((middle, high), unit)
+        spread = (high - low) / 3.29
+        wide = 100 * np.quantile(found.log_sd[:, number], _LEVELS)
+        rows.append(
+            (
+                name,
+                title,
+                f"{row.number(middle, spread)} {row.unit}",
+                f"{row.number(low, spread)} to {row.number(high, spread)}",
+                f"{pure(wide[1], 2)} %",
+                f"{pure(wide[0], 2)} to {pure(wide[2], 2)} %",
+            )
+        )
+    return tuple(rows)
+
+
+def correlations(found: Population) -> Rows:
+    """The strongest correlations between hand parameters over people: (pair, median, 90 %)."""
+    names, rows = found.parameters, []
+    for i in range(len(names)):
+        for j in range(i + 1, len(names)):
+            low, middle, high = np.quantile(found.correlation[:, i, j], _LEVELS)
+            rows.append((abs(middle), (f"{names[i]}, {names[j]}", middle, low, high)))
+    strongest = sorted(rows, key=lambda row: -row[0])[:3]
+    return tuple((pair, *(pure(v, 2) for v in values)) for _, (pair, *values) in strongest)
+
+
+def crossings(cases: Sequence[Case]) -> Rows:
+    """What limits a person not yet seen: (crossing, median frequency, probability)."""
+    return tuple(
+        (c.label, quantity(c.frequency_hz, "Hz", digits=4), percent(c.probability))
+        for c in cases[0].limit.crossings
+    )
+
+
+def provenance(study: StudyAnalysis) -> Rows:
+    """Where this comes from: (what, value)."""
+    seconds = sum(study.seconds.values())
+    return (("Took", f"{seconds:.0f} s"),)
+
+
+def _four(value: float, unit: str) -> str:
+    return quantity(value, unit, digits=4)

@@ -1,0 +1,192 @@
+"""What a study says, in sentences."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bayeshaptic.report.estimates import decibel
+from bayeshaptic.report.quantities import estimate, percent, pure
+from bayeshaptic.report.study.bands import band_of
+from bayeshaptic.stability.cases import CONFIGURATION, FREE
+
+if TYPE_CHECKING:
+    from bayeshaptic.stability.cases import Case
+    from bayeshaptic.study.analysis import StudyAnalysis
+
+_HARDLY_DB = 0.15  # a spread of K_CR between people that nobody needs to care about
+_LITTLE_DB = 0.5
+_AS_BAD_DB = 1.0
+_CONFIGURATION = ", configuration "
+Z90 = 3.29  # width of a normal 90 % interval in standard deviations
+
+
+def is_free(label: str, group: str) -> bool:
+    """Whether nobody holds the device in a case, recorded or predicted along a coordinate."""
+    return group == FREE or (group == CONFIGURATION and label.endswith("nobody holds it"))
+
+
+def hands(study: StudyAnalysis) -> str:
+    """Free or held: which is worse, and by how much."""
+    free = [case for case in study.cases if is_free(case.label, case.group)]
+    held = [case for case in study.cases if not is_free(case.label, case.group)]
+    if not free or not held:
+        return ""
+    alone, in_hand = (_median_db(cases) for cases in (free, held))
+    step = in_hand - alone
+    if abs(step) < _AS_BAD_DB:
+        return (
+            f"A hand makes little difference: the median limit is {alone:.1f} dB without one and "
+            f"{in_hand:.1f} dB held."
+        )
+    if step > 0:
+        return (
+            f"A hand helps: the median limit is {alone:.1f} dB without one and {in_hand:.1f} dB "
+            f"held. A wall that is to be safe when the user lets go must be {step:.1f} dB softer."
+        )
+    return (
+        f"A hand makes it worse: the median limit is {alone:.1f} dB without one and "
+        f"{in_hand:.1f} dB held."
+    )
+
+
+def people(study: StudyAnalysis) -> tuple[str, ...]:
+    """How much people move the limit."""
+    if not study.new_person:
+        return ()
+    case = study.new_person[0]
+    where = f" (in configuration {_place(case)})" if len(study.new_person) > 1 else ""
+    spread = spread_db(case)
+    middle, low, high = case.limit.quantile([0.5, 0.05, 0.95])
+    seen = estimate(middle, low, high, case.limit.unit)
+    if spread < _HARDLY_DB:
+        first = (
+            "People hardly move the critical stiffness of this device: for a person not yet seen"
+            f"{where} it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does "
+            "not matter for the limit, and more people would not narrow it."
+        )
+    else:
+        size = "a little, " if spread < _LITTLE_DB else ""
+        first = (
+            f"People move the critical stiffness of this device {size}by {pure(spread, 2)} dB "
+            f"(sd): for a person not yet seen{where} it is {seen}."
+        )
+    branches = [c for c in case.limit.crossings if c.probability >= 0.01]
+    found = [first]
+    if len(branches) > 1:
+        named = listed([f"{c.label} ({percent(c.probability)})" for c in branches])
+        found.append(f"What limits it differs from person to person: {named}.")
+    elsewhere = _elsewhere(study)
+    if elsewhere:
+        found.append(elsewhere)
+    apart = _between(study)
+    if apart:
+        found.append(apart)
+    return tuple(found)
+
+
+def _elsewhere(study: StudyAnalysis) -> str:
+    """A new person in the other configurations."""
+    first, *others = study.new_person
+    if not others:
+        return ""
+    parts = []
+    for case in others:
+        low, middle, high = (decibel(case.limit.quantile(p)) for p in (0.05, 0.5, 0.95))
+        parts.append(f"{middle:.1f} dB ({low:.1f} to {high:.1f}) in configuration {_place(case)}")
+    return (
+        f"Most people were recorded in configuration {_place(first)}: wherever a new person's "
+        f"limit is one number, it is the limit there. Elsewhere it is {listed(parts)}; the limit "
+        "of the device counts all of them."
+    )
+
+
+def _between(study: StudyAnalysis) -> str:
+    """The lowest and the highest of the people that were seen in one configuration."""
+    place = _place(study.new_person[0])
+    seen = [case for case in study.users if _place(case) == place]
+    if len(seen) < 2:
+        return ""
+    order = sorted(seen, key=lambda case: case.limit.quantile(0.5))
+    (low, least), (high, most) = (
+        (decibel(case.limit.quantile(0.5)), _user(case)) for case in (order[0], order[-1])
+    )
+    blur = float(np.median([spread_db(case) for case in seen]))
+    same = (
+        " That is no more than what one recording leaves open, so that these people cannot be "
+        "told apart by it."
+        if high - low < 2 * blur
+        else ""
+    )
+    return (
+        f"Of those who were recorded{' there' if place else ''}, {least} has the lowest limit "
+        f"({low:.2f} dB) and {most} the highest ({high:.2f} dB).{same}"
+    )
+
+
+def _place(case: Case) -> str:
+    """The configuration in the label of a case; empty without one."""
+    return case.label.partition(_CONFIGURATION)[2]
+
+
+def _user(case: Case) -> str:
+    return case.label.partition(_CONFIGURATION)[0].removeprefix("user ")
+
+
+def spread_db(case: Case) -> float:
+    """Standard deviation of a limit in dB, from its 90 % interval."""
+    low, high = (decibel(case.limit.quantile(p)) for p in (0.05, 0.95))
+    return (high - low) / Z90 if math.isfinite(low) and math.isfinite(high) else math.inf
+
+
+def missing(study: StudyAnalysis) -> tuple[str, ...]:
+    """What cannot be said of this device, because it was not recorded."""
+    entries = [one.entry for one in study.recordings if one.result is not None]
+    users = {entry.user for entry in entries if entry.user is not None}
+    places = {entry.configuration for entry in entries if entry.configuration is not None}
+    found = []
+    if not users:
+        found.append(
+            "Nobody holds the device in any recording: how people change the limit, for better or "
+            "worse, is unknown."
+        )
+    elif len(users) == 1:
+        found.append(
+            "One user only: how much people differ is the prior's guess, not this study's finding."
+        )
+    if entries and all(entry.user is not None for entry in entries):
+        found.append(
+            "No recording without a user: when the user lets go the limit may be far lower."
+        )
+    if len(places) < 2:
+        found.append("One configuration only: in others the limit may be different.")
+    return tuple(found)
+
+
+def _median_db(cases: list[Case]) -> float:
+    return min(decibel(case.limit.quantile(0.5)) for case in cases)
+
+
+def listed(parts: list[str]) -> str:
+    """ "a, b and c"."""
+    if len(parts) < 2:
+        return "".join(parts)
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def configurations(study: StudyAnalysis) -> tuple[str, ...]:
+    """Where along the coordinate the limit is lowest, free and held."""
+    found = []
+    for one in study.configurations:
+        band = band_of(one)
+        who = "Held" if one.held else "With nobody holding it"
+        low, high = decibel(band.middle.min()), decibel(band.middle.max())
+        sure = float(one.worst_probability.max())
+        found.append(
+            f"{who}, the median limit goes from {low:.1f} to {high:.1f} dB over the configurations "
+            f"from {pure(band.coordinates[0])} to {pure(band.coordinates[-1])}; the worst is most "
+            f"probably near {pure(one.worst_coordinate)} ({percent(sure)} among those looked at)."
+        )
+    return tuple(found)

@@ -1,0 +1,126 @@
+"""Writing the report of a study: one page for the device, everything or nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import uuid
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
+from bayeshaptic.report.guidance.section import guidance_section
+from bayeshaptic.report.study.headline import study_headline
+from bayeshaptic.report.study.page import render_study
+from bayeshaptic.report.study.population_json import population_json
+from bayeshaptic.report.walls.section import limits_section, table_of
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.report.section import Section
+    from bayeshaptic.stability.cases import Case
+    from bayeshaptic.study.analysis import StudyAnalysis
+
+# Whoever waits for a report looks for its numbers: they arrive when the rest is there.
+_LAST = "population.json"
+_MAY_BE_MISSING = ("limits.json", "limits.csv", "index.html")
+
+
+def write_study_report(
+    study: StudyAnalysis,
+    out_dir: str | Path,
+    pages: Mapping[str, str | Path] | None = None,
+    walls: bool = True,
+) -> Path:
+    """Write report.html, population.json, limits.json, limits.csv and the figures of a study.
+
+    The files are made in a hidden folder and moved when all of them are there: an interrupted run
+    leaves what was there before. Other files in `out_dir` stay.
+
+    Parameters
+    ----------
+    study : StudyAnalysis
+    out_dir : str or Path
+        Made where it is missing, with its parents.
+    pages : mapping of str to path, optional
+        Where each recording's own report is, by the recording's name; linked relative to `out_dir`.
+    walls : bool
+        Whether to go into stable walls (stiffness and damping) and what would raise the limit.
+
+    Returns
+    -------
+    Path
+        Of report.html.
+
+    Raises
+    ------
+    InputError
+        If `out_dir` is a file.
+    """
+    out = Path(out_dir).resolve()
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out_dir}: is a file; name a folder for the report.")
+    out.mkdir(parents=True, exist_ok=True)
+    draft = out / f".report-{uuid.uuid4().hex[:12]}"
+    draft.mkdir()
+    links = {name: _link(Path(page), out) for name, page in (pages or {}).items()}
+    try:
+        _write_all(study, draft, links, walls)
+        _move(draft, out)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+    return out / "report.html"
+
+
+def _write_all(study: StudyAnalysis, folder: Path, links: Mapping[str, str], walls: bool) -> None:
+    pictures = draw_study_pictures(study)
+    sections = _sections(study, folder) if walls else []
+    for shown in (pictures, *(part.pictures for part in sections)):
+        for name, png in shown.items():
+            (folder / f"{name}.png").write_bytes(png)
+    page = render_study(study, pictures, links, [part.html for part in sections])
+    (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
+    (folder / _LAST).write_text(population_json(study), encoding="utf-8", newline="\n")
+
+
+def _sections(study: StudyAnalysis, folder: Path) -> list[Section]:
+    """Stable walls over all cases, with their files; and what would raise the limit."""
+    if study.limit is None:
+        return []
+    status = study_headline(study).status
+    table = table_of(study.cases)
+    table.write(folder, study.device.name, status)
+    walls = limits_section(
+        table, resolution=study.device.encoder_resolution, untrusted=status == "untrusted"
+    )
+    first = study.limit.binding[0].case
+    case = next(case for case in study.cases if case.label == first)
+    advice = guidance_section(case, _analysis_of(case, study))
+    return [walls] if advice is None else [walls, advice]
+
+
+def _analysis_of(case: Case, study: StudyAnalysis) -> Analysis | None:
+    """The recording that a case is, where it is one alone."""
+    return next(
+        (
+            one.analysis
+            for one in study.recordings
+            if one.analysis and one.analysis.limit is case.limit
+        ),
+        None,
+    )
+
+
+def _link(page: Path, out: Path) -> str:
+    return Path(os.path.relpath(page.resolve(), out)).as_posix()
+
+
+def _move(draft: Path, out: Path) -> None:
+    older = (*_MAY_BE_MISSING, *(f"{picture.name}.png" for picture in STUDY_PICTURES))
+    for name in older:  # one of an older report would contradict this one
+        if not (draft / name).exists():
+            (out / name).unlink(missing_ok=True)
+    for path in sorted(draft.iterdir(), key=lambda path: path.name == _LAST):
+        os.replace(path, out / path.name)

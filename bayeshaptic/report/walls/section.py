@@ -1,0 +1,94 @@
+"""The section about stable walls: for one recording, or for all cases of a device."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bayeshaptic.report.figures.walls import curve as limits_curve
+from bayeshaptic.report.figures.walls import kb as limits_kb
+from bayeshaptic.report.section import Section, section
+from bayeshaptic.report.summary import analysis_of, closed_of
+from bayeshaptic.report.walls.rules import rules_of
+from bayeshaptic.report.walls.words import rule_rows, width_rows, words
+from bayeshaptic.stability.cases import FREE, HELD, Case
+from bayeshaptic.stability.walls.damping import Damping
+from bayeshaptic.stability.walls.limit_table import LimitTable, limit_table
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+DRAWS = 2400
+_SLOW_DRAWS = 2000  # of a model without a finite set of poles
+_FRICTION = "friction_force"
+
+
+def limits_section(
+    table: LimitTable,
+    friction: float | None = None,
+    resolution: float | None = None,
+    untrusted: bool = False,
+) -> Section:
+    """HTML and pictures: P(stable | K), P(stable | K, B), Z-width, rules.
+
+    Parameters
+    ----------
+    table : LimitTable
+        Of one case or several.
+    friction, resolution : float, optional
+        Coulomb friction and one encoder count, for Abbott and Okamura's rule.
+    untrusted : bool
+        Whether the page says at its top that no limit can be relied on.
+    """
+    rules = rules_of(table.cases, friction, resolution)
+    figures = {
+        "limits_curve": (limits_curve.draw(table), "Probability of being stable over stiffness"),
+        "limits_kb": (limits_kb.draw(table, rules), "Stable walls by stiffness and damping"),
+    }
+    return section(
+        "limits.jinja",
+        figures,
+        words=words(table, rules),
+        widths=width_rows(table),
+        rules=rule_rows(table, rules),
+        untrusted=untrusted,
+    )
+
+
+def table_of(
+    cases: Sequence[Case], dampings: Sequence[Damping] | None = None, draws: int = DRAWS
+) -> LimitTable:
+    """The limits over some cases, with fewer draws where a model takes long to look at."""
+    slow = any(case.model.system(case.draws[:1]).dynamic_links for case in cases)
+    return limit_table(cases, dampings, draws=min(draws, _SLOW_DRAWS) if slow else draws)
+
+
+def case_of(result: Any) -> Case:
+    """An analysis, or what closing the loop returns, as a case by itself."""
+    analysis = analysis_of(result)
+    held = analysis.model.name == "grasped"
+    user = None if analysis.recording is None else analysis.recording.user
+    label = f"held by {user}" if user else "held" if held else "nobody holds it"
+    chains = np.swapaxes(analysis.posterior.chains, 1, 2)  # the order of the limit's samples
+    draws = chains.reshape(-1, chains.shape[-1])
+    return Case(label, HELD if held else FREE, analysis.model, draws, analysis.limit)
+
+
+def friction_of(result: Any) -> float | None:
+    """The Coulomb friction that closing the loop found, or None."""
+    closed = closed_of(result)
+    for effect in () if closed is None else closed.effects:
+        if _FRICTION in effect.estimates:
+            return float(effect.estimates[_FRICTION].mean)
+    return None
+
+
+def resolution_of(analysis: Analysis) -> float | None:
+    """One encoder count, from the recording or the device file."""
+    for source in (analysis.recording, analysis.device):
+        found = getattr(source, "encoder_resolution", None)
+        if found:
+            return float(found)
+    return None

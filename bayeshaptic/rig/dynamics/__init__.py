@@ -1,0 +1,1 @@
+"""The mechanics of the bench: structure, plant, forces, time steps."""

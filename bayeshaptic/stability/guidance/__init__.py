@@ -1,0 +1,1 @@
+"""What moves the limit: shares of the uncertainty, elasticities, sweeps."""

@@ -1,0 +1,1 @@
+"""Relay experiments: a second witness of the critical stiffness."""

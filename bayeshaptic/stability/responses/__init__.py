@@ -1,0 +1,1 @@
+"""Responses as the search for crossings reads them."""

@@ -1,0 +1,107 @@
+"""The response of a loop with dynamic links (delayed forces, hysteresis): no finite set of poles.
+
+It is that of the rational part, from its poles, and what the links add: see
+`models/response/remainder.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.models.response.remainder import (
+    Aliases,
+    Remainder,
+    alias_sums,
+    aliases,
+    remainder_of,
+    smooth_aliases,
+)
+from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.stability.responses.evaluated import ends, held_at_rest
+from bayeshaptic.stability.responses.grid import search_grid
+from bayeshaptic.stability.responses.response import PoleResponse, pole_response
+
+Floats = NDArray[Any]
+Complexes = NDArray[Any]
+Rows = NDArray[np.int_]
+
+_BEYOND = np.geomspace(np.pi, 100 * np.pi, 60)  # angles above the grid's last one
+
+
+@dataclass(frozen=True)
+class LinkedResponse:
+    """The response of a rational part and a remainder.
+
+    Attributes
+    ----------
+    rational : PoleResponse
+    remainder : Remainder
+    aliases : Aliases
+    rough : ndarray of bool, shape (B,)
+        Where the aliases are to be summed term by term.
+    delay : ndarray, shape (B,)
+        Of the remainder, in periods.
+    period_s : float
+    log_points : int
+    """
+
+    rational: PoleResponse
+    remainder: Remainder
+    aliases: Aliases
+    rough: NDArray[np.bool_]
+    delay: Floats
+    period_s: float
+    log_points: int = 250
+
+    @property
+    def features(self) -> Complexes:
+        return self.rational.features
+
+    def at(self, rows: Rows, theta: Floats) -> Complexes:
+        return self.rational.at(rows, theta) + self._added(rows, theta.T).T
+
+    def _added(self, rows: Rows, theta: Floats) -> Complexes:
+        """What the links add at angles of shape (k, M)."""
+        s = 1j * theta / self.period_s
+        part = self.remainder.rows(rows)
+        late = np.exp(-1j * theta * self.delay[rows])
+        if not self.rational.exact:
+            return part.at(s) * late
+        value = part.at(s) / s + self.aliases.at(theta, rows)
+        rough = self.rough[rows]
+        if rough.any():
+            delay_s = self.delay[rows[rough]] * self.period_s
+            sums = alias_sums(part.rows(rough), theta[:, rough], delay_s, self.period_s)
+            value[:, rough] += sums - self.aliases.at(theta[:, rough], rows[rough])
+        return -np.expm1(-1j * theta) / self.period_s * late * value
+
+    def at_ends(self) -> tuple[Floats, Floats]:
+        return ends(self, self.rational.exact)
+
+    def stable_at_rest(self) -> NDArray[np.bool_]:
+        """As for the rational part, and no pole to the right of the imaginary axis by the links.
+
+        Their number is how often the return difference 1 + lambda h_ee goes round the origin.
+        """
+        every = np.arange(len(self.delay))
+        theta = search_grid(self, slice(0, len(every)))
+        beyond = np.broadcast_to(_BEYOND, (len(every), len(_BEYOND)))
+        s = 1j * np.concatenate([theta, beyond], axis=1).T / self.period_s
+        phase = np.unwrap(np.angle(self.remainder.return_difference(s)), axis=0)
+        quiet = np.abs(phase[-1] - phase[0]) < np.pi
+        return self.rational.stable_at_rest() & quiet & held_at_rest(self)
+
+
+def linked_response(system: LinearSystem, period_s: float, exact: bool = True) -> LinkedResponse:
+    """The response of a system with dynamic links: exact, or the continuous approximation."""
+    rational = pole_response(system.rational_part, period_s, exact)
+    remainder = remainder_of(system)
+    series = aliases(remainder, np.pi, system.delay_s, period_s)
+    fastest = np.abs(np.linalg.eigvals(system.mechanism.state_matrix())).max(axis=1) * period_s
+    rough = ~smooth_aliases(fastest, np.pi)
+    delay = system.delay_s / period_s + (0.0 if exact else 0.5)
+    return LinkedResponse(rational, remainder, series, rough, delay, period_s)

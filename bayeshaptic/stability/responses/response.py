@@ -1,0 +1,190 @@
+"""Responses as the crossing search reads them: any batch row at any of its own frequencies.
+
+Frequencies are angles theta = w T in (0, pi].  With the delay split as td = d T + e, poles p_i and
+residues r_i, and phi(x) = expm1(x) / x, the exact sampled response is
+
+    G = z^-d  sum_i  [ r_i (T - e) phi(p_i (T-e)) + z^-1 r_i exp(p_i (T-e)) e phi(p_i e) ]
+                     / [ (z - 1) - expm1(p_i T) ]
+
+The differences from 1 are formed without cancellation, so crossings at micro-hertz are as accurate
+as those at the Nyquist frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.models.response.sampled import phi
+from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.types import Complexes, Floats
+
+Rows = NDArray[np.int_]
+
+_DOUBLE = 1e-6  # poles closer than this, relative to their size, are moved apart to it
+_SLOW = 1e-10  # and closer than this in radians a sample, beside zero
+
+
+class Response(Protocol):
+    """What the search for crossings needs to know of a batch of loops.
+
+    Attributes
+    ----------
+    delay : ndarray, shape (B,)
+        Whole loop delay in periods: how fast the phase turns at high frequency.
+    features : ndarray of complex, shape (B, n)
+        Poles times T, where the response may turn quickly; n may be 0.
+    log_points : int
+        Points of the logarithmic grid that leave no turn out, beside those around its features.
+    """
+
+    @property
+    def delay(self) -> Floats: ...
+
+    @property
+    def features(self) -> Complexes: ...
+
+    @property
+    def log_points(self) -> int: ...
+
+    def at(self, rows: Rows, theta: Floats) -> Complexes:
+        """Values of rows (M,) at angles (M, k), shape (M, k)."""
+
+    def at_ends(self) -> tuple[Floats, Floats]:
+        """Real limits at theta -> 0 (infinite: integrator) and at pi (nan: none)."""
+
+    def stable_at_rest(self) -> NDArray[np.bool_]:
+        """Whether the loop is stable for K -> 0+, shape (B,)."""
+
+
+@dataclass(frozen=True)
+class PoleResponse:
+    """The response of a loop that has finitely many poles.
+
+    Attributes
+    ----------
+    poles, residues : ndarray of complex, shape (B, n)
+        Of the continuous transfer function, times T each.
+    direct, late : ndarray of complex, shape (B, n)
+        Numerators of each pole's term: without and with a further z^-1.
+    centre : ndarray of complex, shape (B, n)
+        What is subtracted in the denominator.
+    delay : ndarray, shape (B,)
+        Delay factor e^{-j theta delay}.
+    integrators : ndarray of int, shape (B,)
+        How many poles are exactly at zero.
+    exact : bool
+        False: the continuous approximation P(s) e^{-s (td + T/2)}.
+    """
+
+    poles: Complexes
+    residues: Complexes
+    direct: Complexes
+    late: Complexes
+    centre: Complexes
+    delay: Floats
+    integrators: NDArray[np.int_]
+    exact: bool
+    log_points: int = 60
+
+    @property
+    def features(self) -> Complexes:
+        return self.poles
+
+    def at(self, rows: Rows, theta: Floats) -> Complexes:
+        return self.terms(rows, theta).sum(axis=0)
+
+    def terms(self, rows: Rows, theta: Floats) -> Complexes:
+        """The contribution of each pole, shape (n, M, k)."""
+        half = np.exp(0.5j * theta)
+        back = np.conj(half) ** 2
+        point = 2j * np.sin(0.5 * theta) * half if self.exact else 1j * theta
+        direct, late, centre = (
+            table[rows].T[:, :, None] for table in (self.direct, self.late, self.centre)
+        )
+        terms = direct + late * back
+        terms /= point - centre
+        delay = self.delay[rows]
+        if np.any(delay):
+            terms *= np.exp(-1j * theta * delay[:, None])
+        return terms
+
+    def at_ends(self) -> tuple[Floats, Floats]:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            static = -(self.residues / self.poles).sum(axis=1).real
+        static = np.where(self.integrators == 0, static, np.inf)
+        if not self.exact:  # real at no particular frequency
+            return static, np.full(len(static), np.nan)
+        nyquist = ((self.direct - self.late) / (-2.0 - self.centre)).sum(axis=1).real
+        return static, nyquist * np.cos(np.pi * self.delay)
+
+    def stable_at_rest(self) -> NDArray[np.bool_]:
+        """Poles inside the unit circle, or on it and leaving it inwards as K grows.
+
+        Near a pole z0 on the circle with residue R the closed-loop pole is z0 - K R, so it goes
+        inwards where Re(conj(z0) R) > 0.
+        """
+        scale = np.abs(self.poles).max(axis=1, keepdims=True)
+        marginal = np.abs(self.poles.real) <= 1e-10 * scale
+        z0 = np.exp(np.where(marginal, self.poles, 0.0))
+        residue = (self.direct + self.late / z0) * z0 ** -self.delay[:, None]
+        outwards = (np.conj(z0) * residue).real < 0
+        unstable = np.where(marginal, outwards, self.poles.real > 0).any(axis=1)
+        return ~unstable & (self.integrators < 2)
+
+
+def pole_response(system: LinearSystem, period_s: float, exact: bool = True) -> PoleResponse:
+    """The response of `system` from its poles: exact, or the continuous approximation."""
+    poles, residues, integrators = _simple_poles(system, period_s)
+    p, r = poles * period_s, residues * period_s
+    delay = system.delay_s / period_s
+    if not exact:
+        none = np.zeros_like(r)
+        return PoleResponse(p, r, r, none, p, delay + 0.5, integrators, exact=False)
+    whole = np.floor(delay)
+    late = (delay - whole)[:, None]
+    early = 1.0 - late
+    direct = r * early * phi(p * early)
+    second = r * np.exp(p * early) * late * phi(p * late)
+    return PoleResponse(p, r, direct, second, np.expm1(p), whole, integrators, exact=True)
+
+
+def _simple_poles(
+    system: LinearSystem, period_s: float
+) -> tuple[Complexes, Complexes, NDArray[np.int_]]:
+    """Poles, residues and the number of integrators, with double poles moved apart.
+
+    Moving a double pole to p +- h changes the denominator by h^2 relative to |s - p|^2, and costs
+    eps |s - p| / h in rounding: both far below 1e-6 wherever a crossing can be.
+    """
+    poles = system.poles()[0]
+    numerator, denominator = system.transfer()
+    poles = np.take_along_axis(poles, np.argsort(np.abs(poles), axis=1), axis=1)
+    integrators = np.cumprod(denominator == 0, axis=0).sum(axis=0)
+    at_zero = np.arange(poles.shape[1]) < integrators[:, None]
+    poles[at_zero] = 0.0
+    gaps = _gaps(poles)
+    apart = np.maximum(_DOUBLE * np.abs(poles), _SLOW / period_s)
+    near = np.abs(gaps) < apart[:, :, None]
+    rows = np.flatnonzero(near.any(axis=(1, 2)))
+    if rows.size:
+        near = near[rows]
+        rank = np.tril(near, -1).sum(axis=2) - 0.5 * near.sum(axis=2)
+        poles[rows] += 2j * rank * apart[rows]
+        gaps[rows] = _gaps(poles[rows])
+    # Nothing may sit on the line where the response is read.
+    poles.real = np.where((poles.real == 0) & ~at_zero, -1e-14 * np.abs(poles), poles.real)
+    residues = evaluate(numerator, poles.T).T / (denominator[-1][:, None] * gaps.prod(axis=2))
+    return poles, residues, integrators
+
+
+def _gaps(poles: Complexes) -> Complexes:
+    """p_i - p_j, and 1 on the diagonal, shape (B, n, n)."""
+    gaps = poles[:, :, None] - poles[:, None, :]
+    diagonal = np.arange(poles.shape[1])
+    gaps[:, diagonal, diagonal] = 1.0
+    return gaps

@@ -1,0 +1,1 @@
+"""Walls with stiffness and damping: boundaries, regions, tables."""

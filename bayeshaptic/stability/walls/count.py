@@ -1,0 +1,42 @@
+"""How many closed-loop poles are outside the unit circle, by the boundaries that lie between."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.stability.walls.curve import Events, KbCurve, along_damping
+from bayeshaptic.types import Floats, Ints
+
+_MANY = 1000  # poles outside, of a loop that is never stable
+
+
+def unstable_at_start(curve: KbCurve, start: Floats, levels: Floats) -> Ints:
+    """Poles outside the unit circle at the stiffness `start` (n,) and dampings (J,); (n, J).
+
+    There are none at `start` without damping; many are said of a loop whose `start` is nan.
+    """
+    events = along_damping(curve, np.where(np.isnan(start), 1.0, start))
+    poles = np.zeros((len(start), len(levels)), int)
+    for number, level in enumerate(levels):
+        between = (events.place > min(level, 0)) & (events.place < max(level, 0))
+        change = np.bincount(events.row[between], events.poles[between], len(start))
+        poles[:, number] = np.sign(level) * np.rint(change)
+    poles[np.isnan(start)] = _MANY
+    return poles
+
+
+def beyond_start(
+    events: Events, rows: Ints, heights: Floats, levels: int, start: Floats
+) -> NDArray[np.int_]:
+    """Poles outside the unit circle at each height, less those at the start, (rows, J, I)."""
+    mine = (events.row >= rows[0]) & (events.row <= rows[-1])
+    row, level = events.row[mine] - rows[0], events.level[mine]
+    place, poles = events.place[mine], events.poles[mine]
+    reach = len(heights) + 1
+    cell = (row * levels + level) * reach + np.searchsorted(heights, place)
+    total = np.bincount(cell, poles, len(rows) * levels * reach)
+    passed = np.cumsum(total.reshape(len(rows), levels, reach), axis=2)[:, :, :-1]
+    below = place < np.nan_to_num(start)[rows][row]
+    first = np.bincount((row * levels + level)[below], poles[below], len(rows) * levels)
+    return np.rint(passed - first.reshape(len(rows), levels, 1)).astype(int)

@@ -1,0 +1,87 @@
+"""How a virtual wall's damping term gets its velocity from sampled positions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.types import Complexes, Floats
+
+
+class Damping(Protocol):
+    """A velocity estimate v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1]) / T with its smoothing a."""
+
+    @property
+    def label(self) -> str: ...
+
+    @property
+    def cutoff_hz(self) -> float | None: ...
+
+    def smoothing(self, period_s: float) -> float: ...
+
+
+@dataclass(frozen=True)
+class Backward:
+    """The backward difference, v[k] = (y[k] - y[k-1]) / T."""
+
+    @property
+    def label(self) -> str:
+        return "backward difference"
+
+    @property
+    def cutoff_hz(self) -> None:
+        return None
+
+    def smoothing(self, period_s: float) -> float:
+        """The factor a, 0 at any `period_s`."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """The backward difference behind a first-order low-pass filter.
+
+    v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1]) / T with the filter's pole where the continuous one
+    has it, a = exp(-2 pi cutoff T) (matched pole, no further delay).  Whoever smooths with a factor
+    a has the cut-off -ln(a) / (2 pi T).
+
+    Attributes
+    ----------
+    cutoff_hz : float
+
+    Raises
+    ------
+    InputError
+        If the cut-off is not above zero.
+    """
+
+    cutoff_hz: float
+
+    def __post_init__(self) -> None:
+        if not self.cutoff_hz > 0:
+            raise InputError(f"a low-pass cut-off of {self.cutoff_hz} Hz; give one above zero.")
+
+    @property
+    def label(self) -> str:
+        return f"low-pass at {self.cutoff_hz:.4g} Hz"
+
+    def smoothing(self, period_s: float) -> float:
+        """The factor a at a sampling period of `period_s` seconds."""
+        return math.exp(-2 * math.pi * self.cutoff_hz * period_s)
+
+
+def derivative(damping: Damping, theta: Floats, period_s: float) -> Complexes:
+    """D(e^{j theta}), of the shape of `theta`; its imaginary part is positive inside (0, pi)."""
+    a = damping.smoothing(period_s)
+    back = np.exp(-0.5j * theta)
+    return (1 - a) / period_s * 2j * np.sin(0.5 * theta) * back / (1 - a * back**2)
+
+
+def derivative_at_nyquist(damping: Damping, period_s: float) -> float:
+    """D(-1), a real number: 2/T for the backward difference."""
+    a = damping.smoothing(period_s)
+    return 2 * (1 - a) / (period_s * (1 + a))

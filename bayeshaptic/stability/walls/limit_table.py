@@ -1,0 +1,291 @@
+"""The limits as a table that a rendering program can load: `limits.json` and `limits.csv`."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayeshaptic import __version__
+from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
+from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.stability.walls.damping import Damping
+from bayeshaptic.stability.walls.joint import (
+    INSIDE,
+    JointRegion,
+    Lowest,
+    filtered,
+    joint_region,
+    lowest,
+    usual_dampings,
+)
+from bayeshaptic.stability.walls.region import DRAWS
+from bayeshaptic.stability.walls.source import loops_of
+from bayeshaptic.stability.walls.tail import Tail, lower_tail
+from bayeshaptic.stability.walls.width import Boundary, ZWidth, width_of
+from bayeshaptic.types import Floats
+
+RISKS = (0.05, 0.01, 0.001)
+ROWS = 25  # dampings a filter
+_FORMAT = "bayeshaptic limits 1"
+_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class FilterLimits:
+    """The stiffness that a wall may have over its damping, with one way to get the velocity.
+
+    Attributes
+    ----------
+    region : JointRegion
+    damping : ndarray, shape (J,)
+        Ascending from zero; the end of the boundary at each risk is among them.
+    limits : tuple of ndarray, shapes (n_c, J)
+        Limits of some draws of each case, each column in ascending order.
+    tails : tuple of Tail, or None
+        The lowest limits of more draws of each case, for small risks.
+    """
+
+    region: JointRegion = field(repr=False)
+    damping: Floats = field(repr=False)
+    limits: tuple[Floats, ...] = field(repr=False)
+    tails: tuple[Tail, ...] | None = field(repr=False, default=None)
+
+    @property
+    def kind(self) -> Damping:
+        return self.region.kind
+
+    def quantile(self, risk: float) -> Floats:
+        """The stiffness at that risk whether or not the draws are enough for it, shape (J,)."""
+        return self._lowest.quantile(risk)
+
+    def boundary(self, risk: float) -> Boundary | None:
+        """The stiffness at that risk; None where the draws are too few to state it."""
+        if self.region.says(risk):
+            return Boundary(risk, self.damping, self.quantile(risk))
+        if self.tails is None or risk > min(tail.risk for tail in self.tails):
+            return None
+        tails = lowest([tail.limits for tail in self.tails], [tail.total for tail in self.tails])
+        return Boundary(risk, self.damping, tails.quantile(risk))
+
+    @cached_property
+    def _lowest(self) -> Lowest:
+        return lowest(self.limits, [len(part) for part in self.limits])
+
+    def width(self, risk: float) -> ZWidth | None:
+        """How wide the range of walls is at that risk; None where the draws are too few."""
+        boundary = self.boundary(risk)
+        return None if boundary is None else width_of(boundary)
+
+
+@dataclass(frozen=True)
+class LimitTable:
+    """Limits at given risks over the cases of a device.
+
+    Attributes
+    ----------
+    cases : tuple of Case
+    risks : tuple of float
+    samples : ndarray, shape (n,)
+        K_CR of the joint draws over all cases, without damping.
+    stiffness : tuple of float or None
+        The stiffness without damping at each risk, over all cases.
+    by_case : tuple of tuple of float or None
+        The same of each case.
+    filters : tuple of FilterLimits
+    """
+
+    cases: tuple[Case, ...] = field(repr=False)
+    risks: tuple[float, ...]
+    samples: Floats = field(repr=False)
+    stiffness: tuple[float | None, ...]
+    by_case: tuple[tuple[float | None, ...], ...]
+    filters: tuple[FilterLimits, ...]
+
+    @property
+    def unit(self) -> str:
+        return self.cases[0].limit.unit
+
+    @property
+    def damping_unit(self) -> str:
+        return self.filters[0].region.damping_unit
+
+    def as_dict(self, device: str | None = None, status: str | None = None) -> dict[str, Any]:
+        """What `limits.json` holds, see docs/file-formats.md.
+
+        Parameters
+        ----------
+        device : str, optional
+        status : {"safe", "caution", "untrusted"}, optional
+            What the report says of these numbers.
+        """
+        return {
+            "format": _FORMAT,
+            "version": __version__,
+            "device": device,
+            "status": status,
+            "period_s": self.filters[0].region.period_s,
+            "stiffness_unit": self.unit,
+            "damping_unit": self.damping_unit,
+            "stiffness": self._by_risk(self.stiffness),
+            "cases": [
+                {"label": case.label, "group": case.group, "stiffness": self._by_risk(values)}
+                for case, values in zip(self.cases, self.by_case, strict=True)
+            ],
+            "boundaries": [self._boundary(part) for part in self.filters],
+        }
+
+    def as_json(self, device: str | None = None, status: str | None = None) -> str:
+        """`as_dict` of `device` and `status` as text; strict JSON."""
+        return json.dumps(self.as_dict(device, status), indent=1, allow_nan=False) + "\n"
+
+    def as_csv(self) -> str:
+        """One row a filter and damping; the units stand in the names of the columns."""
+        stiffness, damping = (_in_a_name(unit) for unit in (self.unit, self.damping_unit))
+        heads = ["damping_filter", "cutoff_hz", "smoothing", f"damping_{damping}"]
+        heads += [f"stiffness_{stiffness}_at_risk_{risk:g}" for risk in self.risks]
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(heads)
+        for part in map(self._boundary, self.filters):
+            columns = [part["stiffness"][f"{risk:g}"] for risk in self.risks]
+            for number, level in enumerate(part["damping"]):
+                values = ["" if c is None else c[number] for c in columns]
+                cutoff = "" if part["cutoff_hz"] is None else part["cutoff_hz"]
+                writer.writerow([part["damping_filter"], cutoff, part["smoothing"], level, *values])
+        return text.getvalue()
+
+    def write(
+        self, folder: str | Path, device: str | None = None, status: str | None = None
+    ) -> None:
+        """Write limits.json and limits.csv.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Which is there.
+        device, status : str, optional
+            As in `as_dict`.
+        """
+        for name, text in (
+            ("limits.csv", self.as_csv()),
+            ("limits.json", self.as_json(device, status)),
+        ):
+            (Path(folder) / name).write_text(text, encoding="utf-8", newline="\n")
+
+    def _by_risk(self, values: Sequence[float | None]) -> dict[str, float | None]:
+        return {f"{r:g}": _plain(v) for r, v in zip(self.risks, values, strict=True)}
+
+    def _boundary(self, part: FilterLimits) -> dict[str, Any]:
+        found = {f"{risk:g}": part.boundary(risk) for risk in self.risks}
+        return {
+            "damping_filter": "backward" if part.kind.cutoff_hz is None else "low_pass",
+            "cutoff_hz": part.kind.cutoff_hz,
+            "smoothing": part.kind.smoothing(part.region.period_s),
+            "damping": [_plain(level) for level in part.damping],
+            "stiffness": {
+                risk: None if b is None else [_plain(value) for value in b.stiffness]
+                for risk, b in found.items()
+            },
+        }
+
+
+def limit_table(
+    cases: Sequence[Case],
+    dampings: Sequence[Damping] | None = None,
+    risks: tuple[float, ...] = RISKS,
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> LimitTable:
+    """The limits of a device over its cases, without damping and with it.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        One for a single recording.
+    dampings : sequence of Backward or LowPass, optional
+        By default the backward difference, and a low-pass at a tenth of the sampling rate.
+    risks : tuple of float
+    draws : int
+        Of each case for the boundaries over damping.
+    seed : int
+
+    Returns
+    -------
+    LimitTable
+
+    Raises
+    ------
+    InputError
+        Without cases, or where they have different units.
+    """
+    cases = tuple(cases)
+    over_all: DeviceLimit | CriticalStiffness
+    over_all = device_limit(cases, seed=seed) if len(cases) != 1 else cases[0].limit
+    region = joint_region(cases, draws=draws)
+    kinds = usual_dampings(region.period_s) if dampings is None else tuple(dampings)
+    return LimitTable(
+        cases,
+        risks,
+        over_all.samples,
+        tuple(over_all.safe(risk) for risk in risks),
+        tuple(tuple(case.limit.safe(risk) for risk in risks) for case in cases),
+        tuple(_filter_limits(cases, filtered(region, kind), risks, draws) for kind in kinds),
+    )
+
+
+def _filter_limits(
+    cases: Sequence[Case], region: JointRegion, risks: tuple[float, ...], draws: int
+) -> FilterLimits:
+    levels = region.dampings(risks, ROWS)
+    limits = region.limits(levels)
+    tails = None
+    if not region.says(min(risks)):
+        tails = _tails(cases, region, levels, limits, min(risks), draws)
+    if tails is not None:  # the table has the end of this boundary, too
+        ends = [tail.ends[:, None] for tail in tails]
+        end = INSIDE * lowest(ends, [tail.total for tail in tails]).quantile(min(risks))[0]
+        place = int(np.searchsorted(levels, end))
+        levels, there = np.insert(levels, place, end), region.limits([end])
+        limits = tuple(
+            np.insert(own, place, new[:, 0], axis=1) for own, new in zip(limits, there, strict=True)
+        )
+        tails = tuple(tail.at(levels) for tail in tails)
+    return FilterLimits(region, levels, tuple(np.sort(part, axis=0) for part in limits), tails)
+
+
+def _tails(
+    cases: Sequence[Case],
+    region: JointRegion,
+    levels: Floats,
+    limits: tuple[Floats, ...],
+    risk: float,
+    draws: int,
+) -> tuple[Tail, ...] | None:
+    """The lowest limits of every case, or None as soon as one of them cannot say it."""
+    found = []
+    for case, own, part in zip(cases, limits, region.regions, strict=True):
+        tail = lower_tail(case, part, loops_of(case, draws=draws).draws, levels, own, risk)
+        if tail is None:
+            return None
+        found.append(tail)
+    return tuple(found)
+
+
+def _plain(value: float | None) -> float | None:
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def _in_a_name(unit: str) -> str:
+    """ "N s/m" as "N_s_per_m"."""
+    return unit.replace("/", "_per_").replace(" ", "_")

@@ -1,0 +1,275 @@
+"""The analysis of a study: every recording, its users and configurations, the device's limit."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.analysis import REPORT_ESS, Analysis, analyse
+from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.errors import Notice, describe
+from bayeshaptic.inference.population.infer import Population
+from bayeshaptic.models import Prior, prior_from_table
+from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.recordings.study import Study, StudyEntry
+from bayeshaptic.stability.cases import Case, DeviceLimit
+from bayeshaptic.study.cases import StudyCases, study_cases
+from bayeshaptic.study.configuration_limits import ConfigurationLimits
+from bayeshaptic.types import Progress
+
+Executor = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+"""As in `bayeshaptic.jobs.executors`: yields outcomes with `item`, `result` and `error`."""
+
+_RECORDINGS = 0.8  # share of the progress that the recordings take
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """One recording of a study, and what became of it.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without its ending; numbered where two have the same.
+    entry : StudyEntry
+    result : Analysis, Closed or None
+        None where it failed.
+    error : str or None
+        Why, in one line.
+    """
+
+    name: str
+    entry: StudyEntry
+    result: Analysis | Closed | None = field(default=None, repr=False)
+    error: str | None = None
+
+    @property
+    def analysis(self) -> Analysis | None:
+        """The analysis; of a closed loop that with its effects."""
+        if isinstance(self.result, Closed):
+            return self.result.analysis
+        return self.result
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that were accepted."""
+        if isinstance(self.result, Closed):
+            return tuple(effect.name for effect in self.result.effects)
+        return ()
+
+
+@dataclass(frozen=True)
+class StudyAnalysis:
+    """Everything that is known of one device from one study.
+
+    Attributes
+    ----------
+    study : Study
+    device : Device
+    recordings : tuple of Analysed
+        In the order of the study.
+    population : Population or None
+        None where nobody holds the device.
+    new_person : tuple of Case
+        A person not yet seen; one case for each configuration that people were measured in, that
+        of most people first: it stands for a new person's limit wherever there is one number.  A
+        single one without configurations; empty without a population.
+    users : tuple of Case
+        K_CR of each user, shrunken towards the population.
+    configurations : tuple of ConfigurationLimits
+        Over a numeric coordinate, free and held; empty without one.
+    cases : tuple of Case
+        Everything that the device must stay stable in, the above included.
+    limit : DeviceLimit or None
+        Over all cases; None where every recording failed.
+    notices : tuple of Notice
+    seconds : mapping
+        Stage to the time it took.
+    """
+
+    study: Study
+    device: Device
+    recordings: tuple[Analysed, ...]
+    population: Population | None
+    new_person: tuple[Case, ...]
+    users: tuple[Case, ...]
+    configurations: tuple[ConfigurationLimits, ...]
+    cases: tuple[Case, ...]
+    limit: DeviceLimit | None
+    notices: tuple[Notice, ...]
+    seconds: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        return self.study.name
+
+    @property
+    def failed(self) -> tuple[Analysed, ...]:
+        """The recordings that could not be analysed."""
+        return tuple(one for one in self.recordings if one.error is not None)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One recording to analyse: picklable, so that another process can do it."""
+
+    number: int
+    study: Study
+    device: Device
+    entry: StudyEntry
+    model: str
+    prior: Mapping[str, Prior]
+    close_loop: bool
+    options: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """How one task ended, as the executors say it."""
+
+    item: Task
+    result: Any = None
+    error: str | None = None
+
+
+def analyse_study(
+    study: Study,
+    model: str = "auto",
+    close_loop: bool = False,
+    device: Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    band_hz: tuple[float, float] | None = None,
+    ess: float = REPORT_ESS,
+    seed: int = 0,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
+) -> StudyAnalysis:
+    """Analyse every recording of a study, then what they say together.
+
+    Parameters
+    ----------
+    study : Study
+        See `bayeshaptic.read_study`.
+    model : {"auto", "rigid", "free", "grasped"}
+        Where "auto", a recording with a user is grasped and one without is rigid or free.
+    close_loop : bool
+        Whether to look for what the model lacks in every recording.
+    device : Device, optional
+        Instead of the study's own.
+    delay_s, delay_sd_s, band_hz
+        As in `bayeshaptic.analyse`.
+    ess : float
+        Effective draws of every parameter of a recording.
+    seed : int
+    progress : callable, optional
+        Called with the share done and a word about it.
+    executor : callable, optional
+        Where the recordings are analysed (see `bayeshaptic.jobs.executors`); by default here,
+        one after the other.
+
+    Returns
+    -------
+    StudyAnalysis
+        A recording that fails is in it with its error and does not stop the others.
+
+    Raises
+    ------
+    InputError
+        Where a prior of the study cannot be understood.
+    """
+    report = progress or (lambda share, word: None)
+    prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
+    device = study.device if device is None else device
+    options = {
+        "delay_s": delay_s,
+        "delay_sd_s": delay_sd_s,
+        "band_hz": band_hz,
+        "ess": ess,
+        "seed": seed,
+    }
+    tasks = [
+        Task(number, study, device, entry, model, prior, close_loop, options)
+        for number, entry in enumerate(study.entries)
+    ]
+    began = time.perf_counter()
+    recordings = _analysed(tasks, report, executor)
+    seconds = {"recordings": time.perf_counter() - began}
+    whole = study_cases(
+        recordings, seed, lambda share, word: report(_RECORDINGS + (1 - _RECORDINGS) * share, word)
+    )
+    report(1.0, "done")
+    return StudyAnalysis(
+        study,
+        device,
+        recordings,
+        notices=study.notices + _failures(recordings) + whole.notices,
+        seconds=seconds | dict(whole.seconds),
+        **_parts(whole),
+    )
+
+
+def analyse_entry(task: Task, progress: Progress | None = None) -> Analysis | Closed:
+    """Read and analyse one recording of a study."""
+    measurement = task.study.read(task.entry)
+    options = dict(task.options, device=task.device, prior=task.prior, progress=progress)
+    options["held"] = task.entry.user is not None
+    if task.close_loop:
+        return close_loop(task.model, measurement, **options)
+    return analyse(measurement, task.model, **options)
+
+
+def _analysed(
+    tasks: Sequence[Task], report: Progress, executor: Executor | None
+) -> tuple[Analysed, ...]:
+    """All recordings in their order; the progress counts those that are done."""
+    names = _distinct([recording_name(task.entry.path) for task in tasks])
+    done: dict[int, Analysed] = {}
+    outcomes = (
+        _one_by_one(tasks, names, report) if executor is None else executor(analyse_entry, tasks)
+    )
+    for outcome in outcomes:
+        number = outcome.item.number
+        done[number] = Analysed(names[number], tasks[number].entry, outcome.result, outcome.error)
+        report(_RECORDINGS * len(done) / len(tasks), f"{names[number]} is done")
+    return tuple(done[task.number] for task in tasks)
+
+
+def _one_by_one(
+    tasks: Sequence[Task], names: Sequence[str], report: Progress
+) -> Iterator[_Outcome]:
+    for task, name in zip(tasks, names, strict=True):
+
+        def part(share: float, word: str, task: Task = task, name: str = name) -> None:
+            report(_RECORDINGS * (task.number + share) / len(tasks), f"{name}: {word}")
+
+        try:
+            yield _Outcome(task, analyse_entry(task, part))
+        except Exception as error:
+            yield _Outcome(task, error=describe(error))
+
+
+def _parts(whole: StudyCases) -> dict[str, Any]:
+    names = ("population", "new_person", "users", "configurations", "cases", "limit")
+    return {name: getattr(whole, name) for name in names}
+
+
+def _failures(recordings: Sequence[Analysed]) -> tuple[Notice, ...]:
+    failed = [one for one in recordings if one.error is not None]
+    if not failed:
+        return ()
+    text = f"{len(failed)} of {len(recordings)} recordings could not be used: " + "; ".join(
+        f"{one.name} ({one.error})" for one in failed
+    )
+    return (Notice("warning", "recordings", text),)
+
+
+def _distinct(names: Sequence[str]) -> list[str]:
+    """The names, numbered where one comes more than once."""
+    return [
+        name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}"
+        for index, name in enumerate(names)
+    ]

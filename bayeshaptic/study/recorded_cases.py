@@ -1,0 +1,124 @@
+"""Cases of single recordings, and how much wider their limits are than their draws say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.stability.cases import FREE, Case
+from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness, draws_of
+from bayeshaptic.types import Floats
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.study.analysis import Analysed
+
+
+@dataclass(frozen=True)
+class Widening:
+    """What closing the loop adds to limits: uncertain effects, and what is unexplained.
+
+    Attributes
+    ----------
+    shift, log_sd : ndarray, shape (R,)
+        Of log K_CR, in each recording.
+    """
+
+    shift: Floats
+    log_sd: Floats
+
+    def apply(self, limit: CriticalStiffness, rng: np.random.Generator) -> CriticalStiffness:
+        """The limit with each draw widened as one of the recordings, at random."""
+        if not (self.shift.any() or self.log_sd.any()):
+            return limit
+        which = rng.integers(len(self.shift), size=len(limit.samples))
+        normal = rng.standard_normal(len(limit.samples))
+        factor = np.exp(self.shift[which] + self.log_sd[which] * normal)
+        return replace(limit, samples=limit.samples * factor)
+
+
+def widening(some: Sequence[Analysed]) -> Widening:
+    """How the limits of closed loops differ from those of their posteriors; nothing elsewhere."""
+    table = [_widening(one) for one in some]
+    return Widening(*np.array(table, float).reshape(-1, 2).T)
+
+
+def _widening(one: Analysed) -> tuple[float, float]:
+    analysis = one.analysis
+    if analysis is None or analysis is one.result:
+        return 0.0, 0.0
+    plain = critical_stiffness(analysis.posterior, max_draws=4000).samples
+    own, logs = analysis.limit.samples, []
+    for samples in (plain, own):
+        good = samples[np.isfinite(samples) & (samples > 0)]
+        logs.append(np.log(good) if len(good) > 1 else np.zeros(2))
+    shift = float(logs[1].mean() - logs[0].mean())
+    log_sd = float(np.sqrt(max(logs[1].var() - logs[0].var(), 0.0)))
+    # What thinning alone makes of equal limits is no widening.
+    noise = 4 * float(logs[0].std()) / np.sqrt(min(len(plain), 1000))
+    return (0.0, 0.0) if abs(shift) < noise and log_sd < 3 * noise else (shift, log_sd)
+
+
+def posterior(one: Analysed) -> Posterior:
+    """The posterior of a recording that did not fail."""
+    assert one.analysis is not None
+    return one.analysis.posterior
+
+
+def signature(one: Analysed) -> tuple[str, ...]:
+    """What recordings must have in common to be pooled: parameters and accepted effects."""
+    return (*posterior(one).names, *sorted(one.effects))
+
+
+def place_of(configuration: float | str | None) -> str:
+    """How a label goes on with a configuration; nothing without one."""
+    if configuration is None:
+        return ""
+    name = configuration if isinstance(configuration, str) else f"{configuration:g}"
+    return f", configuration {name}"
+
+
+def recorded(some: Sequence[Analysed], group: str) -> tuple[Case, ...]:
+    """One case for each user (or nobody), configuration and model; its trials in equal shares."""
+    found: dict[tuple[str, ...], list[Analysed]] = {}
+    for one in some:
+        who = "nobody holds it" if group == FREE else f"user {one.entry.user}"
+        label = who + place_of(one.entry.configuration)
+        found.setdefault((label, *signature(one)), []).append(one)
+    labels = [key[0] for key in found]
+    return tuple(
+        _pooled(
+            key[0] if labels.count(key[0]) == 1 else f"{key[0]} ({trials[0].name})",
+            group,
+            [one.analysis for one in trials if one.analysis is not None],
+        )
+        for key, trials in found.items()
+    )
+
+
+def _pooled(label: str, group: str, analyses: Sequence[Analysis]) -> Case:
+    """All trials of one case, as many draws of each."""
+    model = analyses[0].model
+    draws = [_in_order(one) for one in analyses]
+    if len(analyses) == 1:
+        return Case(label, group, model, draws[0], analyses[0].limit)
+    count = min(len(one) for one in draws)
+    picks = [np.linspace(0, len(one) - 1, count).astype(int) for one in draws]
+    joined = np.concatenate([one[pick] for one, pick in zip(draws, picks, strict=True)])
+    samples = [a.limit.samples[pick] for a, pick in zip(analyses, picks, strict=True)]
+    # Samples are kept as they are: a closed loop may have widened them.
+    limit = replace(critical_stiffness(model, joined), samples=np.concatenate(samples))
+    return Case(label, group, model, joined, limit)
+
+
+def _in_order(analysis: Analysis) -> Floats:
+    """Draws of a posterior in the order of its limit's samples."""
+    draws = draws_of(analysis.posterior)
+    count = len(analysis.limit.samples)
+    if len(draws) == count:
+        return draws
+    return draws[np.linspace(0, len(draws) - 1, count).astype(int)]

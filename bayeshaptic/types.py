@@ -1,0 +1,18 @@
+"""Names of types that every part of the package uses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int_]
+Bools = NDArray[np.bool_]
+
+Progress = Callable[[float, str], None]
+"""Called with the share of the work done, 0 to 1, and a word about it."""
+Tick = Callable[[str], None]
+"""Called with what is being tried."""
