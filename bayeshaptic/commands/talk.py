@@ -6,6 +6,8 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.compiled import when_compiling
+
 if TYPE_CHECKING:
     from bayeshaptic.report.reported import Reported
 
@@ -29,6 +31,7 @@ class Talk:
     def __init__(self, quiet: bool) -> None:
         self.quiet = quiet
         self._bar: Any = None
+        self._compiled = False
         if not quiet and sys.stderr.isatty():
             from tqdm import tqdm
 
@@ -36,9 +39,11 @@ class Talk:
             self._bar = tqdm(total=1.0, leave=False, dynamic_ncols=True, bar_format=form)
 
     def __enter__(self) -> Talk:
+        when_compiling(self._compiling)
         return self
 
     def __exit__(self, *_: object) -> None:
+        when_compiling(None)
         if self._bar is not None:
             self._bar.close()
 
@@ -75,6 +80,12 @@ class Talk:
                 self.say(f"  and {more} more in the report")
             self.say(f"  report: {reported.page}")
         return failed
+
+    def _compiling(self) -> None:
+        """Say why the first run takes longer; once."""
+        if self._bar is not None and not self._compiled:
+            self._bar.write("compiling for this machine (once per installation)", file=sys.stderr)
+        self._compiled = True
 
     def _between_bars(self, write: Any) -> None:
         if self._bar is None:

@@ -1,0 +1,79 @@
+"""Inner loops compiled by numba: once per installation, kept on disk where that can be written.
+
+A file of kernels is imported by the functions that call it, so that nobody waits for numba who does
+not need it.  Beside each kernel stands a plain NumPy form that it is tested against.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar, overload
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# No assumption that numbers are finite: proposals that are far away overflow, and are refused.
+_FAST = {"reassoc", "contract", "nsz", "arcp"}
+_tell: Callable[[], None] | None = None
+_listening = False
+
+
+@overload
+def kernel(function: F) -> F: ...
+
+
+@overload
+def kernel(*, inline: bool = False) -> Callable[[F], F]: ...
+
+
+def kernel(function: F | None = None, *, inline: bool = False) -> F | Callable[[F], F]:
+    """Decorator: compile `function` when it is first called, without Python objects.
+
+    Sums may be taken in another order than written, but in the same one for every call; divisions
+    by zero give inf or nan.  One thread.
+
+    Parameters
+    ----------
+    function : callable
+        On arrays and numbers.  Kernels that it calls stand in the same file: what is kept on disk
+        is renewed when that file changes, and no other.
+    inline : bool
+        Part of the kernels that call it: nothing is kept of it by itself.
+    """
+    if function is None:
+        return partial(kernel, inline=inline)  # type: ignore[return-value]
+    import numba
+
+    _listen()
+    njit: Any = numba.njit
+    options = {"fastmath": _FAST, "error_model": "numpy", "nogil": True}
+    try:
+        compiled: F = njit(cache=not inline, **options)(function)
+    except RuntimeError:  # no folder that can be written: compiled anew in each process
+        compiled = njit(**options)(function)
+    return compiled
+
+
+def when_compiling(tell: Callable[[], None] | None) -> None:
+    """Have `tell` called whenever a kernel is compiled instead of loaded; None: nobody."""
+    global _tell
+    _tell = tell
+
+
+def _listen() -> None:
+    """Be told of each compilation by numba."""
+    global _listening
+    if _listening:
+        return
+    _listening = True
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, _: object) -> None:
+            if _tell is not None:
+                _tell()
+
+        def on_end(self, _: object) -> None:
+            pass
+
+    event.register("numba:compile", Listener())
