@@ -367,7 +367,8 @@ def test_warnings_are_one_line_each(run: Run, monkeypatch: pytest.MonkeyPatch) -
 # A shell's background processes ignore interrupts, and so would their children.
 WAITING = """
 import signal, sys, time
-from bayeshaptic import batch, cli
+from bayeshaptic import cli
+from bayeshaptic.jobs import batch
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
