@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_bench import LHIFAM_FREE, LHIFAM_HELD, Device, tremor
@@ -247,3 +249,13 @@ def test_motion_of_a_mass_without_damping_is_its_force_twice_integrated() -> Non
     # Poles 1e-5 rad/s apart over 5 s.
     assert np.abs(velocity - wanted_velocity).max() < 5e-5 * np.abs(wanted_velocity).max()
     assert np.abs(position - wanted).max() < 5e-5 * np.abs(wanted).max()
+
+
+def test_a_device_file_with_some_values_only() -> None:
+    device = replace(load_device("lhifam"), parameters={"free": {"m1": 0.2, "b1": 0.0}})
+    model = free(device=device, period_s=1e-3, delay_s=1e-4)
+    assert model.prior("m1") == LogNormal(0.2, 0.5)
+    assert not model.has_priors  # the others come from the data
+    with pytest.raises(InputError, match="no values for bc, kc"):
+        free(device=device).values  # noqa: B018
+    assert rigid(device=device).names[:2] == ("m", "b")

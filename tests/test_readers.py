@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import gzip
+import io
 import math
 import os
 import re
+import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +28,7 @@ from bayeshaptic.recordings import (
 )
 from bayeshaptic.recordings import readers as registry
 from bayeshaptic.recordings.columns import parse_columns
+from bayeshaptic.recordings.readers import apart
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -79,14 +84,112 @@ def write_npz(path: Path) -> None:
     np.savez(path, **SIGNALS, note=np.array(["text"]), thing=np.array([None]))
 
 
-# A new reader is tested by adding its file name and a writer here.
+def write_tdms(path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as file:
+        file.write_segment([nptdms.ChannelObject("", k, v) for k, v in SIGNALS.items()])
+
+
+def write_xlsx(path: Path) -> None:
+    book = pytest.importorskip("openpyxl").Workbook()
+    for row in (["of", "Monday", None], list(SIGNALS), *zip(*SIGNALS.values(), strict=True)):
+        book.active.append(list(row))
+    book.save(path)
+
+
+def structs(*fields: dict[str, Any]) -> np.ndarray:
+    """An array of structures, as savemat takes it."""
+    array = np.empty((1, len(fields)), dtype=[(name, object) for name in fields[0]])
+    for i, one in enumerate(fields):
+        array[0, i] = tuple(one.values())
+    return array
+
+
+def write_dspace(path: Path) -> None:
+    from scipy.io import savemat
+
+    named = [{"Name": k, "Data": SIGNALS[k][None, :], "Raster": "HostService"} for k in "uq"]
+    savemat(path, {"rec": {"X": structs({"Data": TIME[None, :]}), "Y": structs(*named)}})
+
+
+def write_dspace73(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        refs = file.create_group("#refs#")
+        x, y = file.create_group("rec/X"), file.create_group("rec/Y")
+        x["Data"] = TIME[:, None]
+        y["Data"] = np.empty((2, 1), dtype=h5py.ref_dtype)
+        y["Name"] = np.empty((2, 1), dtype=h5py.ref_dtype)
+        for i, name in enumerate("uq"):
+            refs[f"d{i}"], refs[f"n{i}"] = SIGNALS[name][:, None], [[np.uint16(ord(name))]]
+            refs[f"n{i}"].attrs["MATLAB_class"] = np.bytes_("char")
+            y["Data"][i, 0], y["Name"][i, 0] = refs[f"d{i}"].ref, refs[f"n{i}"].ref
+
+
+def write_struct_with_time(path: Path) -> None:
+    from scipy.io import savemat
+
+    signals = [{"values": SIGNALS[k][:, None], "dimensions": 1, "label": k} for k in "uq"]
+    savemat(path, {"simout": {"time": TIME[:, None], "signals": structs(*signals)}})
+
+
+def time_series(name: str, even: bool) -> Any:
+    matclass = pytest.importorskip("matio.utils.matclass")
+    clock = {"Start_": np.zeros((1, 1)), "Increment_": np.full((1, 1), 1e-3)}
+    info = matclass.MatlabOpaque(clock if even else {}, "tsdata.timemetadata")
+    properties = {"Name": name, "Data_": SIGNALS[name].reshape(1, 1, -1), "TimeInfo": info}
+    times = np.zeros((0, 1)) if even else TIME[:, None]
+    return matclass.MatlabOpaque(properties | {"Time_": times}, "timeseries")
+
+
+def write_time_series(path: Path, version: str = "v7.3") -> None:
+    matio = pytest.importorskip("matio")
+    series = {"ts_u": time_series("u", even=False), "ts_q": time_series("q", even=True)}
+    matio.save_to_mat(str(path), series, version=version)
+
+
+def write_dataset(path: Path) -> None:
+    matclass = pytest.importorskip("matio.utils.matclass")
+    elements = np.empty((2, 1), dtype=object)
+    for i, name in enumerate("uq"):
+        values = {"Name": name, "Values": time_series(name, even=False)}
+        elements[i, 0] = matclass.MatlabOpaque(values, "Simulink.SimulationData.Signal")
+    store = matclass.MatlabOpaque({"Elements": elements}, "Simulink.SimulationData.Storage.Ram")
+    data = matclass.MatlabOpaque({"Storage_": store}, "Simulink.SimulationData.Dataset")
+    pytest.importorskip("matio").save_to_mat(str(path), {"logsout": data}, version="v7")
+
+
+# A new reader is tested by adding its file name and a writer here, and the mapping where the names
+# are not t, u and q.
 WRITERS: dict[str, Callable[[Path], None]] = {
     "a.csv": write_csv,
     "a.mat": write_mat5,
     "b.mat": write_mat73,
     "a.h5": write_hdf5,
     "a.npz": write_npz,
+    "a.tdms": write_tdms,
+    "a.xlsx": write_xlsx,
+    "dspace.mat": write_dspace,
+    "dspace73.mat": write_dspace73,
+    "struct.mat": write_struct_with_time,
+    "series.mat": partial(write_time_series, version="v7"),
+    "series73.mat": write_time_series,
+    "dataset.mat": write_dataset,
 }
+MAPPINGS = {
+    "a.tdms": "time=/t,force=/u,position=/q",
+    "dspace.mat": "time=rec.X.Data,force=rec.Y(1).Data,position=q",
+    "dspace73.mat": "time=rec.X.Data,force=u,position=rec.Y(2).Data",
+    "struct.mat": "time=simout.time,force=simout.signals(1).values,position=q",
+    "series.mat": "time=q.Time,force=ts_u.Data,position=q",
+    "series73.mat": "time=ts_u.Time,force=u,position=ts_q.Data",
+    "dataset.mat": "time=u.Time,force=u,position=q",
+}
+
+
+def mapping_of(name: str) -> str:
+    return MAPPINGS.get(name, MAPPING)
 
 
 def assert_is_the_recording(recording: Recording) -> None:
@@ -99,9 +202,9 @@ def assert_is_the_recording(recording: Recording) -> None:
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_format(tmp_path: Path, name: str) -> None:
     WRITERS[name](tmp_path / name)
-    recording = read_recording(tmp_path / name, MAPPING)
+    recording = read_recording(tmp_path / name, mapping_of(name))
     assert_is_the_recording(recording)
-    assert recording.name == name[0]
+    assert recording.name == name.split(".")[0]
     assert recording.source == tmp_path / name
     assert (recording.force_unit, recording.position_unit) == ("N", "m")
 
@@ -109,8 +212,10 @@ def test_every_format(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", WRITERS)
 def test_an_array_that_is_not_there(tmp_path: Path, name: str) -> None:
     WRITERS[name](tmp_path / name)
-    with pytest.raises(InputError, match=r"no column 'v' for the force; the file has .* \(50\)"):
-        read_recording(tmp_path / name, "time=t,force=v,position=q")
+    with pytest.raises(
+        InputError, match=r"no column 'none.* for the force.*; the file has .* \(50\)"
+    ):
+        read_recording(tmp_path / name, mapping_of(name).replace(",force=", ",force=none."))
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -120,7 +225,7 @@ def test_damaged_and_empty_files(tmp_path: Path, name: str) -> None:
     for damaged in (b"", content[: len(content) // 2], b"\0\1\2\3" * 300):
         (tmp_path / name).write_bytes(damaged)
         with pytest.raises(InputError, match=re.escape(str(tmp_path / name))):
-            read_recording(tmp_path / name, MAPPING)
+            read_recording(tmp_path / name, mapping_of(name))
 
 
 def test_default_headers(tmp_path: Path) -> None:
@@ -147,6 +252,16 @@ DIALECTS = {
     "spaces": "time_s, force_n, position_m\n0, 1.5, 2\n0.001, -2.5, 3\n0.002, 1e1, 4\n",
     "quotes": '"time_s","force_n","position_m"\n"0","1.5","2"\n0.001,-2.5,3\n0.002,1e1,4\n',
     "last": "time_s,force_n,position_m\n0,1.5,2,\n0.001,-2.5,3,\n0.002,1e1,4,\n",
+    "declared": "sep=;\ntime_s;force_n;position_m\n0;1,5;2\n0,001;-2,5;3\n0,002;1e1;4\n",
+    "remark": "# made by me\n# time_s, force_n, position_m\n0,1.5,2\n0.001,-2.5,3\n0.002,1e1,4\n",
+    "percent": "% time_s force_n position_m\n0 1.5 2\n0.001 -2.5 3\n0.002 1e1 4\n",
+    "preamble": "Export of\tMonday\nOperator;A;B\n\ntime_s;force_n;position_m\n0;1,5;2\n"
+    "0,001;-2,5;3\n0,002;1e1;4\n",
+    "quoted commas": 'time_s,force_n,position_m\n"0","1,5","2"\n"0,001","-2,5","3"\n'
+    '"0,002","10",4\n',
+    "units": "Time (ms),Force [N],Position (mm)\n0,1.5,2000\n1,-2.5,3000\n2,1e1,4000\n",
+    "unit row": "Setup 3\nt;load;Time;Force;Position\n-;Nm;ms;N;mm\n1;1;0;1,5;2000\n"
+    "1;1;1;-2,5;3000\n1;1;2;1e1;4000\n",
     "text": "time_s,phase,force_n,position_m\n0,up,1.5,2\n0.001,up,-2.5,3\n0.002,,1e1,4\n",
 }
 
@@ -154,7 +269,7 @@ DIALECTS = {
 @pytest.mark.parametrize("name", DIALECTS)
 @pytest.mark.parametrize("packed", [False, True])
 def test_dialects_of_csv(tmp_path: Path, name: str, packed: bool) -> None:
-    content = DIALECTS[name].encode("utf-8")
+    content = DIALECTS[name].encode("utf-16" if name in ("tab", "preamble") else "utf-8")
     path = tmp_path / ("a.csv.gz" if packed else "a.csv")
     path.write_bytes(gzip.compress(content) if packed else content)
     recording = read_recording(path)
@@ -202,9 +317,9 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     for path, message in (
         (tmp_path / "none.csv", "no such file"),
         (tmp_path, "a folder"),
-        (tmp_path / "a.xlsx", r"no reader for files ending in '.xlsx'; known endings: .csv"),
+        (tmp_path / "a.xls", r"no reader for files ending in '.xls'; known endings: .csv"),
     ):
-        if path.suffix == ".xlsx":
+        if path.suffix == ".xls":
             path.write_bytes(b"x")
         with pytest.raises(InputError, match=message):
             read_recording(path)
@@ -364,3 +479,69 @@ def test_a_recording_or_a_frequency_response(tmp_path: Path) -> None:
         read_recording(tmp_path / "c.csv")
     with pytest.raises(InputError, match="'force' belongs to a recording"):
         read_frf(tmp_path / "c.csv", 1e-3, "force=u")
+
+
+def test_units_in_headers(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    np.savetxt(
+        path,
+        np.column_stack(list(SIGNALS.values())),
+        header="t,Force (kN),Position (mm)",
+        comments="",
+        delimiter=",",
+    )
+    for force in ("Force", "Force (kN)", "Force[kN]"):
+        recording = read_recording(path, f"time=t,force={force},position=Position (mm)")
+        np.testing.assert_allclose(recording.force, 1e3 * FORCE)
+        np.testing.assert_allclose(recording.position, 1e-3 * POSITION)
+    turned = read_recording(path, "time=t,force=Force*-1,position=Position[m]")
+    np.testing.assert_allclose(turned.force, -1e3 * FORCE)
+    np.testing.assert_allclose(turned.position, POSITION)
+    with pytest.raises(InputError, match=r"multiplied by 2; write which unit that gives"):
+        read_recording(path, "time=t,force=Force*2,position=Position")
+    write_csv(path, "Time (s),Force (V),Position (mm)")
+    with pytest.raises(InputError, match="'V' is no unit of force.*multiply"):
+        read_recording(path)
+
+
+def test_an_hdf5_file_with_broken_links_units_and_a_loop(tmp_path: Path) -> None:
+    import h5py
+
+    path = tmp_path / "a.h5"
+    (tmp_path / "other.h5").write_bytes(b"secret")
+    with h5py.File(path, "w") as file:
+        for name, values in SIGNALS.items():
+            file[name] = values
+        file["q"].attrs["units"] = "mm"
+        file["gone"], file["away"] = h5py.SoftLink("/no"), h5py.ExternalLink("other.h5", "/x")
+        file["run/loop"] = file.create_group("run")
+    recording = read_recording(path, MAPPING)
+    np.testing.assert_allclose(recording.position, 1e-3 * POSITION)
+
+
+def test_sizes_are_checked_before_memory_is_taken(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("t", shape=(10**12,), dtype="f8", chunks=(1000,))
+    header = io.BytesIO()
+    claim = {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+    np.lib.format.write_array_header_1_0(header, claim)
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("t.npy", header.getvalue() + bytes(80))
+    for name in ("a.h5", "a.npz"):
+        with pytest.raises(InputError, match="claims 1000000000000 numbers"):
+            read_recording(tmp_path / name, MAPPING)
+
+
+def test_a_reader_that_crashes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_mat5(tmp_path / "a.mat")
+    monkeypatch.setattr(apart, "_COMMAND", "import os; os.abort()")
+    with pytest.raises(InputError, match="not a readable MAT file: its reader gave up"):
+        read_recording(tmp_path / "a.mat", MAPPING)
+
+
+def test_pickles_are_not_opened(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", t=np.array([print], dtype=object))
+    with pytest.raises(InputError, match="no vectors of numbers"):
+        read_recording(tmp_path / "a.npz", MAPPING)

@@ -47,6 +47,7 @@ columns = "force=force_n[N],position=position_m[m]"
 [prior]
 m1 = { median = 0.2, log_sd = 0.3 }
 b1 = { scale = 5 }
+b2 = { scale = 5, floor = 5e-6 }
 kc = { mean = 6e4, sd = 1e3 }
 m2 = { low = 1, high = 9, log = true }
 
@@ -80,6 +81,7 @@ def test_a_full_study(folder: Path) -> None:
     assert study.prior == {
         "m1": {"median": 0.2, "log_sd": 0.3},
         "b1": {"scale": 5.0},
+        "b2": {"scale": 5.0, "floor": 5e-6},
         "kc": {"mean": 6e4, "sd": 1e3},
         "m2": {"low": 1.0, "high": 9.0, "log": True},
     }

@@ -110,18 +110,20 @@ def build_model(
 def device_priors(structure: Structure, values: Mapping[str, float]) -> dict[str, Prior]:
     """Priors around a device file's `values`: log-normal, and half-normal for ground dampers.
 
-    A ground damper that the file gives as zero is `NearZero`.
+    A ground damper that the file gives as zero is `NearZero`. What the file does not give has no
+    prior here; it comes from the data.
     """
-    damping = sum(values[name] for name in structure.names if name in GROUND_DAMPERS)
+    known = [name for name in structure.names if name in values]
+    damping = sum(values[name] for name in known if name in GROUND_DAMPERS)
     priors: dict[str, Prior] = {}
-    for name in structure.names:
+    for name in known:
         if name in GROUND_DAMPERS and damping > 0:
             scale = DAMPER_SCALE * damping
             seen = values[name] > 0
             priors[name] = HalfNormal(scale) if seen else NearZero(scale, DAMPER_FLOOR * scale)
         elif values[name] > 0:
             priors[name] = LogNormal(values[name], HAND_LOG_SD if name in HAND else DEVICE_LOG_SD)
-        else:
+        elif name not in GROUND_DAMPERS:  # of those, zeros alone say nothing of the scale
             raise InputError(f"the device file gives {name} = {values[name]}; it must be positive.")
     return priors
 
@@ -152,7 +154,7 @@ def _build(
         reference = dict(_device_values(device, structure))
         if reference:
             priors = device_priors(structure, reference)
-            parameters = [replace(p, prior=priors[p.name]) for p in parameters]
+            parameters = [replace(p, prior=priors.get(p.name)) for p in parameters]
         if delay_s is None:
             delay_s = device.delay_s
             delay_sd_s = device.delay_sd_s if delay_sd_s is None else delay_sd_s
@@ -181,11 +183,16 @@ def _build(
 
 def _device_values(device: Device, structure: Structure) -> Mapping[str, float]:
     """The device file's values for `structure`; a rigid one is the sum of the free one's parts."""
-    values = device.parameters.get(structure.name)
-    if values is None and structure is RIGID and "free" in device.parameters:
+    values = device.parameters.get(structure.name, {})
+    if not values and structure is RIGID and "free" in device.parameters:
         parts = device.parameters["free"]
-        values = {"m": parts["m1"] + parts["m2"], "b": parts["b1"] + parts["b2"]}
-    return {name: values[name] for name in structure.names} if values else {}
+        sums = {"m": ("m1", "m2"), "b": ("b1", "b2")}
+        values = {
+            name: sum(parts[part] for part in of)
+            for name, of in sums.items()
+            if all(part in parts for part in of)
+        }
+    return {name: values[name] for name in structure.names if name in values}
 
 
 def _check_numbers(delay_s: float | None, delay_sd_s: float | None, period_s: float | None) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bayeshaptic.devices.table import nearest
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.readers import Arrays
+from bayeshaptic.recordings.units import base_unit, is_unit
 
 RECORDING_ROLES = ("time", "force", "position")
 FRF_ROLES = ("frequency", "gain_db", "phase_deg", "sd", "coherence", "averages")
@@ -28,7 +29,15 @@ DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     **{role: {role: None} for role in FRF_ROLES[1:]},
 }
 
+# The same in words, for headers that say their unit: "Time (s)", "Force [N]", "Position (mm)".
+_PLAIN_HEADERS = {
+    "time": ("time", "t"),
+    "force": ("force", "torque", "current"),
+    "position": ("position", "angle"),
+}
+
 _EXAMPLE = "time=t,force=u,position=q"
+_WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*[(\[](?P<unit>[^()\[\]]+)[)\]]")
 _EXPRESSION = re.compile(
     r"(?P<name>.+?)"
     r"(?:\s*(?P<sign>[*/])\s*(?P<factor>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?))?"
@@ -116,6 +125,54 @@ def is_frequency_response(arrays: Arrays, mapping: Mapping[str, Column]) -> bool
     return not any(role in mapping for role in RECORDING_ROLES) and "frequency_hz" in arrays
 
 
+def name_and_unit(name: str) -> tuple[str, str | None]:
+    """``Position (mm)`` as the name and the unit in brackets; None where that is no unit."""
+    match = _WITH_UNIT.fullmatch(name)
+    if match is None or not is_unit(match["unit"]):
+        return name, None
+    return match["name"], match["unit"]
+
+
+def _find(arrays: Arrays, name: str) -> str | None:
+    """An array by its name, with or without the unit in brackets after it."""
+    if name in arrays:
+        return name
+    found = [key for key in arrays if name_and_unit(key)[0] == name]
+    return found[0] if len(found) == 1 else None
+
+
+def _unit_times(key: str, factor: float, role: str, path: Path) -> str | None:
+    """The unit that a header says, of values times a factor."""
+    unit = name_and_unit(key)[1]
+    if unit is None or abs(factor) == 1.0 or role not in RECORDING_ROLES:
+        return unit
+    try:
+        _, multiple = base_unit(role, unit)
+    except InputError:  # volts times a force constant
+        return None
+    if multiple != 1.0:
+        raise InputError(
+            f"{path}: '{key}' is multiplied by {factor:g}; write which unit that gives, as in "
+            f"{role}=...*{factor:g}[{unit}]"
+        )
+    return unit
+
+
+def _defaults(arrays: Arrays, role: str) -> dict[str, str | None]:
+    """Arrays that say by their names that they play a role, with their units."""
+    found = {name: unit for name, unit in DEFAULT_HEADERS[role].items() if name in arrays}
+    for key in arrays:
+        name, unit = name_and_unit(key)
+        plain = name.lower()
+        if unit is not None and plain in DEFAULT_HEADERS[role]:
+            if base_unit(role, unit) != (DEFAULT_HEADERS[role][plain], 1.0):
+                raise InputError(f"'{key}' says two units; rename it")
+            found[key] = unit
+        elif unit is not None and plain in _PLAIN_HEADERS.get(role, ()):
+            found[key] = unit
+    return found
+
+
 def pick(
     arrays: Arrays, role: str, mapping: Mapping[str, Column], path: Path, required: bool = True
 ) -> tuple[NDArray[np.float64], str | None] | None:
@@ -140,14 +197,13 @@ def pick(
         Where the array is not there (the message lists what is), or holds text.
     """
     if role not in mapping:
-        defaults = [name for name in DEFAULT_HEADERS[role] if name in arrays]
+        defaults = _defaults(arrays, role)
         if len(defaults) > 1:
             raise InputError(
                 f"{path}: both {' and '.join(defaults)}; say which with --columns {role}=..."
             )
-        if defaults:
-            name = defaults[0]
-            return as_numbers(arrays[name], f"{path}: '{name}'"), DEFAULT_HEADERS[role][name]
+        for name, unit in defaults.items():
+            return as_numbers(arrays[name], f"{path}: '{name}'"), unit
         if not required:
             return None
         raise InputError(
@@ -157,8 +213,10 @@ def pick(
         )
     column = mapping[role]
     for name, factor in zip(column.names, column.factors, strict=True):
-        if name in arrays:
-            return as_numbers(arrays[name], f"{path}: '{name}'") * factor, column.unit
+        key = _find(arrays, name)
+        if key is not None:
+            values = as_numbers(arrays[key], f"{path}: '{key}'")
+            return values * factor, column.unit or _unit_times(key, factor, role, path)
     name = column.names[-1]
     raise InputError(
         f"{path}: no column '{name}' for the {role}{nearest(name, arrays)}; "
@@ -168,11 +226,13 @@ def pick(
 
 def listing(arrays: Arrays, most: int = 20) -> str:
     """The names of a file's arrays and their lengths, the longest first, single numbers not."""
-    names = sorted(
-        (name for name in arrays if len(arrays[name]) > 1), key=lambda n: -len(arrays[n])
-    )
-    shown = [f"{name} ({len(arrays[name])})" for name in names[:most]]
-    return ", ".join(shown) + (f" and {len(names) - most} more" if len(names) > most else "")
+    names: dict[int, list[str]] = {}
+    for name, values in arrays.items():
+        if len(values) > 1:
+            names.setdefault(id(values), []).append(name)
+    lines = [f"{' = '.join(same)} ({len(arrays[same[0]])})" for same in names.values()]
+    lines.sort(key=lambda line: -int(line.rpartition("(")[2][:-1]))
+    return ", ".join(lines[:most]) + (f" and {len(lines) - most} more" if len(lines) > most else "")
 
 
 def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:

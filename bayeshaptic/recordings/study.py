@@ -18,7 +18,7 @@ from bayeshaptic.recordings.response.etfe import Etfe
 
 STUDY_KEYS = ("device", "prior", "recording", "reference")
 ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns")
-PRIOR_KEYS = ("median", "log_sd", "scale", "mean", "sd", "low", "high", "log")
+PRIOR_KEYS = ("median", "log_sd", "scale", "floor", "mean", "sd", "low", "high", "log")
 
 
 @dataclass(frozen=True)
@@ -121,10 +121,11 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     The file has a ``[device]`` table: a `name` of a known device, or the `file` of a device file,
     or the facts themselves (`kind` is then needed); what is written beside a name or a file
     overrides it; and `columns`. An optional ``[prior]`` table has a line a parameter: ``m1 = {
-    median = 0.2, log_sd = 0.3 }``, ``b1 = { scale = 5 }`` (half-normal), ``kc = { mean = 6e4, sd =
-    1e3 }``, ``m2 = { low = 1, high = 9 }`` (uniform; with ``log = true`` in the logarithm). Each
-    ``[[recording]]`` table has a `file`, relative to the study, and where they apply `user`,
-    `configuration` (a number or a name), `trial`, `level`, and `columns` of its own. Recordings are
+    median = 0.2, log_sd = 0.3 }``, ``b1 = { scale = 5 }`` (half-normal; with `floor` near zero),
+    ``kc = { mean = 6e4, sd = 1e3 }``, ``m2 = { low = 1, high = 9 }`` (uniform; with ``log = true``
+    in the logarithm). Each ``[[recording]]`` table has a `file`, relative to the study, and where
+    they apply `user`, `configuration` (a number or a name), `trial`, `level`, and `columns` of its
+    own. Recordings are
     looked for but not read; `Study.read` does that. Optional ``[[reference]]`` tables hold limits
     known from elsewhere: `label`, `held`, and `critical_stiffness` or `critical_stiffness_db`.
 

@@ -22,6 +22,7 @@ _FORCE = {
 _POSITION = {
     "m": ("m", 1.0),
     "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
     "um": ("m", 1e-6),
     "nm": ("m", 1e-9),
     "rad": ("rad", 1.0),
@@ -29,6 +30,11 @@ _POSITION = {
     "urad": ("rad", 1e-6),
     "deg": ("rad", math.pi / 180),
 }
+# Units of other things, and of these in other systems: known as units, and not turned into others.
+_FOREIGN = """
+    V mV kV Hz kHz rpm K C degC % counts count cnt inc incr ticks tick lsb kg g kgf gf lb lbf oz in
+    inch ft min h rev turns m/s mm/s rad/s deg/s m/s^2 m/s2 rad/s^2 rad/s2
+"""
 _BY_ROLE = {"time": _TIME, "force": _FORCE, "position": _POSITION}
 
 
@@ -46,9 +52,7 @@ def base_unit(role: str, unit: str) -> tuple[str, float]:
     InputError
         For a unit that is not one of the role's; the message lists them.
     """
-    plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg")
-    for sign in (" ", "*", "\u00b7", "."):
-        plain = plain.replace(sign, "")
+    plain = _plain(unit)
     known = _BY_ROLE[role]
     if plain not in known:
         cure = ""
@@ -56,6 +60,20 @@ def base_unit(role: str, unit: str) -> tuple[str, float]:
             cure = "; multiply other units by the force constant, as in force=volts*35.15[N]"
         raise InputError(f"'{unit}' is no unit of {role}: use {', '.join(known)}{cure}")
     return known[plain]
+
+
+def is_unit(text: str) -> bool:
+    """Whether a piece of a file is the name of a unit, of these roles or of something else."""
+    plain = _plain(text)
+    return plain in _FOREIGN.split() or any(plain in known for known in _BY_ROLE.values())
+
+
+def _plain(unit: str) -> str:
+    """A unit without blanks and signs of multiplication, in ASCII."""
+    plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg")
+    for sign in (" ", "*", "\u00b7", "."):
+        plain = plain.replace(sign, "")
+    return plain
 
 
 def choose_units(

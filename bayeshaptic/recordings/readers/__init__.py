@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers import delimited, hdf5, matlab, npz
+from bayeshaptic.recordings.readers import delimited, hdf5, matlab, npz, spreadsheet, tdms
+from bayeshaptic.recordings.readers.apart import read_apart, write_arrays
 from bayeshaptic.recordings.readers.reader import Arrays, Reader
 
-_registry: list[Reader] = [delimited.READER, matlab.READER, hdf5.READER, npz.READER]
+_BUILT_IN = tuple(module.READER for module in (delimited, matlab, hdf5, npz, tdms, spreadsheet))
+_registry: list[Reader] = [*_BUILT_IN]
 
-__all__ = ["Arrays", "Reader", "read_arrays", "reader_for", "register_reader"]
+__all__ = ["Arrays", "Reader", "read_arrays", "read_here", "reader_for", "register_reader"]
 
 
 def register_reader(reader: Reader) -> None:
@@ -48,9 +51,18 @@ def read_arrays(path: Path) -> Arrays:
     if path.is_dir():
         raise InputError(f"{path}: a folder; name a recording in it, or a study (.toml)")
     reader = reader_for(path)
+    if not path.is_file():
+        raise InputError(f"{path}: not a file")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty")
-    arrays = reader.read(path)
+    arrays = read_apart(reader, path) if reader.apart and reader in _BUILT_IN else reader.read(path)
     if not arrays:
         raise InputError(f"{path}: no vectors of numbers in this {reader.title} file")
     return arrays
+
+
+def read_here() -> None:
+    """What `read_apart` runs: a reader's title, a file and seconds are on the command line."""
+    title, path, seconds = sys.argv[1:]
+    (reader,) = (one for one in _BUILT_IN if one.title == title)
+    write_arrays(reader, Path(path), int(seconds))

@@ -1,7 +1,8 @@
-"""CSV and its relatives: separators, comments, byte-order marks and decimal commas."""
+"""CSV and its relatives: separators, encodings, comments, preambles and decimal commas."""
 
 from __future__ import annotations
 
+import codecs
 import csv
 import gzip
 import io
@@ -12,66 +13,102 @@ from pathlib import Path
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers.reader import Arrays, Reader
+from bayeshaptic.recordings.readers.layout import find_layout
+from bayeshaptic.recordings.readers.reader import MOST_TEXT, Arrays, Reader
 
-_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.I)
+Lines = list[tuple[int, str]]
+
+_DECLARED = re.compile(r'"?sep=(?P<separator>[^"])"?', re.I)
 
 
 def read_delimited(path: Path) -> Arrays:
     """The columns of a text file of numbers.
 
-    Comma, semicolon, tab or blanks between the fields; lines that start with ``#`` are comments; a
-    decimal comma is understood where the separator is another one. Without a header line the
-    columns are named "1", "2" and so on. A column with text in it stays text.
+    Comma, semicolon, tab or blanks between the fields, or what a first line ``sep=;`` says; lines
+    that start with ``#`` or ``%`` are remarks, the last of which may be the header; a preamble is
+    passed over, and a row of units below the header goes with the names. A decimal comma is
+    understood where the separator is another one, and in quotes. Without a header the columns are
+    named "1", "2" and so on. A column with text in it stays text.
 
     Raises
     ------
     InputError
         For a file that is empty, not text, has a header but no rows, or a row with more or fewer
-        fields than the first (by its line number).
+        fields than the others (by its line number).
     """
-    lines = [
-        (number, line)
-        for number, line in enumerate(_text(path).splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines: Lines = []
+    remarks: dict[int, str] = {}
+    declared = ""
+    for number, line in enumerate(_text(path).splitlines(), start=1):
+        text = line.strip()
+        if number == 1 and (found := _DECLARED.fullmatch(text)):
+            declared = found["separator"]
+        elif text.startswith(("#", "%")):
+            remarks[len(lines)] = text.lstrip("#% \t")
+        elif text:
+            lines.append((number, line))
     if not lines:
         raise InputError(f"{path}: the file is empty")
-    separator = _separator(lines[min(1, len(lines) - 1)][1])
-    names = _header(lines[0][1], separator)
-    if names is None:
-        names = [str(i) for i in range(1, len(_fields(lines[0][1], separator)) + 1)]
-    else:
-        lines = lines[1:]
-        if not lines:
-            raise InputError(f"{path}: a header ({', '.join(names)}) but no rows of numbers")
-    twice = {name for name in names if names.count(name) > 1}
-    if twice:
-        raise InputError(f"{path}: the header has '{twice.pop()}' more than once; rename one")
+    separator = declared or _separator([line for _, line in lines])
+    layout = find_layout(
+        lambda row: _fields(lines[row][1], separator),
+        len(lines),
+        {row: _fields(text, separator) for row, text in remarks.items()},
+        str(path),
+    )
+    lines = lines[layout.first :]
     if separator != ",":
         lines = [(number, line.replace(",", ".")) for number, line in lines]
+    names = layout.names
     return _numbers(lines, separator, names) or _mixed(path, lines, separator, names)
 
 
 def _text(path: Path) -> str:
     try:
-        content = path.read_bytes()
-        if content.startswith(b"\x1f\x8b"):
-            content = gzip.decompress(content)
+        open_file = gzip.open if _is_packed(path) else open
+        with open_file(path, "rb") as file:
+            content = file.read(MOST_TEXT + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be unpacked or read ({error})") from None
-    if b"\0" in content:
+    if len(content) > MOST_TEXT:
+        raise InputError(
+            f"{path}: more than {MOST_TEXT // 1_000_000} MB of text; cut the recording, or save it "
+            "as NPZ or HDF5"
+        )
+    for mark, encoding in (
+        (codecs.BOM_UTF16_LE, "utf-16"),
+        (codecs.BOM_UTF16_BE, "utf-16"),
+        (codecs.BOM_UTF8, "utf-8-sig"),
+    ):
+        if content.startswith(mark):
+            text = content.decode(encoding, "replace")
+            break
+    else:
+        # Latin letters in UTF-16 are every second byte.
+        if content[1:64:2].count(0) > 24:
+            text = content.decode("utf-16-le", "replace")
+        elif content[:64:2].count(0) > 24:
+            text = content.decode("utf-16-be", "replace")
+        else:
+            try:
+                text = content.decode("utf-8")
+            except UnicodeDecodeError:
+                text = content.decode("latin-1")
+    if "\0" in text:
         raise InputError(f"{path}: not a text file; its name should end as its format does")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
+    return text
 
 
-def _separator(line: str) -> str | None:
-    """The field separator of a row; None stands for any run of blanks."""
+def _is_packed(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(2) == b"\x1f\x8b"
+
+
+def _separator(lines: list[str]) -> str | None:
+    """The separator that most of the rows have; None stands for any run of blanks."""
+    sample = lines[len(lines) // 2 :][:50]
     for separator in ("\t", ";", ","):
-        if separator in line:
+        if 2 * sum(separator in line for line in sample) > len(sample):
             return separator
     return None
 
@@ -79,19 +116,14 @@ def _separator(line: str) -> str | None:
 def _fields(line: str, separator: str | None) -> list[str]:
     if separator is None:
         return [field.strip('"') for field in line.split()]
-    (fields,) = csv.reader(io.StringIO(line), delimiter=separator, skipinitialspace=True)
-    return [field.strip() for field in fields]
+    try:
+        rows = list(csv.reader(io.StringIO(line), delimiter=separator, skipinitialspace=True))
+    except csv.Error:
+        rows = [line.split(separator)]
+    return [field.strip() for field in (rows[0] if rows else [])]
 
 
-def _header(line: str, separator: str | None) -> list[str] | None:
-    """Column names, or None where the line is numbers already."""
-    fields = _fields(line, separator)
-    return None if any(_NUMBER.fullmatch(field) for field in fields) else fields
-
-
-def _numbers(
-    lines: list[tuple[int, str]], separator: str | None, names: list[str]
-) -> Arrays | None:
+def _numbers(lines: Lines, separator: str | None, names: list[str]) -> Arrays | None:
     """The fast way, for tables of nothing but numbers."""
     try:
         table = np.loadtxt(
@@ -104,9 +136,7 @@ def _numbers(
     return dict(zip(names, np.ascontiguousarray(table.T), strict=True))
 
 
-def _mixed(
-    path: Path, lines: list[tuple[int, str]], separator: str | None, names: list[str]
-) -> Arrays:
+def _mixed(path: Path, lines: Lines, separator: str | None, names: list[str]) -> Arrays:
     """The slow way, column by column; tells which line does not fit."""
     rows = []
     for number, line in lines:
@@ -120,12 +150,21 @@ def _mixed(
                 f"({', '.join(names)}); is the file cut off, or the separator another one?"
             )
         rows.append(fields)
+    return typed_columns(names, rows)
+
+
+def typed_columns(names: list[str], rows: list[list[str]]) -> Arrays:
+    """Columns of text as numbers where all of a column are, with a decimal point or comma."""
     columns: Arrays = {}
-    for name, column in zip(names, np.array(rows).T, strict=True):
+    for name, column in zip(names, zip(*rows, strict=True), strict=True):
+        text = np.array(column)
         try:
-            columns[name] = column.astype(float)
+            columns[name] = text.astype(float)
         except ValueError:
-            columns[name] = column
+            try:
+                columns[name] = np.char.replace(text, ",", ".").astype(float)
+            except ValueError:
+                columns[name] = text
     return columns
 
 
