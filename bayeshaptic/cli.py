@@ -16,11 +16,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
-from bayeshaptic import __version__
 from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.talk import complain
 from bayeshaptic.errors import BayeshapticWarning, InputError, describe
 from bayeshaptic.threads import one_thread_from_the_start
+from bayeshaptic.version import __version__
 
 DESCRIPTION = """\
 Uncertainty reports for haptic devices: how stiff a virtual wall may be before it shakes the

@@ -21,8 +21,8 @@ import numpy as np  # noqa: E402
 from speed import DATA, RECORDINGS  # noqa: E402
 
 import bayeshaptic as bh  # noqa: E402
+from bayeshaptic.inference.coordinates import coordinates  # noqa: E402
 from bayeshaptic.inference.diagnostics import diagnose  # noqa: E402
-from bayeshaptic.inference.sampling.coordinates import coordinates  # noqa: E402
 from bayeshaptic.inference.sampling.density import Density  # noqa: E402
 
 WALKERS = 96

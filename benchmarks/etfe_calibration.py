@@ -31,8 +31,7 @@ from linear_bench import (
 )
 from test_windows import PERIOD, cramer_rao, record, scale_and_delay
 
-from bayeshaptic.recordings.response.etfe import estimate_etfe
-from bayeshaptic.recordings.response.windows import compress
+from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability import etfe_critical_stiffness
 

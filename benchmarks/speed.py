@@ -26,8 +26,8 @@ import emcee  # noqa: E402
 import numpy as np  # noqa: E402
 
 import bayeshaptic as bh  # noqa: E402
+from bayeshaptic.inference.coordinates import coordinates  # noqa: E402
 from bayeshaptic.inference.diagnostics import diagnose  # noqa: E402
-from bayeshaptic.inference.sampling.coordinates import coordinates  # noqa: E402
 from bayeshaptic.inference.sampling.density import Density  # noqa: E402
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "recordings"

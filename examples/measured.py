@@ -24,8 +24,9 @@ from bayeshaptic.diagnosis.periodic.loop import FLOOR, PeriodicLoop, close_perio
 from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Period, one_period, with_floor
 from bayeshaptic.diagnosis.state import REPORT, share
 from bayeshaptic.effects.nonlinear.protocol import Motion
+from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
-from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.report.figures.style import CYCLE, DATA, MODEL, OTHER, new_figure, panel
 from bayeshaptic.types import Floats
 

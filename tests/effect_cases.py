@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bayeshaptic.effects.effect import LinearEffect
-from bayeshaptic.effects.registry import effect_class
+from bayeshaptic.effects.library import effect_class
 from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.read import recording_from_arrays

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.loop import Candidate, Traced
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
+from bayeshaptic.diagnosis.traced import Candidate, Traced
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.inference.least_squares import Fit

@@ -17,7 +17,8 @@ from bayeshaptic.recordings.known_limits import Reference
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON, Case, device_limit
 from bayeshaptic.stability.critical import critical_stiffness
-from bayeshaptic.study.analysis import Analysed, StudyAnalysis
+from bayeshaptic.study.analysed import Analysed
+from bayeshaptic.study.analysis import StudyAnalysis
 from bayeshaptic.study.configuration_limits import ConfigurationLimits
 
 DRAWS = 1500

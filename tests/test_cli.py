@@ -24,9 +24,10 @@ from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.simulate import parse_effect
 from bayeshaptic.commands.talk import Talk
 from bayeshaptic.devices import device_names
-from bayeshaptic.diagnosis import analysis, closed
+from bayeshaptic.diagnosis import analysis
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs import batch, executors
+from bayeshaptic.jobs import recording as recording_job
 from bayeshaptic.report import summary_json
 from bayeshaptic.report.headline import Headline
 from bayeshaptic.report.reported import Reported
@@ -73,14 +74,14 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         (folder / "report.html").write_text("<!DOCTYPE html>")
         return folder / "report.html"
 
-    monkeypatch.setattr(analysis, "analyse", partial(analysis.analyse, ess=50))
+    monkeypatch.setattr(recording_job, "analyse", partial(analysis.analyse, ess=50))
     monkeypatch.setattr(
         study_analysis, "analyse", lambda *a, **b: analysis.analyse(*a, **b | {"ess": 50})
     )
     monkeypatch.setattr(
         "bayeshaptic.report.study.write.table_of", lambda cases: table_of(cases, draws=60)
     )
-    monkeypatch.setattr("bayeshaptic.report.write_report", write)
+    monkeypatch.setattr(recording_job, "write_report", write)
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
@@ -449,8 +450,7 @@ class TestReport:
             seen.update(options, measurement=measurement)
             raise InputError("seen enough")
 
-        place, name = (analysis, "analyse") if extra else (closed, "close_loop")
-        monkeypatch.setattr(place, name, spy)
+        monkeypatch.setattr(recording_job, "analyse" if extra else "close_loop", spy)
         status, _, err = run(
             "report", phantom, "--model", "free", "--device", "phantom", "--delay-s", "2e-4",
             "--delay-sd-s", "1e-5", "--band", "1,150", "--encoder-resolution", "1e-3",

@@ -23,7 +23,8 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.report.study.population_json import population_json
 from bayeshaptic.report.study.words import people
-from bayeshaptic.study.analysis import Analysed, StudyAnalysis
+from bayeshaptic.study.analysed import Analysed
+from bayeshaptic.study.analysis import StudyAnalysis
 from bayeshaptic.study.cases import study_cases
 from bayeshaptic.study.configuration_limits import configuration_limits
 from bayeshaptic.types import Floats

@@ -10,7 +10,7 @@ from fake_analysis import _tests, fake_closed
 
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
-from bayeshaptic.diagnosis.loop import Traced
+from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _fall
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.stability.critical import critical_stiffness

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from effect_cases import CASES, Case, base_fit, recorded
 
-from bayeshaptic.effects.registry import effects
+from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.archive import model_from_dict, model_to_dict
 from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.inference.screening import promising_starts

@@ -11,9 +11,10 @@ import pytest
 from effect_cases import CASES, plain_bench, recorded
 from test_effects import bench_response
 
-from bayeshaptic.effects import registry
+from bayeshaptic.effects import library, registry
 from bayeshaptic.effects.effect import LinearEffect
-from bayeshaptic.effects.registry import effect_class, effects, register
+from bayeshaptic.effects.library import effect_class, effects
+from bayeshaptic.effects.registry import register
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.archive import model_from_dict, model_to_dict
 from bayeshaptic.models import HalfNormal, Model, Parameter, build_model, rigid
@@ -191,11 +192,11 @@ def test_toy_effect_by_register(empty_registry) -> None:
 
 
 def test_toy_effect_by_an_entry_point(empty_registry, monkeypatch) -> None:
-    point = EntryPoint("toy_brake", f"{__name__}:Eddy", registry.ENTRY_POINT)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [point])
-    registry._load_own_and_installed.cache_clear()
+    point = EntryPoint("toy_brake", f"{__name__}:Eddy", library.ENTRY_POINT)
+    monkeypatch.setattr(library, "entry_points", lambda group: [point])
+    library._load_installed.cache_clear()
     check_the_toy()
-    registry._load_own_and_installed.cache_clear()
+    library._load_installed.cache_clear()
 
 
 def test_two_effects_of_one_name_are_refused(empty_registry) -> None:

@@ -12,7 +12,7 @@ from bayeshaptic.inference.least_squares import least_squares, summarise
 from bayeshaptic.inference.next_experiment import information, next_experiment
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.read import recording_from_arrays
-from bayeshaptic.recordings.response.windows import compress
+from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.guidance.elasticities import elasticities, with_delay

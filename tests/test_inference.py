@@ -71,7 +71,7 @@ def test_the_posterior_holds_the_truth(held_phantom):
 def test_the_sampler_agrees_with_a_plain_stretch_run(held_phantom):
     import emcee
 
-    from bayeshaptic.inference.sampling.coordinates import coordinates
+    from bayeshaptic.inference.coordinates import coordinates
     from bayeshaptic.inference.sampling.density import Density
     from bayeshaptic.inference.sampling.near_zero import with_near_zero
 

@@ -10,8 +10,8 @@ import pytest
 
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
+from bayeshaptic.effects.library import effect_class
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR
-from bayeshaptic.effects.registry import effect_class
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays

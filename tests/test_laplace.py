@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.effects.registry import effect_class
-from bayeshaptic.inference.sampling.coordinates import sampling_coordinates
+from bayeshaptic.effects.library import effect_class
+from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.ensembles import _spread_start
 from bayeshaptic.inference.sampling.importance import Adapted, adapt

@@ -21,7 +21,7 @@ from bayeshaptic.effects.nonlinear.internal_force import CONNECTION
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.windows import compress
+from bayeshaptic.recordings.response.etfe import compress
 
 Find = Callable[[str], Path]
 PERIOD_S = 1e-3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.inference.sampling.coordinates import sampling_coordinates
+from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.laplace import _possible
 from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero

@@ -14,7 +14,7 @@ import pytest
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
-from bayeshaptic.effects.registry import effects
+from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays

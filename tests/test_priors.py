@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import kstest
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.sampling.coordinates import coordinates, reach, sampling_coordinates
+from bayeshaptic.inference.coordinates import coordinates, reach, sampling_coordinates
 from bayeshaptic.models import (
     HalfNormal,
     LogNormal,

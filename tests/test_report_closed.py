@@ -18,8 +18,7 @@ from bayeshaptic import read_recording, write_report
 from bayeshaptic.diagnosis.residuals.force_curve import force_curve, motions
 from bayeshaptic.inference.least_squares import summarise
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.response.etfe import estimate_etfe
-from bayeshaptic.recordings.response.windows import compress
+from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
 from bayeshaptic.report import summary
 from bayeshaptic.report.assumptions import assumptions
 from bayeshaptic.report.figures import LOOP_PICTURES

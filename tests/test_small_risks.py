@@ -16,6 +16,8 @@ from bayeshaptic.stability.tail import TailWatch
 
 @dataclass(frozen=True)
 class Chains:
+    """What `TailWatch` reads of a sampler."""
+
     model: bh.Model
     chains: np.ndarray
 

@@ -11,6 +11,7 @@ import pytest
 
 from bayeshaptic import cli
 from bayeshaptic.inference.population import sampler as population_sampler
+from bayeshaptic.jobs import recording as recording_job
 from bayeshaptic.report.study import write as study_report
 from bayeshaptic.report.walls.section import table_of
 from bayeshaptic.rig import Bench, WhiteNoise, simulate, write_recording
@@ -63,7 +64,7 @@ def test_a_study_through_the_command(
     monkeypatch.setattr(study_analysis, "analyse", lambda *a, **b: analyse(*a, **b | {"ess": 200}))
     monkeypatch.setattr(study_report, "table_of", lambda cases: table_of(cases, draws=60))
     monkeypatch.setattr(population_sampler, "_MOST_STEPS", 60)
-    monkeypatch.setattr("bayeshaptic.report.write_report", _only_the_summary)
+    monkeypatch.setattr(recording_job, "write_report", _only_the_summary)
     out = tmp_path / "out"
     arguments = [
         "report",

@@ -12,7 +12,7 @@ from fake_analysis import fake_closed
 
 from bayeshaptic.recordings.study import StudyEntry
 from bayeshaptic.stability.cases import HELD
-from bayeshaptic.study.analysis import Analysed
+from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.recorded_cases import recorded, signature, widening
 
 

@@ -19,10 +19,9 @@ from linear_bench import (
 from scipy.stats import chi2
 
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import TableSpectra, estimate_etfe
+from bayeshaptic.recordings.response.etfe import TableSpectra, compress, estimate_etfe
 from bayeshaptic.recordings.response.local_polynomial import NODES, interpolation, window_edges
 from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
-from bayeshaptic.recordings.response.windows import compress
 
 PERIOD = 1e-3
 HIGHEST_HZ = 200.0

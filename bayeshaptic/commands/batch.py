@@ -58,7 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the reports; 0 where all came out, else 1."""
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.jobs import executors
-    from bayeshaptic.jobs.batch import jobs, refuse_file, report_source
+    from bayeshaptic.jobs.batch import jobs, report_source
+    from bayeshaptic.jobs.job import refuse_file
 
     folder = arguments.output.absolute()
     refuse_file(folder)

@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bayeshaptic.jobs.batch import Settings
+    from bayeshaptic.jobs.job import Settings
 
 MODELS = ("auto", "rigid", "free", "grasped")
 
@@ -143,7 +143,7 @@ def workers_from(arguments: argparse.Namespace) -> int:
 
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """What `add_analysis_options` understood, as one thing."""
-    from bayeshaptic.jobs.batch import Settings
+    from bayeshaptic.jobs.job import Settings
 
     return Settings(
         columns=arguments.columns,

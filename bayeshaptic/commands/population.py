@@ -53,8 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the population; 0, or 1 where a recording failed."""
     from bayeshaptic.commands.talk import Talk
-    from bayeshaptic.jobs.batch import Job
-    from bayeshaptic.jobs.study_batch import report_population
+    from bayeshaptic.jobs.job import Job
+    from bayeshaptic.jobs.study import report_population
     from bayeshaptic.recordings.read import recording_name
 
     folder = arguments.output or Path(f"{recording_name(arguments.source)}-population")

@@ -58,7 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; 0, or 1 where a recording of a study failed."""
     from bayeshaptic.commands.talk import Talk
-    from bayeshaptic.jobs.batch import Job, report_source
+    from bayeshaptic.jobs.batch import report_source
+    from bayeshaptic.jobs.job import Job
     from bayeshaptic.recordings.read import recording_name
 
     folder = arguments.output or Path(f"{recording_name(arguments.source)}-report")

@@ -23,8 +23,9 @@ from bayeshaptic.diagnosis.feedback.explain import (
     has_feedback,
     trace_force,
 )
-from bayeshaptic.diagnosis.loop import Traced, trace
+from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.state import REPORT, Accepted, share
+from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.least_squares import Fit, polish
 from bayeshaptic.inference.likelihood import Likelihood

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.loop import UNEXPLAINED, Traced
+from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models.structures import GROUND_DAMPERS

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from bayeshaptic.diagnosis.residuals.drift import drift_tests
 from bayeshaptic.diagnosis.residuals.residual import Test, frequency_tests
 from bayeshaptic.diagnosis.samples.mend import measurement_tests, repair_measurement
 from bayeshaptic.diagnosis.state import State, Trial
+from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Candidate, Traced
 from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
@@ -28,56 +29,6 @@ _LINEAR_FIRST = 10.0  # reduced chi-square from which the linear misfit is mende
 _RIVAL = 0.85  # share of the best score that a rival has at least
 _NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit
 _TIE = 6.0  # difference of scores that one recording does not decide
-CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A candidate effect in the record of the loop.
-
-    Attributes
-    ----------
-    name, title : str
-    score : float
-        Gain in log likelihood on windows that took no part in the fit, less two a parameter; of
-        measurement effects the statistic of their own test.
-    accepted : bool
-    round : int
-        From 1; 0 for what was wrong with the measurement itself.
-    """
-
-    name: str
-    title: str
-    score: float
-    accepted: bool
-    round: int
-
-
-@dataclass(frozen=True)
-class Traced:
-    """What the loop found.
-
-    Attributes
-    ----------
-    verdict : {"consistent", "explained", "unexplained"}
-    residual_class : str or None
-        Class of what remains ("unexplained"), else of the first effect found.
-    state : State
-        Measurement, model and fit with the accepted effects.
-    before, after : tuple of Test
-        The tests of the residual before and after.
-    candidates : tuple of Candidate
-    rejected : tuple of Trial
-        Trials of the last round that were good but not accepted: how else it could be.
-    """
-
-    verdict: str
-    residual_class: str | None
-    state: State
-    before: tuple[Test, ...]
-    after: tuple[Test, ...]
-    candidates: tuple[Candidate, ...] = ()
-    rejected: tuple[Trial, ...] = ()
 
 
 def residual_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:

@@ -1,4 +1,10 @@
-"""Imports every effect of this package, so that it is registered."""
+"""The library of effects: those of this package, and those that other packages register."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any
 
 from bayeshaptic.effects import measurement
 from bayeshaptic.effects.linear import (
@@ -11,17 +17,48 @@ from bayeshaptic.effects.linear import (
     transmission_loss,
 )
 from bayeshaptic.effects.nonlinear import actuator, friction, springs
+from bayeshaptic.effects.registry import register, registered
+from bayeshaptic.errors import InputError
 
-__all__ = [
-    "actuator",
-    "attached_mass",
-    "base_compliance",
-    "centring_stiffness",
-    "extra_delay",
-    "friction",
-    "low_pass",
-    "measurement",
-    "reflex",
-    "springs",
-    "transmission_loss",
-]
+ENTRY_POINT = "bayeshaptic.effects"
+# Importing an effect registers it.
+OWN = (
+    attached_mass,
+    base_compliance,
+    centring_stiffness,
+    extra_delay,
+    low_pass,
+    reflex,
+    transmission_loss,
+    actuator,
+    friction,
+    springs,
+    measurement,
+)
+
+
+@cache
+def _load_installed() -> None:
+    for point in entry_points(group=ENTRY_POINT):
+        register(point.load())
+
+
+def effects(family: str | None = None) -> tuple[Any, ...]:
+    """The effect classes, of one family or all, in the order in which they were registered."""
+    _load_installed()
+    return tuple(e for e in registered().values() if family is None or e.family == family)
+
+
+def effect_class(name: str) -> Any:
+    """The effect called `name`.
+
+    Raises
+    ------
+    InputError
+        If there is none; the message lists those there are.
+    """
+    _load_installed()
+    known = registered()
+    if name not in known:
+        raise InputError(f"no effect {name!r}; there are {', '.join(known)}.")
+    return known[name]

@@ -1,8 +1,8 @@
 """Likelihood, least squares, sampling, and the posterior."""
 
-from bayeshaptic.inference.arviz_io import load_posterior
 from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.load import load_posterior
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 

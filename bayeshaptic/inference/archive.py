@@ -6,7 +6,7 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from bayeshaptic.devices import Device
-from bayeshaptic.effects.registry import effect_class
+from bayeshaptic.effects.library import effect_class
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import (
     HalfNormal,

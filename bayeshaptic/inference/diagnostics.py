@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.inference.arviz_statistics import effective_sample_size, split_rhat
 from bayeshaptic.types import Floats
 
 RHAT_LIMIT = 1.01
@@ -41,8 +42,6 @@ def diagnose(chains: Floats) -> Diagnostics:
     A. Vehtari, A. Gelman, D. Simpson, B. Carpenter, P.-C. Buerkner, "Rank-normalization, folding,
     and localization: an improved R-hat", Bayesian Analysis 16 (2021); computed by ArviZ.
     """
-    from bayeshaptic.inference.arviz_io import effective_sample_size, split_rhat
-
     ensembles, steps, walkers, size = chains.shape
     # A whole ensemble as a chain, in the order of time.
     as_ensembles = chains.reshape(ensembles, steps * walkers, size)

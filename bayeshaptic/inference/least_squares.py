@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.sampling.coordinates import Coordinates, coordinates, reach
 from bayeshaptic.models import Model
 from bayeshaptic.models.start import informed, starting_points
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
-from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
 

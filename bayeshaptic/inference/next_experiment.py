@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.least_squares import Fit, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.sampling.coordinates import Coordinates, coordinates
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.structures import FREE, GRASPED, HAND
 from bayeshaptic.numerics.gauss_newton import jacobian

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bayeshaptic.inference.arviz_groups import save_posterior, to_arviz
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -121,13 +122,9 @@ class Posterior:
         }
 
     def to_arviz(self) -> Any:
-        """An ArviZ InferenceData (0.x) or DataTree (1.x): see `arviz_io`."""
-        from bayeshaptic.inference.arviz_io import to_arviz
-
+        """An ArviZ InferenceData (0.x) or DataTree (1.x): see `arviz_groups`."""
         return to_arviz(self)
 
     def save(self, path: str | Path) -> Path:
         """Write it to `path` as netCDF for `load_posterior`; never leaves half a file."""
-        from bayeshaptic.inference.arviz_io import save_posterior
-
         return save_posterior(self, Path(path))

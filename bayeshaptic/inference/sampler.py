@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
 from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.sampling.coordinates import sampling_coordinates
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.ensembles import Ensemble, refitted, warmed_up
 from bayeshaptic.inference.sampling.importance import adapt

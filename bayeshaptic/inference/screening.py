@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.least_squares import weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.sampling.coordinates import coordinates
 from bayeshaptic.models import Model
 from bayeshaptic.models.model import LinearEffect
 from bayeshaptic.models.structures import HAND

@@ -7,10 +7,10 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
-from bayeshaptic import __version__
 from bayeshaptic.models.structures import QUANTITIES
 from bayeshaptic.report import words
 from bayeshaptic.report.quantities import interval, pretty_unit, pure, quantity
+from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

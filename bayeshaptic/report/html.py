@@ -10,7 +10,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic import __version__
 from bayeshaptic.report import tables, words
 from bayeshaptic.report.assumptions import assumptions, priors, versions
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
@@ -19,6 +18,7 @@ from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop import tables as loop_tables
 from bayeshaptic.report.loop import words as loop_words
 from bayeshaptic.report.summary import analysis_of, closed_of, measured_of
+from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Template

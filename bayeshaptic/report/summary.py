@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic import __version__
 from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.report.estimates import RISKS, finite
+from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from bayeshaptic.devices import Device, load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.dynamics.plant import Plant, assemble
 from bayeshaptic.rig.dynamics.structure import chain, check_parameters
 from bayeshaptic.rig.effects import Effect, Scales, make_effect
-
-if TYPE_CHECKING:
-    from bayeshaptic.devices import Device
+from bayeshaptic.rig.scales import motion_scales
+from bayeshaptic.rig.truth import critical_limit
 
 POSITION_UNITS = {"N": "m", "Nm": "rad"}
 
@@ -123,8 +123,6 @@ class Bench:
         InputError
             Where the device file lacks the mechanism's parameters.
         """
-        from bayeshaptic.devices import load_device
-
         found = load_device(device)
         kind = mechanism or ("grasped" if held else "free")
         if kind not in found.parameters:
@@ -203,12 +201,8 @@ class Bench:
 
     def scales(self) -> Scales:
         """How far and how fast the bench moves under its usual excitation, without effects."""
-        from bayeshaptic.rig.scales import motion_scales
-
-        return motion_scales(self)
+        return motion_scales(replace(self, effects=()))
 
     def true_critical_stiffness(self, damping: float = 0.0) -> float:
         """The stiffness at which a virtual wall loses stability; see `critical_limit`."""
-        from bayeshaptic.rig.truth import critical_limit
-
         return critical_limit(self, damping).stiffness

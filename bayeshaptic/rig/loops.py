@@ -9,11 +9,11 @@ import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.bench import Bench
-from bayeshaptic.rig.dynamics.motion import Start, blocks, initial_state
 from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.dynamics.propagate import split_delay
 from bayeshaptic.rig.dynamics.stepper import SUBSTEPS, Stepper
 from bayeshaptic.rig.effects import Effect
+from bayeshaptic.rig.motion import Start, blocks, initial_state
 from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.rig.sensing import Encoder, Streams, actuate, hand_force, write_down
 from bayeshaptic.rig.truth import smoothing_of

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import scipy.integrate
 
-from bayeshaptic.rig.bench import Bench
 from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.effects import Scales
 from bayeshaptic.rig.noise import tremor_density, wander_density
+from bayeshaptic.rig.setup import Setup
 
 
-def motion_scales(bench: Bench) -> Scales:
-    """Root mean squares under white noise in the bench's band, tremor and wander, without effects.
+def motion_scales(bench: Setup) -> Scales:
+    """Root mean squares under white noise in the bench's band, tremor and wander.
 
     From the frequency response of the continuous chain, without hold and delay.
     """
-    plant = replace(bench, effects=()).plant()
+    plant = bench.plant()
     frequency = np.geomspace(1e-3, bench.band_hz[1], 4000)
     low, high = bench.band_hz
 

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.bench import Bench
-from bayeshaptic.rig.dynamics.motion import Start, respond
 from bayeshaptic.rig.dynamics.stepper import HALVINGS, SUBSTEPS
 from bayeshaptic.rig.excitation import Excitation, Given, WhiteNoise
+from bayeshaptic.rig.motion import Start, respond
 from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.rig.sensing import Encoder, Streams, actuate, hand_force, write_down
 

@@ -15,7 +15,6 @@ import scipy.linalg
 import scipy.optimize
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.rig.bench import Bench
 from bayeshaptic.rig.dynamics.plant import Array, Plant
 from bayeshaptic.rig.dynamics.propagate import (
     generator,
@@ -25,6 +24,7 @@ from bayeshaptic.rig.dynamics.propagate import (
     stretches,
 )
 from bayeshaptic.rig.dynamics.stepper import delay_lookup
+from bayeshaptic.rig.setup import Setup
 
 # Moments of the recording at which a mechanism that changes is looked at.
 MOMENTS = 11
@@ -145,7 +145,7 @@ def _period_with_chains(plant: Plant, period_s: float, substeps: int) -> tuple[A
 
 
 def spectral_radius(
-    bench: Bench, stiffness: float, damping: float = 0.0, cutoff_hz: float | None = None
+    bench: Setup, stiffness: float, damping: float = 0.0, cutoff_hz: float | None = None
 ) -> float:
     """Largest modulus of the closed loop's eigenvalues, at the beginning of the recording.
 
@@ -161,7 +161,7 @@ def smoothing_of(cutoff_hz: float | None, period_s: float) -> float:
     return 0.0 if cutoff_hz is None else float(np.exp(-2 * np.pi * cutoff_hz * period_s))
 
 
-def critical_limit(bench: Bench, damping: float = 0.0) -> TrueLimit:
+def critical_limit(bench: Setup, damping: float = 0.0) -> TrueLimit:
     """The smallest stiffness at which the wall loses stability.
 
     Parameters
@@ -188,7 +188,7 @@ def _radii(loop: SampledLoop, stiffness: Array, damping: float, smoothing: float
     return np.abs(np.linalg.eigvals(loop.closed(stiffness, damping, smoothing))).max(axis=1)
 
 
-def _limit(bench: Bench, plant: Plant, damping: float) -> TrueLimit:
+def _limit(bench: Setup, plant: Plant, damping: float) -> TrueLimit:
     fine = sampled_loop(plant, bench.period_s)
     coarse = fine
     if plant.delayed and min(spring.delay_s for spring in plant.delayed) >= bench.period_s:

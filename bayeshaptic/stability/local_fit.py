@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import digamma
 
-from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.windows import compress
+from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.types import Complexes, Floats
 
 _ORDER = 3

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.models.response.system import Filter, LinearSystem
+from bayeshaptic.models.response.filter import Filter
+from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.types import Floats
 
 

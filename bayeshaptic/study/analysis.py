@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from bayeshaptic.devices import Device
@@ -16,6 +16,7 @@ from bayeshaptic.models import Prior, prior_from_table
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.stability.cases import Case, DeviceLimit
+from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.cases import StudyCases, study_cases
 from bayeshaptic.study.configuration_limits import ConfigurationLimits
 from bayeshaptic.types import Progress
@@ -24,41 +25,6 @@ Executor = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 """As in `bayeshaptic.jobs.executors`: yields outcomes with `item`, `result` and `error`."""
 
 _RECORDINGS = 0.8  # share of the progress that the recordings take
-
-
-@dataclass(frozen=True)
-class Analysed:
-    """One recording of a study, and what became of it.
-
-    Attributes
-    ----------
-    name : str
-        Of the file, without its ending; numbered where two have the same.
-    entry : StudyEntry
-    result : Analysis, Closed or None
-        None where it failed.
-    error : str or None
-        Why, in one line.
-    """
-
-    name: str
-    entry: StudyEntry
-    result: Analysis | Closed | None = field(default=None, repr=False)
-    error: str | None = None
-
-    @property
-    def analysis(self) -> Analysis | None:
-        """The analysis; of a closed loop that with its effects."""
-        if isinstance(self.result, Closed):
-            return self.result.analysis
-        return self.result
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects that were accepted."""
-        if isinstance(self.result, Closed):
-            return tuple(effect.name for effect in self.result.effects)
-        return ()
 
 
 @dataclass(frozen=True)

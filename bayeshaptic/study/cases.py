@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from bayeshaptic.inference.population.configurations import FEWEST
 from bayeshaptic.inference.population.infer import Population, infer_population
 from bayeshaptic.stability.cases import FREE, HELD, NEW_PERSON, Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.configuration_limits import ConfigurationLimits, configuration_limits
 from bayeshaptic.study.recorded_cases import (
     place_of,
@@ -25,10 +25,6 @@ from bayeshaptic.study.recorded_cases import (
     widening,
 )
 from bayeshaptic.types import Progress
-
-if TYPE_CHECKING:
-    from bayeshaptic.study.analysis import Analysed
-
 
 _PEOPLE = 25_000  # at least, that are drawn from all draws of the population
 

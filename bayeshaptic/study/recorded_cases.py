@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.stability.cases import FREE, Case
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness, draws_of
+from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.types import Floats
-
-if TYPE_CHECKING:
-    from bayeshaptic.diagnosis.analysis import Analysis
-    from bayeshaptic.study.analysis import Analysed
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics, inverse_dynamics
-from bayeshaptic.diagnosis.loop import Traced, residual_tests, verdict_of
+from bayeshaptic.diagnosis.loop import residual_tests, verdict_of
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
-from bayeshaptic.effects.registry import effects
+from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.effects.library import effects
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.recording import Recording

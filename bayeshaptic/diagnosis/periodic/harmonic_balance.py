@@ -22,8 +22,8 @@ from bayeshaptic.diagnosis.periodic.steady_motion import (
 )
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
+from bayeshaptic.inference.coordinates import coordinates, reach
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.sampling.coordinates import coordinates, reach
 from bayeshaptic.models import Model
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise

@@ -29,9 +29,9 @@ from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.inference.least_squares import Fit, polish, refine, summarise
 from bayeshaptic.inference.screening import promising_starts
-from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
-from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Tick
 
 ROUNDS = 6

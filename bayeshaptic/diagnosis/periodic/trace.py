@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bayeshaptic.diagnosis.loop import CONSISTENT, EXPLAINED, UNEXPLAINED, Candidate, Traced
 from bayeshaptic.diagnosis.periodic.loop import PeriodicLoop, close_periodic
+from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Candidate, Traced
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 

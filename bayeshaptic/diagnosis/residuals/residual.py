@@ -13,8 +13,8 @@ import numpy as np
 from scipy.special import ndtri_exp
 from scipy.stats import chi2, f, norm
 
+from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.least_squares import Fit, weighted_residuals
-from bayeshaptic.inference.sampling.coordinates import coordinates
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 

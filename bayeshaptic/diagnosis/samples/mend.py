@@ -26,8 +26,7 @@ from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.inference.least_squares import Fit, polish, refine, summarise
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
-from bayeshaptic.recordings.response.windows import compress
+from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
 
 
 def measurement_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:

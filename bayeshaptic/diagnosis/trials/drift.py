@@ -20,8 +20,8 @@ from bayeshaptic.inference.least_squares import least_squares, polish, summarise
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
-from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
 

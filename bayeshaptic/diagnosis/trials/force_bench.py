@@ -27,8 +27,8 @@ from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 SUBSTEPS = 8

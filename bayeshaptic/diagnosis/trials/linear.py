@@ -19,11 +19,11 @@ from bayeshaptic.diagnosis.state import (
     share,
 )
 from bayeshaptic.effects.effect import LinearEffect
-from bayeshaptic.effects.registry import effects
+from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.least_squares import polish, refine, summarise
 from bayeshaptic.models import Model
-from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.windows import Windows, compress
+from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 

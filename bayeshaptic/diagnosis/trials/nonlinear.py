@@ -14,9 +14,9 @@ import numpy as np
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.force_fit import fit_force
+from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
-from bayeshaptic.effects.registry import effects
 from bayeshaptic.inference.least_squares import Fit, polish, summarise
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.response.etfe import Etfe

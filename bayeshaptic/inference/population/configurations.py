@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.population.infer import common_model, prior_moments, study_coordinates
 from bayeshaptic.inference.population.path import Path
@@ -15,7 +16,6 @@ from bayeshaptic.inference.population.reweighting import inside
 from bayeshaptic.inference.population.sampler import LevelChains, sample_level
 from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.sampling.coordinates import Coordinates
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.threads import single_threaded

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.sampling.coordinates import Coordinates
 from bayeshaptic.types import Floats
 
 _MOST_POINTS = 5000

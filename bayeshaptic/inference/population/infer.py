@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.population.below import Below, draw_below
 from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.population.hierarchy import Hierarchy
@@ -22,7 +23,6 @@ from bayeshaptic.inference.population.reweighting import (
 from bayeshaptic.inference.population.sampler import LevelChains, sample_level
 from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.sampling.coordinates import Coordinates, coordinates
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.threads import single_threaded

@@ -18,13 +18,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.population.below import Below, draw_below
 from bayeshaptic.inference.population.cavity import Cavity, cavity, described, flattened
 from bayeshaptic.inference.population.gaussian_likelihood import exact_likelihood
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.sampler import TOLERABLE, run_ensembles
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.sampling.coordinates import Coordinates
 from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.inference.sampling.importance import adapt
 from bayeshaptic.numerics.mixture import student

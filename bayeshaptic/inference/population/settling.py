@@ -8,12 +8,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.population.below import walled
 from bayeshaptic.inference.population.gaussian_likelihood import STEP, linearised
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.path import Path
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.sampling.coordinates import Coordinates
 from bayeshaptic.types import Floats
 
 L = TypeVar("L", Hierarchy, Path)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.sampling.coordinates import Coordinates
 from bayeshaptic.types import Floats
 
 

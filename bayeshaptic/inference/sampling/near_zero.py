@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.least_squares import Fit, weighted_residuals
-from bayeshaptic.inference.sampling.coordinates import Coordinates
 from bayeshaptic.models import NearZero, draw
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats

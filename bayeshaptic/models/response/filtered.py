@@ -11,25 +11,27 @@ mechanism's.  The division for R begins at the lowest power, where F is 1 + smal
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.models.response.filter import Filter
+from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.sampled import from_poles, from_polynomials
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.types import Complexes, Floats
-
-if TYPE_CHECKING:
-    from bayeshaptic.models.response.system import LinearSystem
-
 
 _APART = 1e-4  # poles of one filter nearer to each other than this, relatively, are moved apart
 _FAST = 1.0  # |q| T
 
 
 def behind_fast_filters(
-    system: LinearSystem, frequency_hz: Floats, period_s: float
+    mechanism: Mechanism,
+    filters: Sequence[Filter],
+    delay_s: Floats,
+    frequency_hz: Floats,
+    period_s: float,
 ) -> tuple[Complexes, NDArray[np.bool_]]:
     """Sampled response of a system whose filters have poles of their own, beside its mechanism's.
 
@@ -39,12 +41,12 @@ def behind_fast_filters(
     good : ndarray of bool, shape (B,)
         False where the mechanism itself is too fast.
     """
-    numerator, denominator = system.mechanism.transfer()
-    bottom = np.ones((1, system.batch))
-    for factor in system.filters:
+    numerator, denominator = mechanism.transfer()
+    bottom = np.ones((1, mechanism.batch))
+    for factor in filters:
         numerator = multiply(numerator, factor.numerator)
         bottom = multiply(bottom, factor.denominator)
-    poles = np.concatenate([_simple_roots(factor.denominator) for factor in system.filters])
+    poles = np.concatenate([_simple_roots(factor.denominator) for factor in filters])
     gaps = poles[:, None] - poles[None, :]
     gaps[np.arange(len(poles)), np.arange(len(poles))] = 1.0
     slope = bottom[-1] * gaps.prod(axis=1)
@@ -53,15 +55,15 @@ def behind_fast_filters(
         _difference(numerator, multiply(denominator, _sum(poles, residues, bottom[-1]))), bottom
     )
     rest = rest[: len(denominator) - 1]
-    response, good = from_polynomials(rest, denominator, system.delay_s, frequency_hz, period_s)
-    response += from_poles(poles.T, residues.T, system.delay_s, frequency_hz, period_s)
+    response, good = from_polynomials(rest, denominator, delay_s, frequency_hz, period_s)
+    response += from_poles(poles.T, residues.T, delay_s, frequency_hz, period_s)
     return response, good
 
 
-def fast_filters(system: LinearSystem, period_s: float) -> NDArray[np.bool_]:
+def fast_filters(filters: Sequence[Filter], batch: int, period_s: float) -> NDArray[np.bool_]:
     """Where a filter is faster than the series over aliases bears, shape (B,)."""
-    found = np.zeros(system.batch, bool)
-    for factor in system.filters:
+    found = np.zeros(batch, bool)
+    for factor in filters:
         found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > _FAST
     return found
 

@@ -22,18 +22,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
+from bayeshaptic.models.response.filter import Filter
+from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.sampled import fastest_pole, laurent, nodes_at
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate
-
-if TYPE_CHECKING:
-    from bayeshaptic.models.response.system import Filter, LinearSystem
 
 Floats = NDArray[Any]
 Complexes = NDArray[Any]
@@ -111,17 +110,18 @@ class Remainder:
         return total, difference
 
 
-def remainder_of(system: LinearSystem) -> Remainder:
-    """What the dynamic links of `system` add to its rational part."""
-    mechanism = system.mechanism
-    pairs = [mechanism.drive, *((link.first, link.second) for link in system.dynamic_links)]
+def remainder_of(
+    mechanism: Mechanism, links: tuple[DynamicLink, ...], filters: tuple[Filter, ...]
+) -> Remainder:
+    """What dynamic links add to a mechanism with filters."""
+    pairs = [mechanism.drive, *((link.first, link.second) for link in links)]
     compliances = {
         (i, j): mechanism.mutual(pairs[i], pairs[j])
         for j in range(1, len(pairs))
         for i in range(j + 1)
     }
     denominator = mechanism.transfer()[1]
-    return Remainder(system.dynamic_links, compliances, denominator, system.filters)
+    return Remainder(links, compliances, denominator, filters)
 
 
 @dataclass(frozen=True)
@@ -175,9 +175,10 @@ def _chebyshev_nodes() -> tuple[Floats, Floats]:
     return x, np.linalg.inv(chebyshev.chebvander(x, _TERMS - 1))
 
 
-def sampled_remainder(system: LinearSystem, frequency_hz: Floats, period_s: float) -> Complexes:
+def sampled_remainder(
+    remainder: Remainder, delay_s: Floats, frequency_hz: Floats, period_s: float
+) -> Complexes:
     """Delta G at frequencies of shape (L,), with hold and delay; shape (B, L)."""
-    remainder = remainder_of(system)
     nodes = nodes_at(frequency_hz, period_s)
     theta = nodes.s.imag * period_s
     s = nodes.s[:, None]
@@ -185,9 +186,9 @@ def sampled_remainder(system: LinearSystem, frequency_hz: Floats, period_s: floa
     top = float(np.max(theta))
     fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
     if len(theta) > _TERMS and np.all(smooth_aliases(fastest, top)):
-        series = aliases(remainder, top, system.delay_s, period_s)
+        series = aliases(remainder, top, delay_s, period_s)
         total = total + chebyshev.chebvander(2 * theta / top - 1, _TERMS - 1) @ series.coefficients
     else:
-        total = total + alias_sums(remainder, theta, system.delay_s, period_s)
+        total = total + alias_sums(remainder, theta, delay_s, period_s)
     hold = nodes.hold[:, None] / period_s
-    return np.asarray((hold * np.exp(-s * system.delay_s) * total).T)
+    return np.asarray((hold * np.exp(-s * delay_s) * total).T)

@@ -7,26 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
+from bayeshaptic.models.response.filter import Filter
 from bayeshaptic.models.response.filtered import behind_fast_filters, fast_filters
 from bayeshaptic.models.response.mechanism import Mechanism
-from bayeshaptic.models.response.remainder import remainder_of, sampled_remainder
+from bayeshaptic.models.response.remainder import Remainder, remainder_of, sampled_remainder
 from bayeshaptic.models.response.sampled import from_poles, from_polynomials
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.types import Complexes, Floats
 
 _CHUNK = 128  # vectors at a time: the arrays of one chunk stay in the cache
-
-
-@dataclass(frozen=True)
-class Filter:
-    """A rational factor in the loop: actuator, sensor.  Polynomials of shape (degree + 1, B)."""
-
-    numerator: Polynomial
-    denominator: Polynomial
-
-    def rows(self, index: Index) -> Filter:
-        """A part of the batch."""
-        return Filter(self.numerator[:, index], self.denominator[:, index])
 
 
 @dataclass(frozen=True)
@@ -61,6 +50,11 @@ class LinearSystem:
     def rational_part(self) -> LinearSystem:
         """The same without its dynamic links."""
         return replace(self, dynamic_links=()) if self.dynamic_links else self
+
+    @property
+    def remainder(self) -> Remainder:
+        """What the dynamic links add to the rational part."""
+        return remainder_of(self.mechanism, self.dynamic_links, self.filters)
 
     def with_filter(self, numerator: Polynomial, denominator: Polynomial) -> LinearSystem:
         return replace(self, filters=(*self.filters, Filter(numerator, denominator)))
@@ -115,7 +109,7 @@ class LinearSystem:
         points = np.asarray(s, complex)[:, None]
         response = evaluate(numerator, points) / evaluate(denominator, points)
         if self.dynamic_links:
-            response = response + remainder_of(self).at(points)
+            response = response + self.remainder.at(points)
         return np.asarray(response.T)
 
     def continuous_approximation(self, frequency_hz: Floats, period_s: float) -> Complexes:
@@ -136,19 +130,21 @@ class LinearSystem:
         part = self.rows(rows) if self.batch > _CHUNK else self
         response = part._rational_response(frequency_hz, period_s)
         if part.dynamic_links:
-            response += sampled_remainder(part, frequency_hz, period_s)
+            response += sampled_remainder(part.remainder, part.delay_s, frequency_hz, period_s)
         return response
 
     def _rational_response(self, frequency_hz: Floats, period_s: float) -> Complexes:
         """The rational part, by the fastest way that holds for each row."""
-        fast = fast_filters(self, period_s) if self.filters else np.zeros(self.batch, bool)
+        fast = fast_filters(self.filters, self.batch, period_s)
         if fast.any() and not fast.all():
             response = np.empty((self.batch, len(frequency_hz)), complex)
             for part in (fast, ~fast):
                 response[part] = self.rows(part)._rational_response(frequency_hz, period_s)
             return response
         if fast.any():
-            response, good = behind_fast_filters(self, frequency_hz, period_s)
+            response, good = behind_fast_filters(
+                self.mechanism, self.filters, self.delay_s, frequency_hz, period_s
+            )
         else:
             numerator, denominator = self.transfer()
             response, good = from_polynomials(

@@ -18,9 +18,17 @@ from bayeshaptic.recordings.response.spectra import (
     Spectra,
     TableSpectra,
 )
+from bayeshaptic.recordings.response.windows import Reference, Windows
 from bayeshaptic.threads import single_threaded
 
-__all__ = ["Etfe", "PeriodicSpectra", "RandomSpectra", "TableSpectra", "estimate_etfe"]
+__all__ = [
+    "Etfe",
+    "PeriodicSpectra",
+    "RandomSpectra",
+    "TableSpectra",
+    "compress",
+    "estimate_etfe",
+]
 
 
 @dataclass(frozen=True)
@@ -175,3 +183,23 @@ def _check(recording: Recording, band_hz: tuple[float, float] | None) -> None:
             f"band {low:g} to {high:g} Hz: it ends above the Nyquist frequency, {nyquist:g} Hz "
             f"at a period of {recording.period_s:g} s"
         )
+
+
+def compress(
+    etfe: Etfe, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+) -> Windows:
+    """The windows that the likelihood uses.
+
+    Parameters
+    ----------
+    etfe : Etfe
+    reference : callable, optional
+        A first fit, as a function of the frequency in Hz. In a window only the ratio to it has to
+        be a parabola, which matters beside resonances and at low frequencies. By default a
+        smooth estimate made from the data. It makes no difference for periodic excitation and
+        for tables.
+    inputs : complex ndarray, shape (J, L), optional
+        Motions that add to the position with a coefficient each, at the lines of `etfe.spectra` and
+        in the scale of its positions.
+    """
+    return etfe.spectra.windows(reference, inputs)

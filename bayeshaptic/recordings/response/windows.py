@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from bayeshaptic.recordings.response.etfe import Etfe
 
 Reference = Callable[[NDArray[Any]], NDArray[Any]]
 """A frequency response: frequencies in Hz, shape (L,), to complex values, shape (L,)."""
@@ -59,23 +56,3 @@ class Windows:
             self.scatter[chosen],
             self.lines[chosen],
         )
-
-
-def compress(
-    etfe: Etfe, reference: Reference | None = None, inputs: NDArray[Any] | None = None
-) -> Windows:
-    """The windows that the likelihood uses.
-
-    Parameters
-    ----------
-    etfe : Etfe
-    reference : callable, optional
-        A first fit, as a function of the frequency in Hz. In a window only the ratio to it has to
-        be a parabola, which matters beside resonances and at low frequencies. By default a
-        smooth estimate made from the data. It makes no difference for periodic excitation and
-        for tables.
-    inputs : complex ndarray, shape (J, L), optional
-        Motions that add to the position with a coefficient each, at the lines of `etfe.spectra` and
-        in the scale of its positions.
-    """
-    return etfe.spectra.windows(reference, inputs)

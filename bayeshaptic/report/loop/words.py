@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.diagnosis.loop import CONSISTENT, UNEXPLAINED
+from bayeshaptic.diagnosis.traced import CONSISTENT, UNEXPLAINED
 from bayeshaptic.report.estimates import decibel
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.quantities import estimate, interval, pretty_unit, pure, quantity, scale

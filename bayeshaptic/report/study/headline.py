@@ -13,7 +13,8 @@ from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Binding
-    from bayeshaptic.study.analysis import Analysed, StudyAnalysis
+    from bayeshaptic.study.analysed import Analysed
+    from bayeshaptic.study.analysis import StudyAnalysis
 
 RISKS = (0.01, 0.05)
 HOLDERS = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from bayeshaptic import __version__
 from bayeshaptic.report.assumptions import versions
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
 from bayeshaptic.report.html import LABELS, embedded, style, template, unique, written
@@ -13,6 +12,7 @@ from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
 from bayeshaptic.report.study.headline import study_headline, what_binds
 from bayeshaptic.report.study.words import configurations, hands, missing, people
+from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from bayeshaptic.study.analysis import StudyAnalysis

@@ -18,7 +18,8 @@ from bayeshaptic.study.recorded_cases import place_of
 if TYPE_CHECKING:
     from bayeshaptic.inference.population.infer import Population
     from bayeshaptic.stability.cases import Case
-    from bayeshaptic.study.analysis import Analysed, StudyAnalysis
+    from bayeshaptic.study.analysed import Analysed
+    from bayeshaptic.study.analysis import StudyAnalysis
 
 _DASH = "\N{EN DASH}"
 _LEVELS = tuple(QUANTILES.values())

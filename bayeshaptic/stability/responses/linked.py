@@ -17,7 +17,6 @@ from bayeshaptic.models.response.remainder import (
     Remainder,
     alias_sums,
     aliases,
-    remainder_of,
     smooth_aliases,
 )
 from bayeshaptic.models.response.system import LinearSystem
@@ -99,7 +98,7 @@ class LinkedResponse:
 def linked_response(system: LinearSystem, period_s: float, exact: bool = True) -> LinkedResponse:
     """The response of a system with dynamic links: exact, or the continuous approximation."""
     rational = pole_response(system.rational_part, period_s, exact)
-    remainder = remainder_of(system)
+    remainder = system.remainder
     series = aliases(remainder, np.pi, system.delay_s, period_s)
     fastest = np.abs(np.linalg.eigvals(system.mechanism.state_matrix())).max(axis=1) * period_s
     rough = ~smooth_aliases(fastest, np.pi)

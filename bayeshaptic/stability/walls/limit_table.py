@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic import __version__
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.walls.damping import Damping
@@ -32,6 +31,7 @@ from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.stability.walls.tail import Tail, lower_tail
 from bayeshaptic.stability.walls.width import Boundary, ZWidth, width_of
 from bayeshaptic.types import Floats
+from bayeshaptic.version import __version__
 
 RISKS = (0.05, 0.01, 0.001)
 ROWS = 25  # dampings a filter

@@ -1,4 +1,4 @@
-"""The one place that knows ArviZ: its statistics, its data format, in versions 0.x and 1.x.
+"""Posteriors in ArviZ's data format, in versions 0.x and 1.x.
 
 ArviZ 0.x keeps an InferenceData and takes groups as keywords; 1.x keeps an xarray DataTree and
 takes a dictionary of groups.  Given the other's form, 0.x fails silently.
@@ -8,49 +8,49 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from bayeshaptic.errors import InputError
-from bayeshaptic.inference.archive import model_from_dict, model_to_dict
-from bayeshaptic.inference.diagnostics import diagnose
+from bayeshaptic.inference.archive import model_to_dict
+from bayeshaptic.inference.arviz_statistics import arviz
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.models import draw
+from bayeshaptic.models import Model, draw
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 _PREDICTIVE_DRAWS = 4  # a walker: the response at every frequency is large
 _LIKELIHOOD_DRAWS = 20  # a walker
 _PRIOR_DRAWS = 2000
-_MARK = "bayeshaptic"
+MARK = "bayeshaptic"
 
 
-def arviz() -> Any:
-    """The arviz module, without its once-a-day advertisement of the next version."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)
-        import arviz
+class Sampled(Protocol):
+    """The part of a `Posterior` that is written; its attributes are described there."""
 
-    return arviz
+    @property
+    def model(self) -> Model: ...
+    @property
+    def chains(self) -> Floats: ...
+    @property
+    def log_likelihood(self) -> Floats: ...
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def message(self) -> str: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def windows(self) -> Windows | None: ...
+    @property
+    def etfe(self) -> Etfe | None: ...
 
 
-def effective_sample_size(chains: Floats, method: str) -> float:
-    """ArviZ's effective sample size, "bulk" or "tail" (5 % and 95 %), of chains (chain, draw)."""
-    keywords = {"prob": (0.05, 0.95)} if method == "tail" else {}
-    value = float(arviz().ess(chains, method=method, **keywords))
-    return value if np.isfinite(value) else 0.0
-
-
-def split_rhat(chains: Floats) -> float:
-    """ArviZ's rank-normalised split R-hat of chains of shape (chain, draw)."""
-    value = float(arviz().rhat(chains))
-    return value if np.isfinite(value) else float("inf")
-
-
-def to_arviz(posterior: Posterior) -> Any:
+def to_arviz(posterior: Sampled) -> Any:
     """The posterior as ArviZ keeps it, each walker a chain.
 
     Groups: ``posterior`` (a variable a parameter, its unit in ``attrs["units"]``),
@@ -71,7 +71,7 @@ def to_arviz(posterior: Posterior) -> Any:
     return xarray.DataTree.from_dict(groups)
 
 
-def save_posterior(posterior: Posterior, path: Path) -> Path:
+def save_posterior(posterior: Sampled, path: Path) -> Path:
     """Write `posterior` as netCDF, first beside `path` and then in its place."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -82,65 +82,13 @@ def save_posterior(posterior: Posterior, path: Path) -> Path:
     return path
 
 
-def load_posterior(path: str | Path) -> Posterior:
-    """Read a posterior that `Posterior.save` or a report wrote.
-
-    Parameters
-    ----------
-    path : path
-        A ``posterior.nc``.
-
-    Returns
-    -------
-    Posterior
-        As good as a fresh one for `critical_stiffness`; the measurement itself is not in it.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is not a posterior of this package.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; a report writes posterior.nc into its folder.")
-    import xarray
-
-    try:
-        with xarray.open_dataset(path, group="posterior", engine="h5netcdf") as data:
-            data.load()
-        with xarray.open_dataset(path, group="sample_stats", engine="h5netcdf") as stats:
-            stats.load()
-        about = json.loads(data.attrs[_MARK])
-    except (OSError, KeyError, ValueError) as problem:
-        raise InputError(f"{path}: not a posterior of bayeshaptic ({problem}).") from None
-    model = model_from_dict(about["model"])
-    by_walker = np.stack([data[name].values for name in model.names], axis=-1)
-    chains = _by_ensemble(by_walker, about["ensembles"])
-    return Posterior(
-        model,
-        chains,
-        _by_ensemble(stats["log_likelihood"].values, about["ensembles"]),
-        diagnose(chains),
-        about["converged"],
-        about["message"],
-        about["seconds"],
-        about["seed"],
-    )
-
-
 def _by_walker(values: Floats) -> Floats:
     """(ensembles, steps, walkers, ...) to (chain, draw, ...) with each walker a chain."""
     moved = np.moveaxis(values, 2, 1)
     return moved.reshape(-1, *moved.shape[2:])
 
 
-def _by_ensemble(values: Floats, ensembles: int) -> Floats:
-    """The way back from `_by_walker`."""
-    split = values.reshape(ensembles, -1, *values.shape[1:])
-    return np.moveaxis(split, 1, 2)
-
-
-def _groups(posterior: Posterior) -> dict[str, Any]:
+def _groups(posterior: Sampled) -> dict[str, Any]:
     """The groups as xarray datasets, for both versions alike."""
     import xarray
 
@@ -174,12 +122,12 @@ def _groups(posterior: Posterior) -> dict[str, Any]:
     return groups
 
 
-def _attributes(posterior: Posterior, name: str) -> dict[str, str]:
+def _attributes(posterior: Sampled, name: str) -> dict[str, str]:
     parameter = posterior.model.parameter(name)
     return {"units": posterior.model.unit(name), "long_name": parameter.title}
 
 
-def _about(posterior: Posterior) -> dict[str, Any]:
+def _about(posterior: Sampled) -> dict[str, Any]:
     about = {
         "model": model_to_dict(posterior.model),
         "ensembles": posterior.chains.shape[0],
@@ -188,7 +136,7 @@ def _about(posterior: Posterior) -> dict[str, Any]:
         "seconds": posterior.seconds,
         "seed": posterior.seed,
     }
-    return {_MARK: json.dumps(about), "inference_library": "emcee"}
+    return {MARK: json.dumps(about), "inference_library": "emcee"}
 
 
 def _thinned(by_walker: Floats, count: int) -> Floats:
@@ -196,7 +144,7 @@ def _thinned(by_walker: Floats, count: int) -> Floats:
     return by_walker[:, step - 1 :: step][:, :count]
 
 
-def _pointwise(posterior: Posterior, by_walker: Floats, chain: dict[str, Any]) -> Any:
+def _pointwise(posterior: Sampled, by_walker: Floats, chain: dict[str, Any]) -> Any:
     import xarray
 
     assert posterior.windows is not None
@@ -214,7 +162,7 @@ def _pointwise(posterior: Posterior, by_walker: Floats, chain: dict[str, Any]) -
 
 
 def _predictive(
-    posterior: Posterior, by_walker: Floats, chain: dict[str, Any], rng: np.random.Generator
+    posterior: Sampled, by_walker: Floats, chain: dict[str, Any], rng: np.random.Generator
 ) -> dict[str, Any]:
     """The measured response, and what the posterior predicts of it with its noise."""
     import xarray

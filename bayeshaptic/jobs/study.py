@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
+from bayeshaptic.jobs import executors
+from bayeshaptic.jobs.executors import Executor, Outcome
+from bayeshaptic.jobs.job import Job, refuse_file
+from bayeshaptic.jobs.recording import reported
+from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.recordings.study import Study, read_study
 from bayeshaptic.report.reported import Reported
-
-if TYPE_CHECKING:
-    from bayeshaptic.jobs.batch import Job, Progress
-    from bayeshaptic.jobs.executors import Executor, Outcome
-    from bayeshaptic.recordings.study import Study
-    from bayeshaptic.study.analysis import StudyAnalysis
+from bayeshaptic.report.study.headline import study_headline
+from bayeshaptic.report.study.write import write_study_report
+from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
+from bayeshaptic.types import Progress
 
 _RECORDINGS = 0.8  # share of the progress that the recordings take
 _WRITING = 0.95
@@ -115,7 +120,6 @@ def analyse_and_report(
     part : callable, optional
         Progress of this recording.
     """
-    from bayeshaptic.jobs.batch import reported
 
     folder = folders[task.number]
     result = analyse(task, part)
@@ -124,7 +128,6 @@ def analyse_and_report(
 
 def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:
     """A folder for each recording, numbered where two have the same name."""
-    from bayeshaptic.recordings.read import recording_name
 
     names = [recording_name(task.entry.path) for task in tasks]
     return tuple(
@@ -134,8 +137,6 @@ def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:
 
 
 def _read(job: Job) -> Study:
-    from bayeshaptic.jobs.batch import refuse_file
-    from bayeshaptic.recordings.study import read_study
 
     refuse_file(job.folder)
     for option in ("columns", "period_s", "encoder_resolution"):
@@ -150,8 +151,6 @@ def _read(job: Job) -> Study:
 def _analysed(
     study: Study, job: Job, progress: Progress | None, executor: Executor
 ) -> StudyAnalysis:
-    from bayeshaptic.devices import load_device
-    from bayeshaptic.study.analysis import analyse_study
 
     settings = job.settings
     return analyse_study(
@@ -175,8 +174,6 @@ def _device(
     progress: Progress | None,
 ) -> tuple[Reported, ...]:
     """The page of the device, shorter without reports; none where no recording could be used."""
-    from bayeshaptic.report.study.headline import study_headline
-    from bayeshaptic.report.study.write import write_study_report
 
     if study.limit is None:
         return ()
@@ -192,7 +189,6 @@ def _device(
 
 def _executor(progress: Progress | None, names: Sequence[str], workers: int) -> Executor:
     """Processes, or one recording after the other with the progress of each."""
-    from bayeshaptic.jobs import executors
 
     if workers > 1 and len(names) > 1:
         return executors.processes(workers)

@@ -1,0 +1,82 @@
+"""From one recording, or a table of a frequency response, to its report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bayeshaptic.devices import Device, load_device
+from bayeshaptic.diagnosis.analysis import Analysis, analyse
+from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.jobs.job import Job, Settings
+from bayeshaptic.recordings.read import read_measurement, recording_name
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.report import write_report
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.loop.words import in_short
+from bayeshaptic.report.reported import Reported
+from bayeshaptic.report.summary import analysis_of
+from bayeshaptic.types import Progress
+
+
+def report_recording(job: Job, progress: Progress | None) -> Reported:
+    """Read, analyse and report; see `bayeshaptic.jobs.batch.report_source`."""
+    settings = job.settings
+    device = None if settings.device is None else load_device(settings.device)
+    resolution = settings.encoder_resolution
+    if resolution is None and device is not None:
+        resolution = device.encoder_resolution
+    measurement = read_measurement(
+        job.source,
+        columns=settings.columns,
+        period_s=settings.period_s,
+        encoder_resolution=resolution,
+        kind=device.kind if device else None,
+        default_period_s=device.period_s if device else None,
+    )
+    if device is not None and isinstance(measurement, Recording):
+        measurement = replace(measurement, device=device.name)
+    return _report(measurement, recording_name(job.source), job.folder, settings, device, progress)
+
+
+def _report(
+    measurement: Recording | Etfe,
+    name: str,
+    folder: Path,
+    settings: Settings,
+    device: Device | None,
+    progress: Progress | None,
+) -> Reported:
+    """Analyse one measurement and write its report."""
+    options: dict[str, Any] = {
+        "model": settings.model,
+        "device": device,
+        "delay_s": settings.delay_s,
+        "delay_sd_s": settings.delay_sd_s,
+        "band_hz": settings.band_hz,
+        "held": None,
+        "seed": settings.seed,
+        "progress": progress,
+    }
+    run = close_loop if settings.close_loop else analyse
+    return reported(name, run(measurement=measurement, **options), folder)
+
+
+def reported(name: str, result: Analysis | Closed, folder: Path) -> Reported:
+    """Write the report of one analysed measurement, and say what is in it.
+
+    Parameters
+    ----------
+    name : str
+    result : Analysis or Closed
+    folder : Path
+    """
+
+    page = write_report(result, folder)
+    warnings = tuple(
+        notice.text for notice in analysis_of(result).notices if notice.level == "warning"
+    )
+    remark = in_short(result) if isinstance(result, Closed) else ""
+    return Reported(name, page, headline(result), remark, warnings)

@@ -1,0 +1,36 @@
+"""What the limit and the motion of a bench are computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from bayeshaptic.rig.dynamics.plant import Plant
+
+
+class Setup(Protocol):
+    """The part of a `Bench` that `truth` and `scales` need; its attributes are described there."""
+
+    @property
+    def values(self) -> Mapping[str, float]: ...
+    @property
+    def period_s(self) -> float: ...
+    @property
+    def encoder_resolution(self) -> float: ...
+    @property
+    def force_rms(self) -> float: ...
+    @property
+    def band_hz(self) -> tuple[float, float]: ...
+    @property
+    def tremor_rms(self) -> float: ...
+    @property
+    def tremor_hz(self) -> tuple[float, float]: ...
+    @property
+    def wander_rms(self) -> float: ...
+    @property
+    def wander_hz(self) -> float: ...
+    @property
+    def varies(self) -> bool: ...
+    def plant(self, progress: float = 0.0) -> Plant:
+        """State equations when a part `progress` (0..1) of the recording is over."""
+        ...

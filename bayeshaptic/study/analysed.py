@@ -1,0 +1,44 @@
+"""One recording of a study, and what became of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.recordings.study import StudyEntry
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """One recording of a study, and what became of it.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without its ending; numbered where two have the same.
+    entry : StudyEntry
+    result : Analysis, Closed or None
+        None where it failed.
+    error : str or None
+        Why, in one line.
+    """
+
+    name: str
+    entry: StudyEntry
+    result: Analysis | Closed | None = field(default=None, repr=False)
+    error: str | None = None
+
+    @property
+    def analysis(self) -> Analysis | None:
+        """The analysis; of a closed loop that with its effects."""
+        if isinstance(self.result, Closed):
+            return self.result.analysis
+        return self.result
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that were accepted."""
+        if isinstance(self.result, Closed):
+            return tuple(effect.name for effect in self.result.effects)
+        return ()
