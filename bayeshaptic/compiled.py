@@ -7,7 +7,7 @@ not need it.  Beside each kernel stands a plain NumPy form that it is tested aga
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any, TypeVar, overload
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -52,6 +52,27 @@ def kernel(function: F | None = None, *, inline: bool = False) -> F | Callable[[
     except RuntimeError:  # no folder that can be written: compiled anew in each process
         compiled = njit(**options)(function)
     return compiled
+
+
+@cache
+def callback(function: Callable[..., float]) -> Any:
+    """A function of numbers and one array, compiled so that a kernel takes it as an argument.
+
+    The kernel is compiled once, whatever function it is given.
+
+    Parameters
+    ----------
+    function : callable
+        Of a module; returns a number.  The last of its arguments is an array.
+    """
+    from numba import cfunc, float64
+
+    _listen()
+    signature = float64(*[float64] * (function.__code__.co_argcount - 1), float64[::1])
+    try:
+        return cfunc(signature, cache=True, error_model="numpy")(function)
+    except RuntimeError:
+        return cfunc(signature, error_model="numpy")(function)
 
 
 def when_compiling(tell: Callable[[], None] | None) -> None:

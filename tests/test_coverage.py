@@ -1,4 +1,4 @@
-"""Do intervals hold the truth?  The reduced version of benchmarks/coverage.py."""
+"""Do intervals hold the truth?  The reduced version of benchmarks/posterior_coverage.py."""
 
 from __future__ import annotations
 

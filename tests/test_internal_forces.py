@@ -11,7 +11,8 @@ import pytest
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
 from bayeshaptic.effects.library import effect_class
-from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, forced_motion, steps
+from bayeshaptic.effects.nonlinear.stepping import step_through
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
@@ -21,6 +22,7 @@ from bayeshaptic.rig.excitation import Given
 
 LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 6.0, 4
+STEP_S = 1e-3 / 8
 
 # Name, fields on the bench, strength, shape, place.
 FORCES: tuple[tuple[str, dict[str, float], float, dict[str, float], Any], ...] = (
@@ -62,6 +64,36 @@ def recorded(bench: Bench) -> Recording:
         period_s=bench.period_s,
         encoder_resolution=bench.encoder_resolution,
     )
+
+
+@pytest.mark.parametrize("case", FORCES[:-1], ids=[force[0] for force in FORCES[:-1]])
+def test_compiled_steps_are_the_plain_ones(case: Any) -> None:
+    name, _, strength, shape, place = case
+    model = build_model("grasped", "lhifam")
+    law = effect_class(OURS.get(name, name))(place, shape).law(strength, model, model.values)
+    mechanism = model.system(model.values).mechanism
+    wander = np.cumsum(np.random.default_rng(1).normal(size=800))
+    velocity = wander * (0.005 if place == MOTOR else 1e-4)
+    motion = np.cumsum(velocity) * STEP_S, velocity, STEP_S, 8
+    constants = np.array(law.constants, float)
+    plain = step_through(*steps(mechanism, place, STEP_S), *motion, law.force, constants)
+    found = forced_motion(mechanism, place, law, *motion)
+    # What rounding differs by, over eight hundred steps.
+    np.testing.assert_allclose(found, plain, rtol=0, atol=1e-10 * np.abs(plain).max())
+    assert np.ptp(plain) > 0
+
+
+def test_dry_friction_holds_a_mass_still() -> None:
+    model = build_model("rigid", "lhifam")
+    mechanism = model.system(model.values).mechanism
+    law = effect_class("coulomb_friction")(MOTOR).law(1.0, model, model.values)
+    # Moved to and fro by half of what friction can hold, were there no friction.
+    rate, time = 2 * np.pi * 5.0, STEP_S * np.arange(4000)
+    size = 0.5 / float(mechanism.masses[0][0]) / rate
+    velocity, position = size * np.sin(rate * time), size / rate * (1 - np.cos(rate * time))
+    added = forced_motion(mechanism, MOTOR, law, position, velocity, STEP_S, 8)
+    # Velocities are exact at the ends of the steps: the trapezoidal rule is off by (w h)^2 / 12.
+    assert np.abs(added + position[::8]).max() < (rate * STEP_S) ** 2 * position.max()
 
 
 @pytest.mark.parametrize(

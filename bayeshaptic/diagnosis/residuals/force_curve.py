@@ -14,7 +14,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.residuals.columns import driven_motion, line_transform, pair_response
 from bayeshaptic.inference.least_squares import Fit
-from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.models.response.motion import linear_motions
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Complexes, Floats
@@ -55,7 +55,7 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
     force = recording.force - recording.force.mean()
     system = fit.model.system(fit.theta)
     if len(system.mechanism.masses) > 1:
-        ends = [linear_motion(system, force, recording.period_s, mass=n)[0] for n in (0, 1)]
+        ends = linear_motions(system, force, recording.period_s, (0, 1))[:, 0]
         found[STRETCH] = ends[0] - ends[1]
     found[COMMAND] = force
     return found

@@ -25,7 +25,7 @@ from bayeshaptic.effects.nonlinear.internal_force import (
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.windows import Windows
@@ -77,27 +77,25 @@ class ForceBench:
         self.recording = recording
         self.force = recording.force - recording.force.mean()
         self._transform = line_transform(state.etfe, recording)
-        self._starts: dict[Place, Floats] = {}
         self._extra: Floats = np.zeros(recording.samples)
         self._base = self._likelihoods(state.fit.theta, state.fit.windows)
 
     def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
         """Position and velocity at places, on the fine grid, without the force."""
-        system = self.model.system(theta)
-        period = self.recording.period_s
-        x, v = linear_motion(system, self.force, period, 0, SUBSTEPS)
+        system, period = self.model.system(theta), self.recording.period_s
+        masses = tuple(range(min(len(system.mechanism.masses), 2)))
+        if set(places) == {MOTOR}:
+            masses = masses[:1]
+        (x, v), *others = linear_motions(system, self.force, period, masses, SUBSTEPS)
         found = {}
         along: Floats | float = 0.0
         if {MOTOR, LOAD} & set(places):
             # The measured position has what a hand does, and where the device stands.
             measured = self.recording.position
-            grid, samples = np.arange(len(x)) / SUBSTEPS, np.arange(len(measured))
             besides = measured - x[::SUBSTEPS] - self._extra
-            slow = self._hand(besides) if self.held else self._drift(besides, theta)
-            along = np.interp(grid, samples, slow)
-            found[MOTOR] = Motion(np.interp(grid, samples, measured), v + along, self.force)
-        if {CONNECTION, LOAD} & set(places) and len(system.mechanism.masses) > 1:
-            x2, v2 = linear_motion(system, self.force, period, 1, SUBSTEPS)
+            along = _between(self._hand(besides) if self.held else self._drift(besides, theta))
+            found[MOTOR] = Motion(_between(measured), v + along, self.force)
+        for x2, v2 in others:
             found[CONNECTION] = Motion(x - x2, v - v2, self.force)
             if LOAD in places:  # what is slow moves both masses
                 found[LOAD] = Motion(x2, v2 + along, self.force)
@@ -126,7 +124,7 @@ class ForceBench:
         if isinstance(effect, CommandEffect):
             return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
         motion = self.motions(theta, (effect.place,))[effect.place]
-        forced = forced_motion(
+        return forced_motion(
             system.mechanism,
             effect.place,
             effect.law(strength, self.model, theta),
@@ -134,10 +132,7 @@ class ForceBench:
             motion.velocity,
             period / SUBSTEPS,
             SUBSTEPS,
-            starts=self._starts.get(effect.place),
         )
-        self._starts[effect.place] = forced.starts
-        return forced.motor_position
 
     def remember(self, extra: Floats) -> None:
         """Take this for what the force adds, when the slow motion is read off the encoder."""
@@ -198,3 +193,10 @@ class ForceBench:
     def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
         pointwise = Likelihood(self.model, windows).pointwise(theta[None])[0]
         return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
+
+
+def _between(samples: Floats) -> Floats:
+    """Along straight lines to the fine grid, the last sample held, shape (N * SUBSTEPS,)."""
+    ahead = np.append(samples[1:], samples[-1])
+    weight = np.arange(SUBSTEPS) / SUBSTEPS
+    return np.asarray(samples[:, None] + (ahead - samples)[:, None] * weight).ravel()

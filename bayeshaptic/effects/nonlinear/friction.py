@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
-from bayeshaptic.effects.nonlinear.internal_force import LOAD, MOTOR, Law, Place, Step
+from bayeshaptic.effects.nonlinear.internal_force import LOAD, MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
@@ -42,12 +43,13 @@ class CoulombFriction(NonlinearEffect):
         return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        def force(step: Step) -> Floats:
-            return np.minimum(
-                np.maximum(step.last_velocity * (-1 / step.gain), -strength), strength
-            )
+        return Law(_coulomb, (strength,))
 
-        return force
+
+def _coulomb(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    """What stops the mass within the step, or as much of it as friction can."""
+    bound = constants[0]
+    return min(max(-last / gain, -bound), bound)
 
 
 @register
@@ -79,14 +81,14 @@ class StribeckFriction(NonlinearEffect):
         return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        rise = self.shape["static_excess"]
-        scale = 1 / self.shape["stribeck_velocity"]
+        shape = self.shape["static_excess"], self.shape["stribeck_velocity"]
+        return Law(_stribeck, (strength, *shape))
 
-        def force(step: Step) -> Floats:
-            bound = strength * (1 + rise * np.exp(-((step.velocity * scale) ** 2)))
-            return np.minimum(np.maximum(step.last_velocity * (-1 / step.gain), -bound), bound)
 
-        return force
+def _stribeck(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    rise, slow = constants[1], constants[2]
+    bound = constants[0] * (1 + rise * math.exp(-((v / slow) ** 2)))
+    return min(max(-last / gain, -bound), bound)
 
 
 @register
@@ -117,16 +119,15 @@ class DahlFriction(NonlinearEffect):
         return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        distance = self.shape["presliding_distance"]
+        return Law(_dahl, (strength, self.shape["presliding_distance"]))
 
-        def force(step: Step) -> Floats:
-            stiffness = strength * step.duration_s / distance
-            speed = np.abs(step.velocity + 0.5 * step.gain * step.before)
-            # Implicit in the force, so that a stiff beginning is stable.
-            slip = 1 + stiffness * step.gain + speed * (step.duration_s / distance)
-            return (step.before - stiffness * step.velocity) / slip
 
-        return force
+def _dahl(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    """Implicit in the force, so that a stiff beginning is stable."""
+    part = step_s / constants[1]
+    stiffness = constants[0] * part
+    slip = 1 + stiffness * gain + part * abs(v + 0.5 * gain * before)
+    return (before - stiffness * v) / slip
 
 
 class _PowerOfVelocity(NonlinearEffect):
@@ -140,12 +141,15 @@ class _PowerOfVelocity(NonlinearEffect):
         return scale * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        def force(step: Step) -> Floats:
-            resistance = strength * np.abs(step.velocity) ** (self.power - 1)
-            # Implicit, so that it never reverses the motion.
-            return -resistance * step.velocity / (1 + 0.5 * resistance * step.gain)
+        return Law(_power_of_velocity, (strength, self.power))
 
-        return force
+
+def _power_of_velocity(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    """Implicit, so that it never reverses the motion."""
+    resistance = constants[0]
+    for _ in range(int(constants[1]) - 1):
+        resistance *= abs(v)
+    return -resistance * v / (1 + 0.5 * resistance * gain)
 
 
 @register

@@ -3,8 +3,7 @@
 The command drives the linear mechanism; the force (friction, a hardening spring, a gap) acts
 inside it and moves it further.  Only the further motion is simulated, on a fine grid, with the
 exact step of the linear mechanism; the force of a step is found together with its end, so that dry
-friction sticks exactly.  The recording is cut into segments that advance side by side, several
-times over, each from where the one before it ended the last time.
+friction sticks exactly.
 """
 
 from __future__ import annotations
@@ -15,41 +14,40 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
+from bayeshaptic.compiled import callback
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.types import Floats
 
+Force = Callable[[float, float, float, float, float, float, Floats], float]
+"""The force of one step, compiled when it is first simulated: a function of a module that uses
+`math` and its arguments alone.  These are
 
-@dataclass
-class Step:
-    """What a law knows of one step, in all segments side by side.
+position, velocity
+    in the middle of the step, if the force were absent during it;
+last velocity
+    at the end of the step, likewise;
+gain
+    what a unit force adds to the last velocity;
+before
+    the force of the step before;
+duration
+    of the step, s;
+constants
+    array: the law's strength and shape."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law of a force, with the values of its constants.
 
     Attributes
     ----------
-    position, velocity : ndarray, shape (segments,)
-        In the middle of the step, if the force were absent during it.
-    last_velocity : ndarray, shape (segments,)
-        At the end of the step, likewise.
-    gain : float
-        What a unit force adds to the last velocity.
-    before : ndarray, shape (segments,)
-        The force of the step before.
-    duration_s : float
+    force : Force
+    constants : tuple of float
     """
 
-    position: Floats
-    velocity: Floats
-    last_velocity: Floats
-    gain: float
-    before: Floats
-    duration_s: float
-
-
-Law = Callable[[Step], Floats]
-"""The force of a step, shape (segments,)."""
-
-_SEGMENT_S = 0.3
-_SWEEPS = 15
-_SETTLED = 4e-4  # relative change of the segments' starts
+    force: Force
+    constants: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -72,22 +70,6 @@ LOAD = Place(1, None)
 CONNECTION = Place(0, 1)
 
 
-@dataclass(frozen=True)
-class Forced:
-    """What an internal force adds to the motion.
-
-    Attributes
-    ----------
-    motor_position : ndarray, shape (N,)
-        To what the encoder reads, at the samples.
-    starts : ndarray, shape (states, segments)
-        State at the start of every segment; a later call with a force much the same begins here.
-    """
-
-    motor_position: Floats
-    starts: Floats
-
-
 def forced_motion(
     mechanism: Mechanism,
     place: Place,
@@ -96,8 +78,7 @@ def forced_motion(
     velocity: Floats,
     step_s: float,
     substeps: int,
-    starts: Floats | None = None,
-) -> Forced:
+) -> Floats:
     """Simulate what an internal force adds to the motion.
 
     Parameters
@@ -105,7 +86,7 @@ def forced_motion(
     mechanism : Mechanism
         A batch of one.
     place : Place
-    law : callable
+    law : Law
     position, velocity : ndarray, shape (N * substeps,)
         Motion at `place` without the force: of the mass, or of the first mass relative to the
         second. Against the ground the position is the one with the force: it is measured.
@@ -113,77 +94,29 @@ def forced_motion(
         Step of the fine grid.
     substeps : int
         Steps a sampling period.
-    starts : ndarray, shape (states, segments), optional
-        Where the segments start, from an earlier call.
 
     Returns
     -------
-    Forced
+    ndarray, shape (N,)
+        What the force adds to the motor's position at the samples.
     """
-    state, drive, at_position, at_velocity = _stepper(mechanism, place, step_s)
-    length = max(int(_SEGMENT_S / step_s) // substeps, 1) * substeps
-    count = -(-len(position) // length)
-    padding = (0, count * length + 1 - len(position))
-    index = np.arange(length)[:, None] + length * np.arange(count)[None, :]
-    ahead = np.stack([np.pad(a, padding, mode="edge") for a in (position, velocity)])
-    ahead = np.stack(
-        [*(0.5 * (ahead[:, index] + ahead[:, index + 1])), ahead[1, index + 1]], axis=1
+    from bayeshaptic.effects.nonlinear.stepping_kernel import step_through
+
+    return step_through(
+        *steps(mechanism, place, step_s),
+        np.ascontiguousarray(position),
+        np.ascontiguousarray(velocity),
+        step_s,
+        substeps,
+        callback(law.force),
+        np.array(law.constants, float),
     )
-    gain = float(at_velocity @ drive)
-    nothing = np.zeros(count)
-    step = Step(nothing, nothing, nothing, gain, nothing, step_s)
-    reading = np.concatenate([mechanism.drive_vector(), np.zeros(len(state) // 2)])
-    moving = slice(len(state) // 2, None)
-    if starts is None:
-        starts = np.zeros((len(state), count))
-    motor = np.empty((length // substeps, count))
-    pull = drive[:, None]
-    read = np.stack([at_position, at_velocity])
-    read = np.stack([*(0.5 * (read + read @ state)), at_velocity @ state])
-    for _ in range(_SWEEPS):
-        z = starts.copy()
-        # A segment begins with the force that the one before it ended with the last time.
-        step.before = np.concatenate([[0.0], step.before[:-1]])
-        for k in range(length):
-            if k % substeps == 0:
-                motor[k // substeps] = reading @ z
-            step.position, step.velocity, step.last_velocity = read @ z + ahead[k]
-            step.before = law(step)
-            z = state @ z + pull * step.before
-        # Each segment starts where the one before it ended: friction forgets its beginning.
-        used, starts = starts, np.concatenate([np.zeros_like(z[:, :1]), z[:, :-1]], axis=1)
-        size = np.sqrt(np.mean(starts[moving] ** 2)) + 1e-300
-        if np.sqrt(np.mean((starts - used)[moving] ** 2)) < _SETTLED * size:
-            break
-    motor += _mended(state, reading, length, substeps, used, z)
-    return Forced(motor.T.ravel()[: len(position) // substeps], starts)
 
 
-def _mended(
-    state: Floats, reading: Floats, length: int, substeps: int, used: Floats, ends: Floats
-) -> Floats:
-    """What the motor's position lacks for segments that fit each other, for the forces found.
-
-    The mechanism is linear in the forces: where every segment really starts follows from them, and
-    what a wrong start did is the mechanism's own motion from there.
-    """
-    over = np.linalg.matrix_power(state, length)
-    forced = ends - over @ used
-    true = np.zeros_like(used)
-    for s in range(1, used.shape[1]):
-        true[:, s] = over @ true[:, s - 1] + forced[:, s - 1]
-    period = np.linalg.matrix_power(state, substeps)
-    rows = np.empty((length // substeps, len(state)))
-    rows[0] = reading
-    for k in range(1, len(rows)):
-        rows[k] = rows[k - 1] @ period
-    return np.asarray(rows @ (true - used))
-
-
-def _stepper(
+def steps(
     mechanism: Mechanism, place: Place, step_s: float
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Exact step of the mechanism, of a unit force held over it, and what is read at `place`."""
+) -> tuple[Floats, Floats, float, Floats]:
+    """Exact steps, as `stepping.step_through` takes them: matrix, drive, gain, reading."""
     a = mechanism.state_matrix()[0]
     size, n = len(a), len(mechanism.masses)
     push = np.zeros(size)
@@ -197,4 +130,8 @@ def _stepper(
     block = np.zeros((size + 1, size + 1))
     block[:size, :size], block[:size, size] = a, push
     step = expm(block * step_s)
-    return step[:size, :size], step[:size, size], at_position, at_velocity
+    state, drive = step[:size, :size], np.ascontiguousarray(step[:size, size])
+    middle = [0.5 * (row + row @ state) for row in (at_position, at_velocity)]
+    matrix = np.concatenate([state, np.stack([*middle, at_velocity @ state])])
+    reading = np.concatenate([mechanism.drive_vector(), np.zeros(size // 2)])
+    return matrix, drive, float(at_velocity @ drive), reading

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, Law, Place, Step
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
@@ -43,10 +43,11 @@ class HardeningSpring(NonlinearEffect):
         return scale * np.array([0.001, 0.003, 0.01, 0.03, 0.1])
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        def force(step: Step) -> Floats:
-            return -strength * step.position**3
+        return Law(_cubic, (strength,))
 
-        return force
+
+def _cubic(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    return -constants[0] * x * x * x
 
 
 @register
@@ -78,12 +79,13 @@ class Backlash(NonlinearEffect):
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         values = dict(zip(model.names, theta, strict=True))
-        stiffness = values["kc"]
         damping = (1 - self.shape["damping_in_gap"]) * values["bc"]
+        return Law(_gap, (strength, values["kc"], damping))
 
-        def force(step: Step) -> Floats:
-            inside = np.abs(step.position) < strength
-            slack = np.where(inside, damping * step.velocity, 0.0)
-            return stiffness * np.clip(step.position, -strength, strength) + slack
 
-        return force
+def _gap(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    """What the linear connection takes inside the gap, given back."""
+    half, stiffness, damping = constants[0], constants[1], constants[2]
+    if abs(x) < half:
+        return stiffness * x + damping * v
+    return stiffness * min(max(x, -half), half)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
@@ -16,8 +15,15 @@ _GAP = 1e-5  # between poles, rad/s
 
 def linear_motion(
     system: LinearSystem, force: Floats, period_s: float, mass: int = 0, substeps: int = 1
-) -> tuple[Floats, Floats]:
-    """Position and velocity of one mass, from rest, for one parameter vector.
+) -> Floats:
+    """Position and velocity of one mass, shape (2, N * substeps): see `linear_motions`."""
+    return linear_motions(system, force, period_s, (mass,), substeps)[0]
+
+
+def linear_motions(
+    system: LinearSystem, force: Floats, period_s: float, masses: tuple[int, ...], substeps: int = 1
+) -> Floats:
+    """Position and velocity of masses, from rest, for one parameter vector.
 
     Exact for a force held between the samples and delayed by the system's delay; filters in the
     loop are left out of the sum over poles only if there are none.
@@ -28,39 +34,34 @@ def linear_motion(
         A batch of one.
     force : ndarray, shape (N,)
     period_s : float
-    mass : int
-        Number of the mass.
+    masses : tuple of int
+        Numbers of the masses.
     substeps : int
         Points a period, the sample itself first.
 
     Returns
     -------
-    position, velocity : ndarray, shape (N * substeps,)
+    ndarray, shape (masses, 2, N * substeps)
     """
+    from bayeshaptic.models.response.motion_kernel import modal_motion
+
     poles = _apart(system.poles()[0][0])
-    residues = _residues(system, poles, mass)
     h = period_s / substeps
     delay = float(system.delay_s[0])
     whole = int(np.floor(delay / h + 1e-9))
     late = max(delay - whole * h, 0.0)
-    fine = np.repeat(np.asarray(force, float), substeps)
-    held = np.concatenate([np.zeros(whole), fine])[: len(fine)]
-    before = np.concatenate([[0.0], held[:-1]])
-    position = np.zeros(len(fine))
-    velocity = np.zeros(len(fine))
-    for pole, residue in zip(poles, residues, strict=True):
-        if pole.imag < 0:
-            continue
-        twice = 2.0 if pole.imag > 0 else 1.0
-        # One step: the old force until `late`, the new one after it.
-        new = (h - late) * phi(np.array(pole * (h - late)))
-        old = np.exp(pole * (h - late)) * late * phi(np.array(pole * late))
-        driven = new * held + old * before
-        decay = np.exp(pole * h)
-        state = lfilter([0.0, 1.0], [1.0, -decay], driven.astype(complex))
-        position += twice * (residue * state).real
-        velocity += twice * (residue * pole * state).real
-    return position, velocity
+    kept = poles[poles.imag >= 0]
+    twice = np.where(kept.imag > 0, 2.0, 1.0)
+    rows = []
+    for mass in masses:
+        position = twice * _residues(system, poles, mass)[poles.imag >= 0]
+        rows += [position, position * kept]
+    # One step: the old force until `late`, the new one after it.
+    new = (h - late) * phi(kept * (h - late))
+    old = np.exp(kept * (h - late)) * late * phi(kept * late)
+    held = np.ascontiguousarray(force, float)
+    motion = modal_motion(held, substeps, whole, np.exp(kept * h), new, old, np.array(rows))
+    return np.asarray(motion.reshape(len(masses), 2, -1))
 
 
 def _apart(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:

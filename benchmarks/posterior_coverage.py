@@ -1,6 +1,7 @@
 """Do 90 % intervals cover the truth in 90 % of recordings, and are they as narrow as they can be?
 
-    python benchmarks/coverage.py [--recordings 25] [--ess 2000] [--processes 2] [--first 0]
+    python benchmarks/posterior_coverage.py [--recordings 25] [--ess 2000] [--processes 2]
+        [--first 0]
 
 Truths are drawn from the priors of both devices, free and grasped; the recordings (30 s each) come
 from the virtual bench. README.md explains the columns.
