@@ -79,7 +79,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         study_analysis, "analyse", lambda *a, **b: analysis.analyse(*a, **b | {"ess": 50})
     )
     monkeypatch.setattr(
-        "bayeshaptic.report.study.write.table_of", lambda cases: table_of(cases, draws=60)
+        "bayeshaptic.report.study.write.table_of",
+        partial(table_of, draws=60),
     )
     monkeypatch.setattr(recording_job, "write_report", write)
 

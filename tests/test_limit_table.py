@@ -77,7 +77,8 @@ def test_the_risk_is_what_it_says(table, one):
             limits = region.limits(boundary.damping)
             inside = boundary.stiffness > 0
             below, upto = (np.mean(c(limits, boundary.stiffness), axis=0) for c in COMPARE)
-            assert np.all((below < risk) & (upto >= risk - 1e-9) | ~inside)
+            assert np.all(((below < risk) & (upto >= risk - 1e-9) | ~inside)[1:])
+            assert boundary.stiffness[0] == one.limit.safe(risk)  # as stated everywhere else
             b, k = boundary.damping[10], boundary.stiffness[10]
             assert region.probability(k * (1 - 1e-6), b) == pytest.approx(1 - below[10], abs=1e-9)
 
@@ -138,9 +139,18 @@ def test_small_risks_come_from_the_lowest_of_many_draws():
     assert found.boundary(0.01) is None  # neither 1500 draws nor the tail say it
     inside = np.flatnonzero(boundary.stiffness > 0)
     assert len(inside) > 15
-    some = inside[::6]
+    assert boundary.stiffness[0] == many.limit.safe(0.002)  # of all draws, as stated elsewhere
+    some = inside[1::6]
     truth = kb_region(many, found.kind, draws=10_500).quantile(0.002, boundary.damping[some])
     np.testing.assert_allclose(boundary.stiffness[some], truth, rtol=1e-9)
     assert np.all(boundary.stiffness <= found.boundary(0.05).stiffness)
     ends = np.sort(kb_region(many, found.kind, draws=10_500).largest_damping())
     assert found.width(0.002).damping == pytest.approx(ends[20], rel=1e-5)
+
+
+def test_no_boundary_is_stated_where_the_stiffness_without_damping_is_not(one):
+    few = replace(one.limit, samples=one.limit.samples[:1000], chains=1)
+    found = limit_table([replace(one, draws=one.draws[:1000], limit=few)], [LowPass(80.0)])
+    for risk, stiffness in zip(found.risks, found.stiffness, strict=True):
+        assert (found.filters[0].boundary(risk) is None) or stiffness is not None
+    assert found.stiffness[found.risks.index(0.01)] is None

@@ -131,11 +131,11 @@ def test_assumptions_say_what_was_added_and_widened() -> None:
 def test_tables_hold_what_the_loop_holds() -> None:
     closed = fake_closed(family="linear")
     (effect,) = found(closed)
-    assert effect.ties == "arm mode"
+    assert effect.ties == "further mass in the hand or arm"
     assert effect.told_apart_by == "Another posture or a relaxed grip."
     assert len(effect.parameters) == 2
     rows = {row[0]: row for row in outcomes(closed)}
-    assert rows["residual, band by band"][-2:] == ("9.0, flagged", "1.0")
+    assert rows["residual, band by band"][2:] == ("9.0, beyond", "4.5", "1.0", "4.5")
     assert candidates(closed)[0][1:] == ("reflex of the hand", "300", "accepted")
     assert [row[0] for row in errors(closed)][1] == "residual over the noise, data held out"
     assert errors(closed)[1][1:] == ("1.60", "1.02")

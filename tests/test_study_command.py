@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def test_a_study_through_the_command(
 ) -> None:
     analyse = study_analysis.analyse
     monkeypatch.setattr(study_analysis, "analyse", lambda *a, **b: analyse(*a, **b | {"ess": 200}))
-    monkeypatch.setattr(study_report, "table_of", lambda cases: table_of(cases, draws=60))
+    monkeypatch.setattr(study_report, "table_of", partial(table_of, draws=60))
     monkeypatch.setattr(population_sampler, "_MOST_STEPS", 60)
     monkeypatch.setattr(recording_job, "write_report", _only_the_summary)
     out = tmp_path / "out"

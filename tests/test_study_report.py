@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ def study(shape: str) -> Any:
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """The walls of few draws: their own tests are elsewhere."""
-    monkeypatch.setattr(study_report, "table_of", lambda cases: table_of(cases, draws=60))
+    monkeypatch.setattr(study_report, "table_of", partial(table_of, draws=60))
 
 
 def text_of(page: Path) -> str:
@@ -53,7 +53,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a report with everything in it."""
     folder = tmp_path_factory.mktemp("study")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study_report, "table_of", lambda cases: table_of(cases, draws=60))
+        patch.setattr(study_report, "table_of", partial(table_of, draws=60))
         page = folder / "anna" / "report.html"
         write_study_report(study("whole"), folder, pages={"anna": page})
     return folder

@@ -33,9 +33,11 @@ KEYS: dict[str, set[str]] = {
         "least_squares",
         "posterior",
         "critical_stiffness",
+        "recommendation",
         "diagnosis",
         "error",
     },
+    "recommendation": {"status", "stiffness", "risk", "sentence"},
     "recording": {
         "file",
         "device",
@@ -83,6 +85,7 @@ POSTERIOR = {
     "ess_tail",
     "rhat",
     "prior_dominated",
+    "trusted",
 }
 
 

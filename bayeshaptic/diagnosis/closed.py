@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -138,11 +139,13 @@ def close_loop(
         seed,
         lambda part, word: report(0.3 * part, word),
     )
+    began = time.perf_counter()
     force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None
     if force is not None:  # the response is biased: whatever is traced in it may be the controller
         traced = trace_force(begun.etfe, begun.fit, force)
     else:
         traced = trace(begun.etfe, begun.fit, lambda word: report(0.15, f"trying {word}"))
+    tracing = time.perf_counter() - began
     changed = force is None and bool(traced.state.accepted)
     state = traced.state
     base = finish(
@@ -165,8 +168,22 @@ def close_loop(
         )
     limit = with_discrepancy(analysis.limit, analysis.posterior, begun.fit, state.fit, traced, seed)
     notices = analysis.notices + _notices(traced)
-    analysis = replace(analysis, limit=limit, notices=notices)
+    seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
+    analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds)
     return Closed(base, analysis, traced, _error(base), _error(analysis), force)
+
+
+def _stages(
+    begun: Mapping[str, float],
+    tracing: float,
+    base: Mapping[str, float],
+    after: Mapping[str, float],
+) -> dict[str, float]:
+    """Every stage in its order with its time; of two samplings the declared model's comes first."""
+    stages = {**begun, "closing the loop": tracing}
+    if after is not base:
+        stages["the model as declared"] = sum(base.values()) - sum(begun.values())
+    return stages | {name: spent for name, spent in after.items() if name not in begun}
 
 
 def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

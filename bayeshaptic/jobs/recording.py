@@ -17,7 +17,7 @@ from bayeshaptic.report import write_report
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.reported import Reported
-from bayeshaptic.report.summary import analysis_of
+from bayeshaptic.report.result import analysis_of
 from bayeshaptic.types import Progress
 
 

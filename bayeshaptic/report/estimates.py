@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayeshaptic.report.result import analysis_of, closed_of, families_of, measured_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -23,7 +25,8 @@ class Witness:
     Attributes
     ----------
     key : str
-        "posterior", "least_squares", "etfe", or the name of a rule.
+        "posterior", "least_squares", "etfe" (the response as measured), "corrected" (after what
+        the model says was taken off it), or the name of a rule.
     label, remark : str
         What it is, short for a figure and in a sentence for the page.
     low, middle, high : float or None
@@ -63,23 +66,56 @@ def own_limit(analysis: Analysis) -> tuple[float, float, float] | None:
     return own.q05, own.q50, own.q95
 
 
-def witnesses(analysis: Analysis) -> tuple[Witness, ...]:
-    """The posterior, least squares, the measurement's own crossing, and the closed-form rules."""
-    limit, own = analysis.limit, own_limit(analysis)
+def witnesses(result: Any) -> tuple[Witness, ...]:
+    """Every estimate of the limit: model, least squares, measurement, closed-form rules.
+
+    Parameters
+    ----------
+    result : Analysis, or what closing the loop returns
+    """
+    analysis = analysis_of(result)
+    limit = analysis.limit
     low, middle, high = (finite(limit.quantile(p)) for p in (0.05, 0.5, 0.95))
     fitted = least_squares_limit(analysis)
     found = [
         Witness("posterior", "posterior", "the model with its uncertainty", middle, low, high),
         Witness("least_squares", "least squares", "the same model, one number", fitted),
     ]
+    return (*found, *_measured(result), *_rules(analysis))
+
+
+def correction(result: Any) -> str:
+    """What was done to the response before its crossing was read off; empty where nothing was."""
+    closed = closed_of(result)
+    if closed is None or closed.force is not None or closed.analysis.etfe is closed.base.etfe:
+        return ""
+    if "time-varying" in families_of(result):
+        return "in the worst part of the recording"
+    titles = [e.title for e in closed.effects if e.family in ("nonlinear", "measurement")]
+    if not titles:
+        return ""
+    return f"after {' and '.join(titles)} was taken off it with the model's help"
+
+
+def _measured(result: Any) -> tuple[Witness, ...]:
+    """The response's own crossing, as it was measured and as the model corrected it."""
+    changed = correction(result)
+    found = []
+    own = own_limit(measured_of(result))
     if own is not None:
         low, middle, high = own
         remark = "the crossing read from the response, no model"
-        caveat = getattr(analysis.etfe_limit, "caveat", None)
-        if caveat:
-            remark += f"; {caveat}"
         found.append(Witness("etfe", "measurement alone", remark, middle, low, high))
-    return (*found, *_rules(analysis))
+    mended = own_limit(analysis_of(result)) if changed else None
+    if mended is not None:
+        low, middle, high = mended
+        label = "measurement, worst part" if "part of" in changed else "measurement, corrected"
+        remark = f"the crossing read from the response {changed}"
+        found.append(Witness("corrected", label, remark, middle, low, high))
+    caveat = getattr(analysis_of(result).etfe_limit, "caveat", None)
+    if found and caveat:
+        found[-1] = replace(found[-1], remark=f"{found[-1].remark}; {caveat}")
+    return tuple(found)
 
 
 def _rules(analysis: Analysis) -> tuple[Witness, ...]:

@@ -7,19 +7,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.explain import has_feedback
-from bayeshaptic.inference.least_squares import MISFIT
 from bayeshaptic.report.estimates import decibel, own_limit
 from bayeshaptic.report.loop.words import in_short
+from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
 from bayeshaptic.report.quantities import estimate, percent, pure, quantity
-from bayeshaptic.report.summary import analysis_of, closed_of, tip_limit
+from bayeshaptic.report.result import analysis_of, closed_of, tip_limit
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
 
 HEADLINE_RISKS = (0.01, 0.05)
-# The reduced chi-square of pure noise scatters by one over the root of the number of points.
-_CHANCE_SDS = 4.0
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001
@@ -39,11 +37,18 @@ class Headline:
         The recommendation, or that there is none and why.
     details : tuple of str
         Sentences below it: the tip, what limits it, what to beware of.
+    stiffness : float or None
+        The stiffness of the sentence, in the unit of the limit; None where there is none.
+    risk : float or None
+        The risk that the loop is unstable there; None where the measurement, not the model, sets
+        the stiffness.
     """
 
     status: str
     sentence: str
     details: tuple[str, ...]
+    stiffness: float | None = None
+    risk: float | None = None
 
 
 def headline(result: Any) -> Headline:
@@ -65,26 +70,6 @@ def headline(result: Any) -> Headline:
         return _untrusted(analysis, (few,))
     diagnosis = getattr(result, "diagnosis", None) or {}
     return _recommended(analysis, risk, diagnosis, closed_of(result))
-
-
-def misfit_is_clear(analysis: Analysis) -> bool:
-    """Whether the model lacks something: a residual far beyond the noise, and not by chance."""
-    return not analysis.fit.reduced_chi_square <= max(MISFIT, _by_chance(analysis))
-
-
-def misfit_is_faint(analysis: Analysis) -> bool:
-    """Whether the residual is a little above the noise, but more than chance makes it."""
-    above = analysis.fit.reduced_chi_square > _by_chance(analysis)
-    return above and not misfit_is_clear(analysis)
-
-
-def _by_chance(analysis: Analysis) -> float:
-    return 1.0 + _CHANCE_SDS / math.sqrt(max(len(analysis.fit.residual), 1))
-
-
-def misfit_factor(analysis: Analysis) -> str:
-    """How many times the noise the residual is, for a sentence."""
-    return pure(math.sqrt(analysis.fit.reduced_chi_square), 2)
 
 
 def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
@@ -187,7 +172,9 @@ def _recommended(
         sentence += " Part of this recording remains unexplained; the interval is widened for it."
     if warnings:
         details.append("Beware: " + " ".join(_sentence(text) for text in warnings))
-    return Headline("caution" if any(doubts) else "safe", sentence, tuple(details))
+    status = "caution" if any(doubts) else "safe"
+    stated = risk if cap is None else None
+    return Headline(status, sentence, tuple(details), stiffness, stated)
 
 
 def rounded_down(stiffness: float, unit: str, sd: float) -> tuple[float, str]:

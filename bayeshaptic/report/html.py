@@ -17,7 +17,7 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop import tables as loop_tables
 from bayeshaptic.report.loop import words as loop_words
-from bayeshaptic.report.summary import analysis_of, closed_of, measured_of
+from bayeshaptic.report.result import analysis_of, closed_of, measured_of
 from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def render(result: Any, pictures: Mapping[str, bytes], sections: Sequence[str] =
         style=style(),
         version=__version__,
         written=written(),
+        result=result,
         analysis=analysis,
         closed=closed,
         measured=measured_of(result),

@@ -10,11 +10,13 @@ import numpy as np
 
 from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.report.estimates import RISKS, finite
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.result import analysis_of, measured_of, tip_limit
+from bayeshaptic.report.trust import doubtful_parameters
 from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
-    from bayeshaptic.diagnosis.closed import Closed
     from bayeshaptic.stability.critical import CriticalStiffness
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
@@ -58,8 +60,9 @@ def summary(result: Any) -> dict[str, Any]:
                 "parameters": list(analysis.model.names),
             },
             "least_squares": _least_squares(analysis),
-            "posterior": _posterior(analysis),
+            "posterior": _posterior(result),
             "critical_stiffness": _critical_stiffness(analysis),
+            "recommendation": _recommendation(result),
             "diagnosis": diagnosis,
             "error": {name: _ERROR | dict(given or {}) for name, given in error.items()},
         }
@@ -69,22 +72,6 @@ def summary(result: Any) -> dict[str, Any]:
 def summary_json(result: Any) -> str:
     """`summary` as text; strict JSON, without NaN and infinity."""
     return json.dumps(summary(result), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def analysis_of(result: Any) -> Analysis:
-    """The analysis itself, of an analysis or of what closing the loop returns."""
-    return getattr(result, "analysis", result)
-
-
-def closed_of(result: Any) -> Closed | None:
-    """The closed loop, where there is one."""
-    return result if hasattr(result, "traced") else None
-
-
-def measured_of(result: Any) -> Analysis:
-    """The analysis of the recording as it was measured, before effects changed or cut it."""
-    closed = closed_of(result)
-    return analysis_of(result) if closed is None else closed.base
 
 
 def plain(value: Any) -> Any:
@@ -158,10 +145,13 @@ def _least_squares(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _posterior(analysis: Analysis) -> dict[str, Any]:
-    posterior = analysis.posterior
+def _posterior(result: Any) -> dict[str, Any]:
+    posterior, doubtful = analysis_of(result).posterior, doubtful_parameters(result)
     return {
-        "parameters": posterior.summary(),
+        "parameters": {
+            name: {**found, "trusted": name not in doubtful}
+            for name, found in posterior.summary().items()
+        },
         "draws": len(posterior.draws),
         "ess_min": min(posterior.ess_bulk.min(), posterior.ess_tail.min()),
         "rhat_max": posterior.rhat.max(),
@@ -187,11 +177,15 @@ def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def tip_limit(analysis: Analysis) -> CriticalStiffness | None:
-    """The limit at the tip in N/m; None without a lever arm or without a torque in N m."""
-    if analysis.lever_m is None or analysis.limit.unit != "N m/rad":
-        return None
-    return analysis.limit.tip(analysis.lever_m)
+def _recommendation(result: Any) -> dict[str, Any]:
+    """What the sentence at the top of the page says, as numbers."""
+    head = headline(result)
+    return {
+        "status": head.status,
+        "stiffness": head.stiffness,
+        "risk": head.risk,
+        "sentence": head.sentence,
+    }
 
 
 def _quantiles(limit: CriticalStiffness) -> dict[str, Any]:

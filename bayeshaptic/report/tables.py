@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bayeshaptic.report.estimates import RISKS, decibel, finite, witnesses
 from bayeshaptic.report.quantities import interval, percent, pretty_unit, quantity, scale, spread_of
-from bayeshaptic.report.summary import QUANTILES, tip_limit
+from bayeshaptic.report.result import analysis_of, measured_of, tip_limit
+from bayeshaptic.report.summary import QUANTILES
+from bayeshaptic.report.trust import doubtful_parameters
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -44,8 +46,9 @@ class ParameterRow:
     remarks: str
 
 
-def parameters(analysis: Analysis) -> tuple[ParameterRow, ...]:
+def parameters(result: Any) -> tuple[ParameterRow, ...]:
     """Least squares beside the posterior, a row a parameter."""
+    analysis, doubtful = analysis_of(result), doubtful_parameters(result)
     fit, posterior, model = analysis.fit, analysis.posterior, analysis.model
     rows = []
     for i, (name, found) in enumerate(posterior.summary().items()):
@@ -56,6 +59,8 @@ def parameters(analysis: Analysis) -> tuple[ParameterRow, ...]:
         remarks = [_OUTCOMES.get(fit.outcome.get(name, ""), "")]
         if found["prior_dominated"]:
             remarks.append("the prior decides this one")
+        if name in doubtful:
+            remarks.append(f"not to be trusted: {doubtful[name]}")
         rows.append(
             ParameterRow(
                 name,
@@ -92,17 +97,25 @@ def limit(analysis: Analysis) -> Rows:
 def safe(analysis: Analysis) -> Rows:
     """The stiffness at each risk: (risk, stiffness, dB), and at the tip where there is a lever."""
     tip = tip_limit(analysis)
-    rows = []
+    shown: dict[tuple[str, ...], list[float]] = {}
     for risk in RISKS:
         found = analysis.limit.safe(risk)
         if found is None:
-            row = [percent(risk), "too few draws to say", _DASH]
+            row = ["too few draws to say", _DASH]
         else:
-            row = [percent(risk), quantity(found, analysis.limit.unit, digits=4), _db(found)]
+            row = [quantity(found, analysis.limit.unit, digits=4), _db(found)]
         if tip is not None:
             row.append(_DASH if found is None else quantity(tip.quantile(risk), tip.unit, digits=4))
-        rows.append(tuple(row))
-    return tuple(rows)
+        shown.setdefault(tuple(row), []).append(risk)
+    # Risks that are one number to the digits shown are said once.
+    return tuple(
+        (" to ".join(dict.fromkeys(map(percent, _ends(risks)))), *row)
+        for row, risks in shown.items()
+    )
+
+
+def _ends(values: list[float]) -> tuple[float, float]:
+    return values[0], values[-1]
 
 
 def crossings(analysis: Analysis) -> Rows:
@@ -113,9 +126,9 @@ def crossings(analysis: Analysis) -> Rows:
     )
 
 
-def comparison(analysis: Analysis) -> Rows:
+def comparison(result: Any) -> Rows:
     """Every estimate of the limit: (name, 5 %, middle, 95 %, dB, difference in dB, remark)."""
-    found = witnesses(analysis)
+    analysis, found = analysis_of(result), witnesses(result)
     ours = decibel(found[0].middle or 0.0)
     ours_spread = spread_of(found[0].low or 0.0, found[0].high or 0.0)
     rows = []
@@ -169,15 +182,18 @@ def measured(analysis: Analysis) -> Rows:
     return tuple(rows)
 
 
-def provenance(analysis: Analysis) -> Rows:
+def provenance(result: Any) -> Rows:
     """Where the numbers come from: the file and its hash, and the time each step took."""
     rows: list[tuple[str, ...]] = []
-    source = None if analysis.recording is None else analysis.recording.source
+    recording = measured_of(result).recording
+    source = None if recording is None else recording.source
     if source is not None:
         rows.append(("File", source.as_posix()))
         if source.is_file():
             rows.append(("SHA-256", hashlib.sha256(source.read_bytes()).hexdigest()))
-    took = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in analysis.seconds.items())
+    took = ", ".join(
+        f"{name} {seconds:.1f} s" for name, seconds in analysis_of(result).seconds.items()
+    )
     if took:
         rows.append(("Time taken", took))
     return tuple(rows)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.report.estimates import own_limit
+from bayeshaptic.report.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.figures.residuals import third_octaves
-from bayeshaptic.report.headline import misfit_factor, misfit_is_clear
+from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear
 from bayeshaptic.report.quantities import estimate, interval, percent, pure, quantity
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 _DELAY = "delay_s"
+_WIDE_DB = 1.5  # of an interval, from which it is worth a word why
 
 
 def misfit(analysis: Analysis, loop: bool = False) -> str:
@@ -59,8 +61,7 @@ def convergence(analysis: Analysis) -> str:
     message = posterior.message[:1].upper() + posterior.message[1:].rstrip(".")
     return (
         f"{message}. {ensembles} independent ensembles of {walkers} walkers took {steps} steps "
-        f"each, {posterior.chains[..., 0].size:,} draws in {quantity(posterior.seconds, 's')}, "
-        f"seed {posterior.seed}."
+        f"each: {posterior.chains[..., 0].size:,} draws, seed {posterior.seed}."
     )
 
 
@@ -92,28 +93,54 @@ def delay(analysis: Analysis) -> str:
     )
 
 
-def agreement(analysis: Analysis) -> str:
-    """The model's limit beside the measurement's own."""
-    limit, own = analysis.limit, own_limit(analysis)
-    if own is None:
+def agreement(result: Any) -> str:
+    """The model's limit beside the measurement's own, as measured and as it was corrected."""
+    analysis, limit = analysis_of(result), analysis_of(result).limit
+    found = {w.key: w for w in witnesses(result)}
+    raw, own = found.get("etfe"), found.get("corrected", found.get("etfe"))
+    if own is None or own.middle is None or own.low is None or own.high is None:
         why = getattr(analysis.etfe_limit, "reason", None)
         return (
             "No limit can be read from the measured response alone, without a model"
             f"{': ' + why if why else ''}. Crossings outside the band rest on the model."
         )
-    low, measured, high = own
     middle = limit.quantile(0.5)
-    if not (math.isfinite(middle) and middle > 0 and measured > 0):
+    if not (math.isfinite(middle) and middle > 0 and own.middle > 0):
         return "The model and the measurement cannot be compared: one of them has no limit."
-    difference = 20 * math.log10(middle / measured)
-    overlap = low <= limit.quantile(0.95) and limit.quantile(0.05) <= high
+    how = correction(result) if own is not raw else "alone, without a model"
+    text = (
+        f"Read from the measured response {how}, the limit is "
+        f"{estimate(own.middle, own.low, own.high, limit.unit)}. {_apart(analysis, own)}"
+    )
+    if raw is not None and raw is not own and None not in (raw.low, raw.middle, raw.high):
+        text += (
+            " As it was measured, without any model, the response says "
+            f"{estimate(raw.middle, raw.low, raw.high, limit.unit)}."  # type: ignore[arg-type]
+        )
+    return text
+
+
+def _apart(analysis: Analysis, own: Witness) -> str:
+    """How far the model's median is from a witness, and why that may be."""
+    limit = analysis.limit
+    assert own.middle is not None and own.low is not None and own.high is not None
+    difference = decibel(limit.quantile(0.5)) - decibel(own.middle)
+    overlap = own.low <= limit.quantile(0.95) and limit.quantile(0.05) <= own.high
     side = "above" if difference > 0 else "below"
     verdict = "their 90 % intervals overlap" if overlap else "their 90 % intervals do not overlap"
-    return (
-        f"Read from the measured response alone, without a model, the limit is "
-        f"{estimate(measured, low, high, limit.unit)}. The model's "
-        f"median lies {abs(difference):.2f} dB {side} that, and {verdict}."
-    )
+    text = f"The model's median lies {abs(difference):.2f} dB {side} that, and {verdict}."
+    hertz = getattr(analysis.etfe_limit, "frequency_hz", None)
+    if hertz and own.low > 0 and decibel(own.high) - decibel(own.low) > _WIDE_DB:
+        etfe = analysis.etfe
+        near = np.abs(np.log2(etfe.frequency_hz / hertz)) < 0.5
+        if near.any():
+            noise = np.degrees(float(np.median(etfe.relative_sd[near])) / math.sqrt(2))
+            text += (
+                f" The measurement's interval is wide because near {quantity(hertz, 'Hz')} one "
+                f"point of its phase is uncertain by {pure(noise, 2)} degrees (sd), and the limit "
+                "is where that phase crosses −180 degrees; the model uses all frequencies."
+            )
+    return text
 
 
 def hump(analysis: Analysis) -> str:

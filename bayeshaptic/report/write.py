@@ -13,8 +13,9 @@ from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, draw_pictu
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.html import render
+from bayeshaptic.report.result import analysis_of
 from bayeshaptic.report.section import Section
-from bayeshaptic.report.summary import analysis_of, summary_json
+from bayeshaptic.report.summary import summary_json
 from bayeshaptic.report.walls.section import (
     case_of,
     friction_of,
@@ -82,12 +83,13 @@ def _write_all(result: Any, folder: Path) -> None:
 def _sections(result: Any, folder: Path) -> tuple[Section, ...]:
     """The sections about stable walls, with their table in `folder`."""
     analysis = analysis_of(result)
-    status = headline(result).status
+    head = headline(result)
     case = case_of(result)
     table = table_of([case])
-    table.write(folder, None if analysis.device is None else analysis.device.name, status)
+    name = None if analysis.device is None else analysis.device.name
+    table.write(folder, name, head.status, head.stiffness)
     walls = limits_section(
-        table, friction_of(result), resolution_of(analysis), status == "untrusted"
+        table, friction_of(result), resolution_of(analysis), head.status == "untrusted"
     )
     advice = guidance_section(case, analysis)
     return (walls,) if advice is None else (walls, advice)

@@ -1,4 +1,4 @@
-"""The figures of a report, one module each with ``draw(analysis) -> Figure``.
+"""The figures of a report, one module each with ``draw(result) -> Figure``.
 
 To add one, write the module and add a line to PICTURES; to LOOP_PICTURES, with
 ``draw(closed) -> Figure``, where it shows what closing the loop found.
@@ -89,8 +89,7 @@ FORCE_PICTURES = (
 
 def draw_pictures(result: Any) -> dict[str, bytes]:
     """Every figure of an analysis, or of a closed loop, as PNG, by name."""
-    analysis = getattr(result, "analysis", result)
-    found = {picture.name: png(picture.draw(analysis)) for picture in PICTURES}
+    found = {picture.name: png(picture.draw(result)) for picture in PICTURES}
     if hasattr(result, "traced"):
         for picture in LOOP_PICTURES if result.force is None else FORCE_PICTURES:
             if picture.shown(result):

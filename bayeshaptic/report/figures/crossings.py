@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import thinned
 from bayeshaptic.report.quantities import Scale, quantity, scale
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +26,9 @@ MARKERS = "ovDs^"
 LINEAR_DEG = 10.0
 
 
-def draw(analysis: Analysis) -> Figure:
+def draw(result: Any) -> Figure:
     """Stiffness above, phase from -180 degrees below, up to the Nyquist frequency."""
+    analysis = analysis_of(result)
     etfe, limit = analysis.etfe, analysis.limit
     low_hz, half = float(etfe.frequency_hz[0]), 0.5 / etfe.period_s
     found = [(hz, k) for hz, k in _at_median(analysis) if hz > 0.02 * low_hz]

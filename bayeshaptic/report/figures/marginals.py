@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.quantities import Scale, scale
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,8 +21,9 @@ COLUMNS = 4
 BINS = 36
 
 
-def draw(analysis: Analysis) -> Figure:
+def draw(result: Any) -> Figure:
     """A small panel a parameter, each with its own unit; densities without an axis."""
+    analysis = analysis_of(result)
     model = analysis.model
     columns = min(COLUMNS, max(model.size, 3))
     rows = -(-model.size // columns)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.quantities import scale
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bayeshaptic.diagnosis.analysis import Analysis
 
 SHOWN = 6
 POINTS = 800
@@ -41,8 +41,9 @@ def strongest(matrix: NDArray[Any], count: int = SHOWN) -> list[int]:
     return sorted(chosen)
 
 
-def draw(analysis: Analysis) -> Figure:
+def draw(result: Any) -> Figure:
     """Scatter and contours below the diagonal; all correlations as a map in the empty corner."""
+    analysis = analysis_of(result)
     draws = analysis.posterior.draws[:: max(len(analysis.posterior.draws) // 20_000, 1)]
     matrix = correlation(draws)
     chosen = strongest(matrix)
@@ -79,7 +80,7 @@ def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float)
     axes.plot(x[few], y[few], ".", color=style.MODEL, markersize=1.1, alpha=0.35, rasterized=True)
     ranges = [_wide(x), _wide(y)]
     count, x_edges, y_edges = np.histogram2d(x, y, 22, ranges)
-    levels = _credible(count)
+    levels = credible(count, x_edges, y_edges, x, y)
     if np.all(np.diff(levels) > 0):
         axes.contour(
             _middle(x_edges),
@@ -141,11 +142,23 @@ def _smooth(count: NDArray[Any]) -> NDArray[Any]:
     return gaussian_filter(count, 1.0, mode="constant")
 
 
-def _credible(count: NDArray[Any]) -> NDArray[Any]:
-    """Heights of the contours that enclose the probabilities LEVELS, ascending."""
-    heights = np.sort(_smooth(count), axis=None)[::-1]
-    share = np.cumsum(heights) / heights.sum()
-    return np.array([heights[np.searchsorted(share, level)] for level in LEVELS])
+def credible(
+    count: NDArray[Any],
+    x_edges: NDArray[Any],
+    y_edges: NDArray[Any],
+    x: NDArray[Any],
+    y: NDArray[Any],
+) -> NDArray[Any]:
+    """Heights of the contours that hold the shares LEVELS of the draws (x, y), ascending.
+
+    Read at the draws themselves: a histogram that is smoothed is wider than they are.
+    """
+    from scipy.interpolate import RegularGridInterpolator
+
+    height = RegularGridInterpolator(
+        (_middle(x_edges), _middle(y_edges)), _smooth(count), bounds_error=False, fill_value=0.0
+    )
+    return np.quantile(height(np.column_stack([x, y])), [1 - level for level in LEVELS])
 
 
 def _nothing() -> Figure:

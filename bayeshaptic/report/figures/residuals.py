@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bayeshaptic.diagnosis.analysis import Analysis
 
 BAND_OCTAVES = 1 / 3
 EXPECTED = (0.005, 0.995)
@@ -46,8 +46,9 @@ def third_octaves(frequency_hz: NDArray[Any], residual: NDArray[Any]) -> BandRes
     return BandResidual(centre, np.sqrt(power), low, high)
 
 
-def draw(analysis: Analysis) -> Figure:
+def draw(result: Any) -> Figure:
     """Real and imaginary part over frequency above, the rms in third octaves below."""
+    analysis = analysis_of(result)
     order = np.argsort(analysis.fit.frequency_hz)
     frequency, residual = analysis.fit.frequency_hz[order], analysis.fit.residual[order]
     figure = style.new_figure(4.2)

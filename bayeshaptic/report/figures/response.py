@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import ResponseBand, response_band
 from bayeshaptic.report.quantities import pretty_unit
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.recordings.response.etfe import Etfe
 
 
-def draw(analysis: Analysis) -> Figure:
+def draw(result: Any) -> Figure:
     """Gain, phase, measured over model, and the coherence where there is one."""
+    analysis = analysis_of(result)
     etfe, band = analysis.etfe, response_band(analysis)
     known = bool(np.isfinite(etfe.coherence).any())
     heights = (2.8, 2.0, 1.7, 1.0) if known else (2.8, 2.0, 1.7)

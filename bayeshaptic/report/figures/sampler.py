@@ -8,19 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bayeshaptic.diagnosis.analysis import Analysis
 
 RANK_BINS = 20
 STEPS_SHOWN = 400
 
 
-def draw(analysis: Analysis) -> Figure:
+def draw(result: Any) -> Figure:
     """Trace and ranks of the parameter that mixes worst, effective draws and R-hat of all."""
+    analysis = analysis_of(result)
     posterior = analysis.posterior
     worst = int(np.argmax(posterior.rhat))
     name = style.short(posterior.model.names[worst])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bayeshaptic.report.estimates import RISKS, Witness, decibel, own_limit, witnesses
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.quantities import Scale, percent, scale
+from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,17 +23,17 @@ WIDEST = 4.0  # times the histogram's own width, to show the measurement's inter
 LOG_BEYOND = 8.0  # a distribution wider than this factor is drawn on a logarithmic axis
 
 
-def draw(analysis: Analysis) -> Figure:
+def draw(result: Any) -> Figure:
     """The histogram by binding crossing above; every estimate of the limit on one axis below."""
-    rows = witnesses(analysis)
+    analysis, rows = analysis_of(result), witnesses(result)
     figure = style.new_figure(3.3 + 0.42 + 0.21 * len(rows))
     top, bottom = figure.subplots(2, 1, height_ratios=(3.0, 0.42 + 0.21 * len(rows)))
-    _histogram(top, analysis)
+    _histogram(top, analysis, rows)
     _forest(bottom, rows, analysis.limit.unit)
     return figure
 
 
-def _histogram(axes: Axes, analysis: Analysis) -> None:
+def _histogram(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...]) -> None:
     limit = analysis.limit
     samples = limit.samples[np.isfinite(limit.samples)]
     style.panel(axes, y="probability density", grid=False)
@@ -53,7 +54,7 @@ def _histogram(axes: Axes, analysis: Analysis) -> None:
     _stack(axes, analysis, row, edges, logarithmic)
     axes.set_xlim(*_reach(analysis, row, edges))
     axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
-    _lines(axes, analysis, row)
+    _lines(axes, analysis, rows, row)
     if logarithmic:
         from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -112,7 +113,7 @@ def _stack(
         base = base + height
 
 
-def _lines(axes: Axes, analysis: Analysis, row: Scale) -> None:
+def _lines(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...], row: Scale) -> None:
     """Safe stiffnesses, least squares, and the measurement's own crossing."""
     low, high = axes.get_xlim()
     for number, risk in enumerate(RISKS):
@@ -125,14 +126,15 @@ def _lines(axes: Axes, analysis: Analysis, row: Scale) -> None:
                 linestyle=style.DASHES[1:][number],
                 label=f"{percent(risk)} risk of instability",
             )
-    for witness in witnesses(analysis):
+    own = [w.key for w in rows if w.key in ("etfe", "corrected")][-1:]
+    for witness in rows:
         if witness.middle is None or not low <= witness.middle * row.factor <= high:
             continue
         if witness.key == "least_squares":
             axes.axvline(
                 witness.middle * row.factor, color=style.OTHER, linewidth=1.4, label="least squares"
             )
-        if witness.key == "etfe" and witness.low is not None and witness.high is not None:
+        if witness.key in own and witness.low is not None and witness.high is not None:
             middle = witness.middle * row.factor
             reach = [[middle - witness.low * row.factor], [witness.high * row.factor - middle]]
             axes.errorbar(
@@ -144,7 +146,7 @@ def _lines(axes: Axes, analysis: Analysis, row: Scale) -> None:
                 capsize=3,
                 markersize=4,
                 linewidth=1.1,
-                label="measurement alone, 90 %",
+                label=f"{witness.label}, 90 %",
             )
     axes.set_xlim(low, high)
 

@@ -24,6 +24,7 @@ _NAMED = 0.05  # shares that a sentence names
 _OVERLAP = 1.1
 _MOST = 4
 _KNOWN_DB = 0.05  # a limit known to this sd needs no further recording
+_HARDLY = 0.9  # of the width: a further recording that leaves more is not worth making
 _FLAT = 0.02  # relative change that is none
 
 
@@ -56,11 +57,19 @@ def experiment_rows(
     return tuple(
         (
             one.title,
-            f"{100 * one.ratio:.0f} %",
-            f"± {pure(_DB * shares.log_sd * one.ratio, 2)} dB",
+            f"{100 * _narrowed(shares, one):.0f} %",
+            f"± {pure(_DB * shares.log_sd * _narrowed(shares, one), 2)} dB",
         )
         for one in experiments
     )
+
+
+def _narrowed(shares: VarianceShares, one: Experiment) -> float:
+    """The width with one more recording over the present one.
+
+    More data narrow the share that is of the parameters; what effects and a misfit add stays.
+    """
+    return float(np.sqrt(shares.beyond + (1 - shares.beyond) * one.ratio**2))
 
 
 def _lead(shares: VarianceShares) -> str:
@@ -118,8 +127,8 @@ def _raise(found: Sequence[Elasticities]) -> str:
 
 
 def _sweep(one: Sweep) -> str:
+    # In relation to now: the sweep's own median is without what widens the limit.
     now = float(np.interp(one.now, one.values, one.middle))
-    unit = one.stiffness_unit
     if one.added:
         end = float(one.middle[-1])
         added = quantity(float(one.values[-1] - one.values[0]), one.unit)
@@ -127,9 +136,11 @@ def _sweep(one: Sweep) -> str:
     else:
         end = float(np.interp(2 * one.now, one.values, one.middle))
         what = f"Twice the stiffness {one.name}" if one.name[0] == "k" else f"Twice {one.name}"
-    text = f"{what} takes the median limit from {quantity(now, unit)} to {quantity(end, unit)}."
     if abs(end / now - 1) < _FLAT:
-        text = f"{what} leaves the limit where it is ({quantity(now, unit)})."
+        text = f"{what} leaves the limit where it is."
+    else:
+        step = f"{_DB * np.log(end / now):+.1f} dB".replace("-", "\N{MINUS SIGN}")
+        text = f"{what} makes the limit {pure(end / now, 2)} times what it is ({step})."
     for jump in one.jumps[:2]:
         text += (
             f" Above {one.name} = {quantity(jump.value, one.unit)} the {jump.after} at "
@@ -144,7 +155,13 @@ def _next(shares: VarianceShares, experiments: Sequence[Experiment]) -> str:
         return ""
     best = experiments[0]
     spread = _DB * shares.log_sd
-    after = pure(spread * best.ratio, 2)
+    after = pure(spread * _narrowed(shares, best), 2)
+    if _narrowed(shares, best) > _HARDLY:
+        return (
+            "No further recording of this kind would narrow K_CR by much: "
+            f"{percent(round(shares.beyond, 2))} of its variance is of effects and what is "
+            "unexplained, which more of the same data do not change."
+        )
     text = (
         f"Of the further recordings below, each as long as this one, {best.title} would narrow "
         f"K_CR most: from ± {pure(spread, 2)} dB to ± {after} dB."

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.effects.registry import effects
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
-from bayeshaptic.report.quantities import estimate, pure, quantity, scale
+from bayeshaptic.report.quantities import estimate, quantity, scale
 from bayeshaptic.report.tables import ParameterRow, Rows
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def found(closed: Closed) -> tuple[EffectRows, ...]:
             effect.family,
             _parameters(closed, effect, known["parameters"]),
             _sentence(effect.evidence),
-            ", ".join(name.replace("_", " ") for name in effect.ties),
+            ", ".join(title_of(name) for name in effect.ties),
             _sentence(effect.told_apart_by),
         )
         for effect, known in zip(closed.effects, closed.diagnosis["effects"], strict=True)
@@ -100,15 +101,17 @@ def unshown(closed: Closed) -> int:
 
 
 def outcomes(closed: Closed) -> Rows:
-    """(what was asked, class, threshold, before, after), with a word where it is flagged."""
+    """(what was asked, class, found, threshold): the last two once more for after.
+
+    After something was taken off a recording the thresholds are others than before.
+    """
     later = {test.name: test for test in closed.traced.after}
     return tuple(
         (
             question(test),
             test.family,
-            pure(test.threshold),
-            _outcome(test),
-            *([_outcome(later.get(test.name))] if closed.effects else []),
+            *_outcome(test),
+            *(_outcome(later.get(test.name)) if closed.effects else ()),
         )
         for test in closed.traced.before
     )
@@ -116,7 +119,13 @@ def outcomes(closed: Closed) -> Rows:
 
 def question(test: Test) -> str:
     """What a test asks."""
-    return _TESTS.get(test.name, test.name)
+    return _TESTS.get(test.name) or title_of(test.name)
+
+
+def title_of(name: str) -> str:
+    """An effect's title, from the name that files and commands use."""
+    known = {effect.name: effect.title for effect in effects()}
+    return str(known.get(name, name.replace("_", " ")))
 
 
 def errors(closed: Closed) -> Rows:
@@ -191,10 +200,11 @@ def _sentence(text: str) -> str:
     return text and f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
-def _outcome(test: Test | None) -> str:
+def _outcome(test: Test | None) -> tuple[str, str]:
     if test is None:
-        return _DASH
-    return f"{_score(test.statistic)}{', flagged' if test.flagged else ''}"
+        return _DASH, _DASH
+    flag = ", beyond" if test.flagged else ""
+    return f"{_score(test.statistic)}{flag}", _score(test.threshold)
 
 
 def _score(value: float) -> str:

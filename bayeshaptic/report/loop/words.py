@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.traced import CONSISTENT, UNEXPLAINED
 from bayeshaptic.report.estimates import decibel
 from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear
 from bayeshaptic.report.quantities import estimate, interval, pretty_unit, pure, quantity, scale
 
 if TYPE_CHECKING:
@@ -47,7 +48,31 @@ def verdict(closed: Closed) -> tuple[str, ...]:
     found = (lacked(closed),) if closed.effects else ()
     if closed.verdict == UNEXPLAINED:
         return (*found, *_remainder(closed))
-    return (*found, "What is left is noise: no test finds anything more.")
+    return (*found, _rest(closed))
+
+
+def _rest(closed: Closed) -> str:
+    """What is left where no test is beyond its threshold."""
+    analysis = closed.analysis
+    if misfit_is_clear(analysis):
+        return (
+            "No test finds anything more, and yet what is left is "
+            f"{misfit_factor(analysis)} times the noise: the model does not explain this recording."
+        )
+    widened = [
+        new
+        for old in closed.traced.before
+        for new in closed.traced.after
+        if new.name == old.name and new.statistic > old.threshold
+    ]
+    if not widened:
+        return "What is left is noise: no test finds anything more."
+    top = max(widened, key=lambda test: test.statistic)
+    return (
+        "What is left is as much as the fitted law may be wrong by, and no more: the largest of it "
+        f"({top.text}) is within its threshold of {pure(top.threshold, 2)} after the law was taken "
+        "off."
+    )
 
 
 def lacked(closed: Closed) -> str:
@@ -67,6 +92,8 @@ def in_short(closed: Closed) -> str:
     if closed.force is not None:
         return force_words.in_short(closed.force, closed.base.etfe.force_unit)
     if closed.verdict == CONSISTENT:
+        if misfit_is_clear(closed.analysis):
+            return ""
         return "The model as declared explains the recording to within its noise."
     if not closed.effects:
         return ""

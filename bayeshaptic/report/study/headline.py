@@ -73,7 +73,8 @@ def _recommended(study: StudyAnalysis, risk: float, safe: float) -> Headline:
         details.append("Beware: " + " ".join(sentence_of(text) for text in warned))
     if lacking:
         details.append("What this study does not say: " + " ".join(lacking))
-    return Headline("caution" if warned or study.failed else "safe", sentence, tuple(details))
+    status = "caution" if warned or study.failed else "safe"
+    return Headline(status, sentence, tuple(details), stiffness, risk)
 
 
 def untrusted(recordings: Iterable[Analysed]) -> tuple[Analysed, ...]:

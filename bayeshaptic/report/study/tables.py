@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.report.estimates import RISKS, decibel
+from bayeshaptic.report.loop.tables import title_of
 from bayeshaptic.report.quantities import interval, percent, pure, quantity, scale
 from bayeshaptic.report.study.words import spread_db
 from bayeshaptic.report.summary import QUANTILES
@@ -75,7 +76,7 @@ def _recording(one: Analysed) -> tuple[str, ...]:
         "" if entry.configuration is None else str(entry.configuration),
         ", ".join(parts),
         analysis.model.name,
-        ", ".join(effect.replace("_", " ") for effect in one.effects) or _DASH,
+        ", ".join(title_of(effect) for effect in one.effects) or _DASH,
         f"{decibel(middle):.2f}",
         interval(low, high, analysis.limit.unit),
     )

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _HARDLY_DB = 0.15  # a spread of K_CR between people that nobody needs to care about
 _LITTLE_DB = 0.5
 _AS_BAD_DB = 1.0
+_BETWEEN_DB = 0.1  # beyond the ends of a range, worth a word
 _CONFIGURATION = ", configuration "
 Z90 = 3.29  # width of a normal 90 % interval in standard deviations
 
@@ -182,11 +183,17 @@ def configurations(study: StudyAnalysis) -> tuple[str, ...]:
     for one in study.configurations:
         band = band_of(one)
         who = "Held" if one.held else "With nobody holding it"
+        first, *_, last = (decibel(middle) for middle in band.middle)
         low, high = decibel(band.middle.min()), decibel(band.middle.max())
+        text = (
+            f"{who}, the median limit goes from {first:.1f} dB in configuration "
+            f"{pure(band.coordinates[0])} to {last:.1f} dB in {pure(band.coordinates[-1])}"
+        )
+        if min(first, last) - low > _BETWEEN_DB or high - max(first, last) > _BETWEEN_DB:
+            text += f" (between {low:.1f} and {high:.1f} dB over all of them)"
         sure = float(one.worst_probability.max())
         found.append(
-            f"{who}, the median limit goes from {low:.1f} to {high:.1f} dB over the configurations "
-            f"from {pure(band.coordinates[0])} to {pure(band.coordinates[-1])}; the worst is most "
-            f"probably near {pure(one.worst_coordinate)} ({percent(sure)} among those looked at)."
+            f"{text}; the lowest is most probably near {pure(one.worst_coordinate)} "
+            f"({percent(sure)} among those looked at)."
         )
     return tuple(found)

@@ -89,11 +89,11 @@ def _sections(study: StudyAnalysis, folder: Path) -> list[Section]:
     """Stable walls over all cases, with their files; and what would raise the limit."""
     if study.limit is None:
         return []
-    status = study_headline(study).status
-    table = table_of(study.cases)
-    table.write(folder, study.device.name, status)
+    head = study_headline(study)
+    table = table_of(study.cases, limit=study.limit)
+    table.write(folder, study.device.name, head.status, head.stiffness)
     walls = limits_section(
-        table, resolution=study.device.encoder_resolution, untrusted=status == "untrusted"
+        table, resolution=study.device.encoder_resolution, untrusted=head.status == "untrusted"
     )
     first = study.limit.binding[0].case
     case = next(case for case in study.cases if case.label == first)

@@ -9,11 +9,11 @@ import numpy as np
 
 from bayeshaptic.report.figures.walls import curve as limits_curve
 from bayeshaptic.report.figures.walls import kb as limits_kb
+from bayeshaptic.report.result import analysis_of, closed_of
 from bayeshaptic.report.section import Section, section
-from bayeshaptic.report.summary import analysis_of, closed_of
 from bayeshaptic.report.walls.rules import rules_of
 from bayeshaptic.report.walls.words import rule_rows, width_rows, words
-from bayeshaptic.stability.cases import FREE, HELD, Case
+from bayeshaptic.stability.cases import FREE, HELD, Case, DeviceLimit
 from bayeshaptic.stability.walls.damping import Damping
 from bayeshaptic.stability.walls.limit_table import LimitTable, limit_table
 
@@ -58,11 +58,19 @@ def limits_section(
 
 
 def table_of(
-    cases: Sequence[Case], dampings: Sequence[Damping] | None = None, draws: int = DRAWS
+    cases: Sequence[Case],
+    dampings: Sequence[Damping] | None = None,
+    draws: int = DRAWS,
+    limit: DeviceLimit | None = None,
 ) -> LimitTable:
-    """The limits over some cases, with fewer draws where a model takes long to look at."""
+    """The limits over some cases, with fewer draws where a model takes long to look at.
+
+    `limit` is that of all cases together, where it is known.
+    """
     slow = any(case.model.system(case.draws[:1]).dynamic_links for case in cases)
-    return limit_table(cases, dampings, draws=min(draws, _SLOW_DRAWS) if slow else draws)
+    return limit_table(
+        cases, dampings, draws=min(draws, _SLOW_DRAWS) if slow else draws, limit=limit
+    )
 
 
 def case_of(result: Any) -> Case:

@@ -6,8 +6,8 @@ import csv
 import io
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -52,12 +52,16 @@ class FilterLimits:
         Limits of some draws of each case, each column in ascending order.
     tails : tuple of Tail, or None
         The lowest limits of more draws of each case, for small risks.
+    undamped : mapping
+        Risk to the stiffness without damping that is stated from all draws, or None: the boundary
+        begins there, and is not stated where that is not.
     """
 
     region: JointRegion = field(repr=False)
     damping: Floats = field(repr=False)
     limits: tuple[Floats, ...] = field(repr=False)
     tails: tuple[Tail, ...] | None = field(repr=False, default=None)
+    undamped: Mapping[float, float | None] = field(repr=False, default_factory=dict)
 
     @property
     def kind(self) -> Damping:
@@ -69,6 +73,15 @@ class FilterLimits:
 
     def boundary(self, risk: float) -> Boundary | None:
         """The stiffness at that risk; None where the draws are too few to state it."""
+        found = self._boundary(risk)
+        if found is None or risk not in self.undamped or self.damping[0] != 0:
+            return found
+        first = self.undamped[risk]
+        if first is None:
+            return None
+        return replace(found, stiffness=np.r_[first, found.stiffness[1:]])
+
+    def _boundary(self, risk: float) -> Boundary | None:
         if self.region.says(risk):
             return Boundary(risk, self.damping, self.quantile(risk))
         if self.tails is None or risk > min(tail.risk for tail in self.tails):
@@ -118,7 +131,12 @@ class LimitTable:
     def damping_unit(self) -> str:
         return self.filters[0].region.damping_unit
 
-    def as_dict(self, device: str | None = None, status: str | None = None) -> dict[str, Any]:
+    def as_dict(
+        self,
+        device: str | None = None,
+        status: str | None = None,
+        recommended: float | None = None,
+    ) -> dict[str, Any]:
         """What `limits.json` holds, see docs/file-formats.md.
 
         Parameters
@@ -126,12 +144,15 @@ class LimitTable:
         device : str, optional
         status : {"safe", "caution", "untrusted"}, optional
             What the report says of these numbers.
+        recommended : float, optional
+            The stiffness that the report recommends, which may be below what the model says.
         """
         return {
             "format": _FORMAT,
             "version": __version__,
             "device": device,
             "status": status,
+            "recommended": recommended,
             "period_s": self.filters[0].region.period_s,
             "stiffness_unit": self.unit,
             "damping_unit": self.damping_unit,
@@ -143,9 +164,15 @@ class LimitTable:
             "boundaries": [self._boundary(part) for part in self.filters],
         }
 
-    def as_json(self, device: str | None = None, status: str | None = None) -> str:
-        """`as_dict` of `device` and `status` as text; strict JSON."""
-        return json.dumps(self.as_dict(device, status), indent=1, allow_nan=False) + "\n"
+    def as_json(
+        self,
+        device: str | None = None,
+        status: str | None = None,
+        recommended: float | None = None,
+    ) -> str:
+        """`as_dict` of the same as text; strict JSON."""
+        found = self.as_dict(device, status, recommended)
+        return json.dumps(found, indent=1, allow_nan=False) + "\n"
 
     def as_csv(self) -> str:
         """One row a filter and damping; the units stand in the names of the columns."""
@@ -164,7 +191,11 @@ class LimitTable:
         return text.getvalue()
 
     def write(
-        self, folder: str | Path, device: str | None = None, status: str | None = None
+        self,
+        folder: str | Path,
+        device: str | None = None,
+        status: str | None = None,
+        recommended: float | None = None,
     ) -> None:
         """Write limits.json and limits.csv.
 
@@ -172,12 +203,12 @@ class LimitTable:
         ----------
         folder : str or Path
             Which is there.
-        device, status : str, optional
+        device, status, recommended : optional
             As in `as_dict`.
         """
         for name, text in (
             ("limits.csv", self.as_csv()),
-            ("limits.json", self.as_json(device, status)),
+            ("limits.json", self.as_json(device, status, recommended)),
         ):
             (Path(folder) / name).write_text(text, encoding="utf-8", newline="\n")
 
@@ -204,6 +235,7 @@ def limit_table(
     risks: tuple[float, ...] = RISKS,
     draws: int = DRAWS,
     seed: int = 0,
+    limit: DeviceLimit | CriticalStiffness | None = None,
 ) -> LimitTable:
     """The limits of a device over its cases, without damping and with it.
 
@@ -217,6 +249,8 @@ def limit_table(
     draws : int
         Of each case for the boundaries over damping.
     seed : int
+    limit : DeviceLimit or CriticalStiffness, optional
+        Of all cases together, where it is known already.
 
     Returns
     -------
@@ -228,17 +262,23 @@ def limit_table(
         Without cases, or where they have different units.
     """
     cases = tuple(cases)
-    over_all: DeviceLimit | CriticalStiffness
-    over_all = device_limit(cases, seed=seed) if len(cases) != 1 else cases[0].limit
+    over_all = limit
+    if over_all is None:
+        over_all = device_limit(cases, seed=seed) if len(cases) != 1 else cases[0].limit
+    stated = tuple(over_all.safe(risk) for risk in risks)
+    undamped = dict(zip(risks, stated, strict=True))
     region = joint_region(cases, draws=draws)
     kinds = usual_dampings(region.period_s) if dampings is None else tuple(dampings)
     return LimitTable(
         cases,
         risks,
         over_all.samples,
-        tuple(over_all.safe(risk) for risk in risks),
+        stated,
         tuple(tuple(case.limit.safe(risk) for risk in risks) for case in cases),
-        tuple(_filter_limits(cases, filtered(region, kind), risks, draws) for kind in kinds),
+        tuple(
+            replace(_filter_limits(cases, filtered(region, kind), risks, draws), undamped=undamped)
+            for kind in kinds
+        ),
     )
 
 

@@ -53,7 +53,7 @@ def _own_label(closed: Closed, analysis: Analysis) -> str:
     if analysis is closed.base:
         return "measurement alone"
     worst = any(effect.family == "time-varying" for effect in closed.effects)
-    return "measurement alone, worst part" if worst else "measurement alone, corrected"
+    return "measurement, worst part" if worst else "measurement, corrected"
 
 
 def draw(closed: Closed) -> Figure:

@@ -1,0 +1,44 @@
+"""Which parameters a misfit makes doubtful, although their intervals are narrow."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bayeshaptic.diagnosis.feedback.explain import has_feedback
+from bayeshaptic.report.misfit import misfit_is_clear
+from bayeshaptic.report.result import analysis_of, closed_of, families_of, is_unexplained
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.closed import Closed
+
+
+def doubtful_parameters(result: Any) -> dict[str, str]:
+    """Name to the reason, for each parameter whose interval may miss its true value.
+
+    A residual that is not explained, or feedback, makes all of them doubtful.  The posterior
+    takes the fitted law of a force as exact; that makes those doubtful which taking it off moved
+    by more than their own standard deviation.
+    """
+    analysis, closed = analysis_of(result), closed_of(result)
+    names = analysis.model.names
+    if has_feedback(analysis.notices):
+        return dict.fromkeys(names, "feedback biases it")
+    if is_unexplained(result) or misfit_is_clear(analysis):
+        return dict.fromkeys(names, "part of the recording is unexplained")
+    if closed is not None and "nonlinear" in families_of(result):
+        return dict.fromkeys(_moved(closed), "its error takes the fitted force as exact")
+    return {}
+
+
+def _moved(closed: Closed) -> tuple[str, ...]:
+    """Parameters that the fitted law of a force moved by more than their own error."""
+    before, after = closed.base.fit, closed.analysis.fit
+    sd = closed.analysis.posterior.draws.std(axis=0)
+    known = dict(zip(before.model.names, before.theta, strict=True))
+    return tuple(
+        name
+        for name, value, error in zip(after.model.names, after.theta, sd, strict=True)
+        if name in known and np.abs(value - known[name]) > error
+    )
