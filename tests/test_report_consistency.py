@@ -14,7 +14,7 @@ import pytest
 from fake_analysis import CASES, fake_analysis, fake_closed
 from fake_study import fake_study
 
-from bayeshaptic.effects.registry import effects
+from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.next_experiment import Experiment
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.report import section, write, write_report

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.effects.registry import effects
+from bayeshaptic.effects.library import effects
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.quantities import estimate, quantity, scale
 from bayeshaptic.report.tables import ParameterRow, Rows
