@@ -170,7 +170,7 @@ class LimitTable:
         status: str | None = None,
         recommended: float | None = None,
     ) -> str:
-        """`as_dict` of the same as text; strict JSON."""
+        """`as_dict` of `device`, `status` and `recommended` as text; strict JSON."""
         found = self.as_dict(device, status, recommended)
         return json.dumps(found, indent=1, allow_nan=False) + "\n"
 
