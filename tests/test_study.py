@@ -154,7 +154,7 @@ WRONG = {
     f"{DEVICE}kind='rotational'\n{RECORDING}": "but the device lhifam is translational",
     f"[device]\nname='wheel'\n{RECORDING}": "no device 'wheel' is known: there are lhifam, phantom",
     f"[device]\nkind='rotational'\n{RECORDING}": r"\[device\] needs a name",
-    f"[device]\nfile='none.toml'\n{RECORDING}": "none.toml: no such file",
+    f"[device]\nfile='none.toml'\n{RECORDING}": "no such file: .*none.toml",
     f"device=3\n{RECORDING}": r"\[device\] must be a table",
     f"{DEVICE}[prior]\nm1=3\n{RECORDING}": r"\[prior\], m1 must be a table",
     f"{DEVICE}[prior]\nm1={{men=3}}\n{RECORDING}": r"unknown key 'men' \(did you mean 'mean'\?\)",
@@ -222,3 +222,29 @@ def test_references_that_cannot_be(tmp_path, old, new, part):
     (tmp_path / "study.toml").write_text(REFERENCED.replace(old, new))
     with pytest.raises(InputError, match=part):
         read_study(tmp_path / "study.toml")
+
+
+def test_files_outside_the_folder_are_read_where_it_is_allowed(folder: Path) -> None:
+    (folder / "in").mkdir()
+    study = folder / "in" / "study.toml"
+    study.write_text(f"{DEVICE}[[recording]]\nfile='../a.csv'\n", encoding="utf-8")
+    with pytest.raises(InputError, match="recording 1: ../a.csv is outside .* --allow-outside"):
+        read_study(study)
+    assert len(read_study(study, allow_outside=True).entries) == 1
+
+
+HOSTILE = {
+    "a = " + "[" * 2000 + "]" * 2000: "not valid TOML|nested more than",
+    "a = [[[[[[[[[1]]]]]]]]]": "nested more than 8 deep",
+    "a." * 6000 + "b = 1": "a line of more than 10000 characters",
+    "# no\n" * 300_000: "larger than 1000 kB",
+    f"a = {'9' * 5000}": "not valid TOML",
+    f"{DEVICE}delay_s = {'9' * 400}": "delay_s must be a number .*, not 999.*[.][.][.]$",
+}
+
+
+@pytest.mark.parametrize("content", HOSTILE, ids=lambda content: content[:12])
+def test_hostile_toml(folder: Path, content: str) -> None:
+    with pytest.raises(InputError, match=HOSTILE[content]) as caught:
+        read_study(write(folder, content))
+    assert len(str(caught.value)) < 500

@@ -77,6 +77,11 @@ def add_analysis_options(parser: argparse.ArgumentParser) -> None:
         metavar="Q",
         help="one encoder count, in m or rad (default: from the device, or from the data)",
     )
+    reading.add_argument(
+        "--allow-outside",
+        action="store_true",
+        help="let a study read files outside its own folder",
+    )
     analysis = parser.add_argument_group("how it is analysed")
     analysis.add_argument(
         "--model",
@@ -156,6 +161,7 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         band_hz=arguments.band,
         seed=arguments.seed,
         close_loop=not arguments.no_loop,
+        allow_outside=arguments.allow_outside,
     )
 
 

@@ -11,6 +11,12 @@ from typing import Any
 
 from bayeshaptic.errors import InputError
 
+# A study of a thousand recordings has 100 kB; nothing in one is nested deeper than a mapping of
+# columns in a recording.
+MOST_BYTES = 1_000_000
+LONGEST_LINE = 10_000
+DEEPEST = 8
+
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """`` (did you mean 'x'?)`` where something known is close to `word`, otherwise nothing."""
@@ -25,16 +31,54 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        Where the file is missing, not text, or not TOML.
+        Where the file is missing, not text, not TOML, larger than `MOST_BYTES`, or nested deeper
+        than `DEEPEST`.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        text = content.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text ({error})") from None
-    except tomllib.TOMLDecodeError as error:
+    # The time that the parser takes grows with the square of what stands in one line.
+    if len(content) > MOST_BYTES or max(map(len, text.splitlines()), default=0) > LONGEST_LINE:
+        raise InputError(
+            f"{path}: larger than {MOST_BYTES // 1000} kB, or with a line of more than "
+            f"{LONGEST_LINE} characters; this is no study or device file"
+        )
+    try:
+        found = tomllib.loads(text.replace("\r\n", "\n"))
+    except ValueError as error:  # TOMLDecodeError is one; so is a number of 5000 digits
         raise InputError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        found = {}
+        depth = DEEPEST + 1
+    else:
+        depth = _depth(found)
+    if depth > DEEPEST:
+        raise InputError(f"{path}: tables or lists nested more than {DEEPEST} deep; flatten them")
+    return found
+
+
+def _depth(value: object) -> int:
+    """How deep tables and lists are nested, as far as it matters."""
+    layer, depth = [value], 0
+    while layer and depth <= DEEPEST:
+        depth += 1
+        layer = [
+            inner
+            for item in layer
+            if isinstance(item, Mapping | list)
+            for inner in (item.values() if isinstance(item, Mapping) else item)
+            if isinstance(inner, Mapping | list)
+        ]
+    return depth
+
+
+def _short(value: object) -> str:
+    return shown if len(shown := repr(value)) <= 60 else f"{shown[:57]}..."
 
 
 class Table:
@@ -52,7 +96,9 @@ class Table:
 
     def __init__(self, content: object, where: str, known: Iterable[str] | None = None) -> None:
         if not isinstance(content, Mapping):
-            raise InputError(f"{where} must be a table of 'key = value' lines, not {content!r}")
+            raise InputError(
+                f"{where} must be a table of 'key = value' lines, not {_short(content)}"
+            )
         self.content: Mapping[str, Any] = content
         self.where = where
         if known is not None:
@@ -68,7 +114,9 @@ class Table:
 
     def wrong(self, key: str, expected: str) -> InputError:
         """The error for a value of the wrong type."""
-        return InputError(f"{self.where}: {key} must be {expected}, not {self.content[key]!r}")
+        return InputError(
+            f"{self.where}: {key} must be {expected}, not {_short(self.content[key])}"
+        )
 
     def number(self, key: str, lowest: float = -math.inf, above: bool = False) -> float | None:
         """A finite number of at least `lowest` (`above`: larger than it), or None where absent."""
@@ -76,7 +124,7 @@ class Table:
         if value is None:
             return None
         usable = isinstance(value, int | float) and not isinstance(value, bool)
-        usable = usable and math.isfinite(value)
+        usable = usable and abs(value) < 1e300  # neither infinite nor an integer beyond floats
         if not usable or value < lowest or (above and value == lowest):
             bound = (
                 "" if lowest == -math.inf else f" {'above' if above else 'of at least'} {lowest:g}"

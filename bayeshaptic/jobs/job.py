@@ -27,6 +27,8 @@ class Settings:
     seed : int
     close_loop : bool
         Whether to look for what the model lacks.
+    allow_outside : bool
+        Whether a study may read files outside its folder.
     """
 
     columns: str | None = None
@@ -39,6 +41,7 @@ class Settings:
     band_hz: tuple[float, float] | None = None
     seed: int = 0
     close_loop: bool = True
+    allow_outside: bool = False
 
 
 @dataclass(frozen=True)

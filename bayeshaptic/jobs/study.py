@@ -145,7 +145,7 @@ def _read(job: Job) -> Study:
                 f"--{option.replace('_', '-')} is for a single recording; for a study write it in "
                 f"{job.source}, in the table [device]"
             )
-    return read_study(job.source)
+    return read_study(job.source, job.settings.allow_outside)
 
 
 def _analysed(

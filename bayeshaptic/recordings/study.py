@@ -115,7 +115,7 @@ class Study:
         return tuple(self.read(entry) for entry in self.entries)
 
 
-def read_study(path: str | os.PathLike[str]) -> Study:
+def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Study:
     """A study from its TOML file.
 
     The file has a ``[device]`` table: a `name` of a known device, or the `file` of a device file,
@@ -132,6 +132,9 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     Parameters
     ----------
     path : str or path
+    allow_outside : bool
+        Whether files outside the study's folder may be read; a study from somebody else should not
+        choose which of one's files are opened.
 
     Returns
     -------
@@ -140,8 +143,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     Raises
     ------
     InputError
-        For a missing file, unknown keys (with the nearest known one), wrong types and impossible
-        values.
+        For a missing file or one outside the folder, unknown keys (with the nearest known one),
+        wrong types and impossible values.
     """
     path = Path(path)
     table = Table(read_toml(path), str(path), known=STUDY_KEYS)
@@ -149,7 +152,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         raise InputError(
             f"{path}: no [device] table; it needs at least a name, or a kind and a name"
         )
-    device, columns, notices = _device(table.content["device"], path)
+    home = None if allow_outside else path.parent.resolve()
+    device, columns, notices = _device(table.content["device"], path, home)
     entries = table.content.get("recording")
     if not isinstance(entries, list) or not entries:
         raise InputError(
@@ -160,7 +164,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         path=path,
         device=device,
         entries=tuple(
-            _entry(entry, f"{path}, recording {number}", path.parent)
+            _entry(entry, f"{path}, recording {number}", path.parent, home)
             for number, entry in enumerate(entries, start=1)
         ),
         columns=columns,
@@ -170,14 +174,29 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     )
 
 
-def _device(content: object, path: Path) -> tuple[Device, Columns, tuple[Notice, ...]]:
+def _file(folder: Path, file: str, home: Path | None, where: str) -> Path:
+    """A file by what the study calls it; refused where it is not inside `home`."""
+    path = folder / file
+    if home is not None and not path.resolve().is_relative_to(home):
+        raise InputError(
+            f"{where}: {file} is outside the study's folder; copy it there, or allow it with "
+            "--allow-outside"
+        )
+    if not path.is_file():
+        raise InputError(f"{where}: no such file: {path}")
+    return path
+
+
+def _device(
+    content: object, path: Path, home: Path | None
+) -> tuple[Device, Columns, tuple[Notice, ...]]:
     where = f"{path}, [device]"
     table = Table(content, where)
     file, name, names = table.text("file"), table.text("name"), device_names()
     base: Device | None = None
     notices: tuple[Notice, ...] = ()
     if file is not None:
-        base = load_device(path.parent / file)
+        base = load_device(_file(path.parent, file, home, where))
     elif name is not None and name.lower() in names:
         base = load_device(name)
     elif name is not None and "kind" not in table.content:
@@ -204,16 +223,13 @@ def _columns(columns: object, where: str) -> Columns:
     return columns  # type: ignore[return-value]
 
 
-def _entry(content: object, where: str, folder: Path) -> StudyEntry:
+def _entry(content: object, where: str, folder: Path, home: Path | None) -> StudyEntry:
     table = Table(content, where, known=ENTRY_KEYS)
     file = table.text("file")
     if file is None:
         raise InputError(f"{where} needs a file: file = 'recording.csv'")
-    path = folder / file
-    if not path.is_file():
-        raise InputError(f"{where}: no such file: {path}")
     return StudyEntry(
-        path=path,
+        path=_file(folder, file, home, where),
         user=_label(table, "user"),
         configuration=_coordinate(table, "configuration"),
         trial=_trial(table),

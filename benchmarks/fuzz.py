@@ -1,0 +1,251 @@
+"""Damaged files at every door: no traceback, no crash, none over 10 s or 2 GiB.
+
+    python fuzz.py                      2000 files a format
+    python fuzz.py --count 200 csv npz  fewer, of some formats
+
+Each case is a good file with bytes changed, moved, repeated or cut off, read in a process that this
+one watches. What is not a one-line refusal (`InputError`) or a result is printed with the seed that
+makes it again (`--only SEED`). Needs a system with `fork`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import io
+import multiprocessing
+import resource
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayeshaptic import cli, load_posterior
+from bayeshaptic.devices import load_device
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings import read_frf, read_recording, read_study
+
+# In the place of this folder, whose coverage.py would be taken for the library of that name.
+sys.path[0] = str(Path(__file__).parents[1] / "tests")
+test_readers = importlib.import_module("test_readers")
+
+MOST_SECONDS = 10.0
+MOST_KB = 2 << 20
+Door = Callable[[Path], Any]
+
+STUDY = """
+[device]
+name = "mine"
+kind = "rotational"
+period_s = 1e-3
+delay_s = 2e-4
+columns = "time=t,force=u,position=q"
+[prior]
+m1 = { median = 0.2, log_sd = 0.3 }
+b2 = { scale = 5, floor = 5e-6 }
+[[recording]]
+file = "a.csv"
+user = "Ada"
+configuration = 0.3
+[[reference]]
+label = "relay"
+held = true
+critical_stiffness_db = [40.6, 40.9]
+"""
+DEVICE = """
+name = "mine"
+kind = "translational"
+delay_s = 2e-4
+delay_sd_s = 2e-5
+band_hz = [0.3, 300]
+notes = ["x"]
+[free]
+m1 = 0.19
+b1 = 0.1
+kc = 5e4
+"""
+WORDS = """
+report batch relay simulate population inspect a.csv study.toml none.csv . lhifam phantom -o out
+--columns time=t,force=u,position=q force=u*0 position=q[furlong] time=,= --period-s 0 -1e-3 nan
+1e400 --band 1,2 200,1 a,b --model rigid grasped --device --delay-s --delay-sd-s --seed -3
+--workers 0 --quiet --held --effect coulomb_friction=force:x --excitation relay --rows 5:2
+--seconds 0:1e9 \\x1b[31m --no-loop
+"""
+
+
+def doors(folder: Path) -> dict[str, tuple[bytes, str, Door]]:
+    """A good file, its name, and what reads it, of each format."""
+    found: dict[str, tuple[bytes, str, Door]] = {}
+    for name, write in test_readers.WRITERS.items():
+        write(folder / name)
+        mapping = test_readers.mapping_of(name)
+        key = {"a.csv": "csv", "a.mat": "mat5", "b.mat": "mat73", "a.h5": "hdf5", "a.npz": "npz"}
+        content = (folder / name).read_bytes()
+        found[key.get(name, name)] = (
+            content,
+            name,
+            lambda path, m=mapping: read_recording(path, m),
+        )
+    rows = "\n".join(f"{f},{-f},{-180},1e-6" for f in range(1, 20))
+    table = f"frequency_hz,gain_db,phase_deg,sd\n{rows}\n"
+    found["frf"] = (table.encode(), "frf.csv", lambda path: read_frf(path, 1e-3))
+    found["study"] = (STUDY.encode(), "study.toml", read_study)
+    found["device"] = (DEVICE.encode(), "device.toml", load_device)
+    found["posterior"] = (posterior(folder), "posterior.nc", load_posterior)
+    found["command"] = (b"", "command", lambda _: None)
+    return found
+
+
+def posterior(folder: Path) -> bytes:
+    """A saved posterior, of few draws."""
+    import bayeshaptic as bh  # loads numba, which looks for that library
+
+    recording = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"
+    etfe = bh.estimate_etfe(bh.read_recording(recording), band_hz=(1, 25))
+    model = bh.rigid(device="phantom")
+    fit = bh.least_squares(model, etfe)
+    bh.sample(model, etfe, start=fit, ess=50).save(folder / "p.nc")
+    return (folder / "p.nc").read_bytes()
+
+
+def mutated(content: bytes, rng: np.random.Generator) -> bytes:
+    """`content` with up to a dozen changes."""
+    changed = bytearray(content)
+    for _ in range(min(rng.geometric(0.4), 12)):
+        if not changed:
+            break
+        place, size = int(rng.integers(len(changed))), int(rng.geometric(0.05))
+        kind = rng.integers(6)
+        if kind == 0:
+            changed[place] = int(rng.integers(256))
+        elif kind == 1:
+            changed[place] ^= 1 << int(rng.integers(8))
+        elif kind == 2:
+            del changed[place : place + size]
+        elif kind == 3:
+            changed[place:place] = changed[place : place + size]
+        elif kind == 4:
+            changed[place : place + 8] = rng.choice([0, 0x7F, 0xFF]).astype(np.uint8).tobytes() * 8
+        elif rng.uniform() < 0.2:
+            del changed[place:]
+    return bytes(changed)
+
+
+def attempt(name: str, door: Door, path: Path, content: bytes, seed: int) -> str:
+    """ "read", "refused", or what went wrong."""
+    rng = np.random.default_rng(seed)
+    began = time.perf_counter()
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+            warnings.simplefilter("ignore")
+            if name == "command":
+                result = command(rng)
+            else:
+                path.write_bytes(mutated(content, rng))
+                door(path)
+                result = "read"
+    except InputError as error:
+        result = "refused" if "\n" not in str(error) else "more than a line"
+    except Exception as error:
+        result = f"{type(error).__name__}: {str(error)[:100]!r}"
+    if "defect" in said.getvalue() or "Traceback" in said.getvalue():
+        result = f"said {said.getvalue()[:200]!r}"
+    seconds = time.perf_counter() - began
+    return result if seconds < MOST_SECONDS else f"{result}, {seconds:.0f} s"
+
+
+def command(rng: np.random.Generator) -> str:
+    """A command line of random words; its exit status has to be one of ours."""
+    words = [str(word) for word in rng.choice(WORDS.split(), rng.integers(1, 9))]
+    try:
+        status = cli.main(words)
+    except SystemExit as stop:
+        status = stop.code
+    if status not in (0, 1, 2):
+        return f"status {status} of {words}"
+    return "refused" if status else "read"
+
+
+def watched(name: str, case: tuple[bytes, str, Door], seeds: list[int], folder: Path) -> Counter:
+    """Outcomes of all seeds; a process that dies is one outcome, and the next goes on."""
+    content, file, door = case
+    outcomes: Counter = Counter()
+    context = multiprocessing.get_context("fork")
+    while seeds:
+        here, there = context.Pipe(duplex=False)
+
+        def work(left: list[int] = seeds, there: Any = there) -> None:
+            for seed in left:
+                there.send(attempt(name, door, folder / file, content, seed))
+            own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            below = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+            there.send(max(own, below))
+
+        process = context.Process(target=work)
+        process.start()
+        there.close()
+        done = 0
+        try:
+            while done < len(seeds):
+                if not here.poll(10 * MOST_SECONDS):
+                    break
+                result = here.recv()
+                if result not in ("read", "refused"):
+                    print(f"  {name} --only {seeds[done]}: {result}", flush=True)
+                    result = "WRONG"
+                outcomes[result] += 1
+                done += 1
+            else:
+                kb = here.recv()
+                if kb > MOST_KB:
+                    print(f"  {name}: {kb / 2**20:.1f} GiB")
+                    outcomes["WRONG"] += 1
+        except EOFError:
+            pass
+        if done < len(seeds):
+            process.kill()
+            process.join()
+            print(f"  {name} --only {seeds[done]}: died or hung ({process.exitcode})", flush=True)
+            outcomes["WRONG"] += 1
+            done += 1
+        process.join()
+        seeds = seeds[done:]
+    return outcomes
+
+
+def main() -> int:
+    """The table; 1 where anything went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("formats", nargs="*", help="all by default")
+    parser.add_argument("--count", type=int, default=2000, help="files a format")
+    parser.add_argument("--only", type=int, help="one seed")
+    arguments = parser.parse_args()
+    wrong = 0
+    with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
+        folder = Path(place)
+        cases = doors(folder)
+        test_readers.write_csv(folder / "a.csv")
+        (folder / "study.toml").write_text(STUDY)
+        for name in arguments.formats or cases:
+            began = time.perf_counter()
+            seeds = [arguments.only] if arguments.only is not None else list(range(arguments.count))
+            outcomes = watched(name, cases[name], seeds, folder)
+            wrong += outcomes["WRONG"]
+            print(
+                f"{name:14s} read {outcomes['read']:5d}  refused {outcomes['refused']:5d}  "
+                f"wrong {outcomes['WRONG']:3d}  {time.perf_counter() - began:6.1f} s",
+                flush=True,
+            )
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
