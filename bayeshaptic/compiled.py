@@ -12,8 +12,7 @@ from typing import Any, TypeVar, overload
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# No assumption that numbers are finite: proposals that are far away overflow, and are refused.
-_FAST = {"reassoc", "contract", "nsz", "arcp"}
+_FAST = {"contract"}  # a * b + c in one rounding; nothing else that changes a number
 _tell: Callable[[], None] | None = None
 _listening = False
 
@@ -29,8 +28,7 @@ def kernel(*, inline: bool = False) -> Callable[[F], F]: ...
 def kernel(function: F | None = None, *, inline: bool = False) -> F | Callable[[F], F]:
     """Decorator: compile `function` when it is first called, without Python objects.
 
-    Sums may be taken in another order than written, but in the same one for every call; divisions
-    by zero give inf or nan.  One thread.
+    Sums are taken in the order written, by one thread; a division by zero gives inf or nan.
 
     Parameters
     ----------

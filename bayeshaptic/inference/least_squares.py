@@ -155,8 +155,8 @@ def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[F
     """Real residuals of unit variance, as a function of coordinates: (B, P) to (B, N)."""
 
     def residuals(phi: Floats) -> Floats:
-        left = likelihood.normalised(here.natural(phi)).reshape(len(phi), -1)
-        return np.sqrt(2) * np.concatenate([left.real, left.imag], axis=1)
+        left = likelihood.normalised(here.natural(phi))
+        return np.sqrt(2) * left.view(float).reshape(len(phi), -1)
 
     return residuals
 

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayeshaptic.models import Model
+from bayeshaptic.models.response.kernels.arrays import RationalArrays, WindowArrays
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
-_CHUNK = 128
+_LANES = 32
+_CHUNK = 128  # vectors at a time, of what is done in plain NumPy
 
 
 @dataclass(frozen=True)
 class Likelihood:
     """log p(recording | theta) for batches of parameter vectors in natural values.
+
+    Compiled for every model with finitely many poles, a vector at a time, so that no value depends
+    on the batch around it; `plain_deviations` is the same in plain NumPy, and serves the others.
 
     Attributes
     ----------
@@ -27,17 +34,52 @@ class Likelihood:
     model: Model
     windows: Windows
 
-    @cached_property
-    def _frequencies(self) -> Floats:
-        return np.ascontiguousarray(self.windows.frequency_hz.ravel())
+    def __call__(self, theta: Floats) -> Floats:
+        """Log likelihood of parameter vectors of shape (B, P); shape (B,)."""
+        form = self._rational_form(theta)
+        if form is None:
+            return self.pointwise(theta).sum(axis=1)
+        from bayeshaptic.models.response.kernels.rational import log_likelihood
+
+        value = np.empty(len(theta))
+        log_likelihood(form, self._arrays, value)
+        return value
+
+    def pointwise(self, theta: Floats) -> Floats:
+        """Log likelihood of every window, up to a constant of the data; shape (B, W).
+
+        The constant does not depend on the reference that the windows were compressed around.
+        """
+        left = self.deviations(theta).view(float)
+        power = np.einsum("bwk,bwk->bw", left, left)
+        return -(self.windows.lines - 1) * np.log(self.windows.scatter + power)
 
     def deviations(self, theta: Floats) -> Complexes:
         """z - R g(theta): what the model leaves in every window, shape (B, W, r)."""
+        return self._deviations(theta, np.ones(len(self.windows.scatter)))
+
+    def normalised(self, theta: Floats) -> Complexes:
+        """Deviations over their standard deviation: E|.|^2 = 1 where the model is true."""
+        return self._deviations(theta, 1 / np.sqrt(self.noise_variance))
+
+    def _deviations(self, theta: Floats, weight: Floats) -> Complexes:
+        form = self._rational_form(theta)
+        if form is None:
+            return self.plain_deviations(theta) * weight[:, None]
+        from bayeshaptic.models.response.kernels.rational import deviations
+
+        out = np.empty((len(theta), *self.windows.target.shape, 2))
+        deviations(form, self._arrays, weight, out)
+        return out.view(complex)[..., 0]
+
+    def plain_deviations(self, theta: Floats) -> Complexes:
+        """`deviations` of any model, in plain NumPy."""
         count, nodes = self.windows.frequency_hz.shape
+        frequency_hz = np.ascontiguousarray(self.windows.frequency_hz.ravel())
         out = np.empty((len(theta), *self.windows.target.shape), complex)
         for start in range(0, len(theta), _CHUNK):
             part = theta[start : start + _CHUNK]
-            g = self.model.response(part, self._frequencies).reshape(len(part), count, nodes)
+            g = self.model.response(part, frequency_hz).reshape(len(part), count, nodes)
             if nodes == 1:
                 fitted = self.windows.design[:, :, 0] * g
             else:  # one small matrix product a window, the batch last
@@ -45,19 +87,45 @@ class Likelihood:
             out[start : start + _CHUNK] = self.windows.target - fitted
         return out
 
-    def pointwise(self, theta: Floats) -> Floats:
-        """Log likelihood of every window, up to a constant of the data; shape (B, W).
+    def _rational_form(self, theta: Floats) -> RationalArrays | None:
+        """The loops at the windows' nodes; None where they have no finite set of poles."""
+        system = self.model.system(theta)
+        if not system.rational or self.model.period_s is None:
+            return None
+        return system.rational_form(self._node_frequencies, self.model.period_s)
 
-        The constant does not depend on the reference that the windows were compressed around.
-        """
-        left = self.deviations(theta)
-        power = np.einsum("bwk,bwk->bw", left.real, left.real)
-        power += np.einsum("bwk,bwk->bw", left.imag, left.imag)
-        return -(self.windows.lines - 1) * np.log(self.windows.scatter + power)
+    @cached_property
+    def _node_frequencies(self) -> Floats:
+        return self._windows_last(self.windows.frequency_hz).ravel()
 
-    def __call__(self, theta: Floats) -> Floats:
-        """Log likelihood of parameter vectors of shape (B, P); shape (B,)."""
-        return self.pointwise(theta).sum(axis=1)
+    @cached_property
+    def _arrays(self) -> WindowArrays:
+        """The windows as the compiled form reads them."""
+        nodes = self.windows.frequency_hz.shape[1]
+        design = self._windows_last(self.windows.design[:, :, :nodes])
+        target = self._windows_last(self.windows.target)
+        scatter = self._windows_last(self.windows.scatter)
+        weight = self._windows_last(self.windows.lines - 1.0)
+        real = len(self.windows.scatter)
+        for array in (design, target, weight):
+            array[..., real:] = 0.0
+        triangular = (
+            design.shape[:2] == (3, 3) and not np.tril(np.moveaxis(design, -1, 0), -1).any()
+        )
+        return WindowArrays(
+            np.ascontiguousarray(design.real),
+            np.ascontiguousarray(design.imag),
+            np.ascontiguousarray(target.real),
+            np.ascontiguousarray(target.imag),
+            scatter,
+            weight,
+            triangular,
+        )
+
+    def _windows_last(self, values: NDArray[Any]) -> NDArray[Any]:
+        """With the windows last, the first one repeated until vector instructions leave no rest."""
+        repeated = np.repeat(values[:1], -len(values) % _LANES, axis=0)
+        return np.ascontiguousarray(np.moveaxis(np.concatenate([values, repeated]), 0, -1))
 
     @property
     def noise_variance(self) -> Floats:
@@ -66,10 +134,6 @@ class Likelihood:
         # |z - R g|^2 / k over s0 / (n - k) is an F variable; this is its mean times s0 / (n - k).
         freedom = np.maximum(self.windows.lines - nodes - 1, 0.5)
         return self.windows.scatter / freedom
-
-    def normalised(self, theta: Floats) -> Complexes:
-        """Deviations over their standard deviation: E|.|^2 = 1 where the model is true."""
-        return self.deviations(theta) / np.sqrt(self.noise_variance)[:, None]
 
     def reduced_chi_square(self, theta: Floats) -> Floats:
         """Mean squared normalised deviation a degree of freedom, shape (B,); 1 is the noise."""

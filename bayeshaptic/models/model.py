@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.models.joint_prior import JointPrior, joint_prior
 from bayeshaptic.models.parameter import Parameter, unit_of
 from bayeshaptic.models.prior import Prior
 from bayeshaptic.models.response.system import Complexes, Floats, LinearSystem
@@ -165,10 +167,11 @@ class Model:
     def log_prior(self, theta: ArrayLike) -> Floats:
         """Log prior density of parameter vectors `theta` of shape (B, P); shape (B,)."""
         theta = np.atleast_2d(np.asarray(theta, float))
-        total = np.zeros(len(theta))
-        for name, column in zip(self.names, theta.T, strict=True):
-            total += self.prior(name).log_density(column)
-        return total
+        return self._joint_prior(theta)
+
+    @cached_property
+    def _joint_prior(self) -> JointPrior:
+        return joint_prior([self.prior(name) for name in self.names])
 
     def with_period(self, period_s: float) -> Model:
         """With the sampling period `period_s`, in seconds."""

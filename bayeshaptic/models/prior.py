@@ -49,6 +49,25 @@ def draw(prior: Prior, rng: np.random.Generator, size: int) -> Floats:
 
 
 @dataclass(frozen=True)
+class Terms:
+    """What a log density is made of, for `joint_prior.py`: between `low` and `high`
+
+        constant - ((t - centre) / sd)^2 / 2 - [log(x + shift) if over_x],
+
+    t = log(x + shift) where it is `logarithmic`, and x where not.
+    """
+
+    low: float
+    high: float
+    constant: float
+    centre: float = 0.0
+    sd: float = np.inf
+    logarithmic: bool = False
+    over_x: bool = False
+    shift: float = 0.0
+
+
+@dataclass(frozen=True)
 class LogNormal(Prior):
     """log(x) is normal around log(median) with standard deviation `log_sd`."""
 
@@ -60,6 +79,13 @@ class LogNormal(Prior):
     def __post_init__(self) -> None:
         if not (self.median > 0 and self.log_sd > 0):
             raise InputError(f"LogNormal needs median > 0 and log_sd > 0, got {self}.")
+
+    @property
+    def terms(self) -> Terms:
+        constant = -np.log(self.log_sd) - _LOG_SQRT_2PI
+        smallest = float(np.nextafter(0.0, 1.0))
+        centre = float(np.log(self.median))
+        return Terms(smallest, np.inf, constant, centre, self.log_sd, True, True)
 
     def log_density(self, x: ArrayLike) -> Floats:
         x = np.asarray(x, float)
@@ -87,6 +113,11 @@ class HalfNormal(Prior):
     def __post_init__(self) -> None:
         if not self.scale > 0:
             raise InputError(f"HalfNormal needs scale > 0, got {self}.")
+
+    @property
+    def terms(self) -> Terms:
+        constant = np.log(2 / self.scale) - _LOG_SQRT_2PI
+        return Terms(0.0, np.inf, constant, sd=self.scale)
 
     def log_density(self, x: ArrayLike) -> Floats:
         x = np.asarray(x, float)
@@ -119,6 +150,11 @@ class NearZero(Prior):
             raise InputError(
                 f"NearZero needs a floor below its scale, by a factor of 1e12 at most; got {self}."
             )
+
+    @property
+    def terms(self) -> Terms:
+        constant = -np.log(_near_zero(self.floor / self.scale)[0])
+        return Terms(0.0, np.inf, constant, sd=self.scale, over_x=True, shift=self.floor)
 
     def log_density(self, x: ArrayLike) -> Floats:
         x = np.asarray(x, float)
@@ -172,6 +208,11 @@ class Normal(Prior):
     def _mass_below(self) -> float:
         return float(ndtr((self.low - self.mean) / self.sd))
 
+    @property
+    def terms(self) -> Terms:
+        constant = -np.log(self.sd) - _LOG_SQRT_2PI - np.log1p(-self._mass_below)
+        return Terms(self.low, np.inf, constant, self.mean, self.sd)
+
     def log_density(self, x: ArrayLike) -> Floats:
         x = np.asarray(x, float)
         u = (x - self.mean) / self.sd
@@ -203,6 +244,10 @@ class Uniform(Prior):
     def support(self) -> tuple[float, float]:
         return (self.low, self.high)
 
+    @property
+    def terms(self) -> Terms:
+        return Terms(self.low, self.high, -np.log(self.high - self.low))
+
     def log_density(self, x: ArrayLike) -> Floats:
         x = np.asarray(x, float)
         inside = (x >= self.low) & (x <= self.high)
@@ -230,6 +275,11 @@ class LogUniform(Prior):
     @property
     def support(self) -> tuple[float, float]:
         return (self.low, self.high)
+
+    @property
+    def terms(self) -> Terms:
+        constant = -np.log(np.log(self.high / self.low))
+        return Terms(self.low, self.high, constant, over_x=True)
 
     def log_density(self, x: ArrayLike) -> Floats:
         x = np.asarray(x, float)

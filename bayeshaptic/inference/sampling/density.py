@@ -23,15 +23,15 @@ class Density:
         out = np.full(len(phi), -np.inf)
         inside = self.coordinates.inside(phi)
         inside &= np.all(np.abs(self.coordinates.own(phi)) < 600, axis=1)
-        if inside.any():
-            out[inside] = self._log_prior(phi[inside])
-            with np.errstate(all="ignore"):  # far-away proposals may overflow: they are refused
-                out[inside] += self.likelihood(self.coordinates.natural(phi[inside]))
-        return np.where(np.isfinite(out), out, -np.inf)
-
-    def _log_prior(self, phi: Floats) -> Floats:
+        if not inside.any():
+            return out
+        phi = phi[inside]
         theta = self.coordinates.natural(phi)
-        return self.likelihood.model.log_prior(theta) + self.coordinates.log_jacobian(phi)
+        value = self.likelihood.model.log_prior(theta) + self.coordinates.log_jacobian(phi)
+        with np.errstate(all="ignore"):  # far-away proposals may overflow: they are refused
+            value += self.likelihood(theta)
+        out[inside] = np.where(np.isfinite(value), value, -np.inf)
+        return out
 
     def beyond_walls(self, phi: Floats) -> Floats:
         """The density with the walls taken away: each prior there goes on as it begins.

@@ -1,4 +1,4 @@
-r"""Sampled response behind filters that are too fast for the series over aliases.
+r"""Rational factors in the loop; and those that are too fast for the series over aliases.
 
 By partial fractions at the filters' poles q_j, with mechanism N/D and filters M/F,
 
@@ -11,41 +11,49 @@ mechanism's.  The division for R begins at the lowest power, where F is 1 + smal
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.models.response.filter import Filter
-from bayeshaptic.models.response.mechanism import Mechanism
-from bayeshaptic.models.response.sampled import from_poles, from_polynomials
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
-from bayeshaptic.types import Complexes, Floats
+from bayeshaptic.types import Bools, Complexes, Floats
 
 _APART = 1e-4  # poles of one filter nearer to each other than this, relatively, are moved apart
 _FAST = 1.0  # |q| T
 
 
-def behind_fast_filters(
-    mechanism: Mechanism,
-    filters: Sequence[Filter],
-    delay_s: Floats,
-    frequency_hz: Floats,
-    period_s: float,
-) -> tuple[Complexes, NDArray[np.bool_]]:
-    """Sampled response of a system whose filters have poles of their own, beside its mechanism's.
+Filters = tuple[Filter, ...]
+
+
+def fast_filters(filters: Filters, batch: int, period_s: float) -> Bools:
+    """Where a filter is faster than the series over aliases bears, shape (B,)."""
+    found = np.zeros(batch, bool)
+    for factor in filters:
+        found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > _FAST
+    return found
+
+
+def filtered(
+    numerator: Polynomial, denominator: Polynomial, filters: Filters
+) -> tuple[Polynomial, Polynomial]:
+    """Numerator and denominator of a transfer function behind filters."""
+    for factor in filters:
+        numerator = multiply(numerator, factor.numerator)
+        denominator = multiply(denominator, factor.denominator)
+    return numerator, denominator
+
+
+def parted(
+    numerator: Polynomial, denominator: Polynomial, filters: Filters
+) -> tuple[Polynomial, Complexes, Complexes]:
+    """A transfer function behind filters as the sum of the filters' poles and the rest.
 
     Returns
     -------
-    response : ndarray of complex, shape (B, L)
-    good : ndarray of bool, shape (B,)
-        False where the mechanism itself is too fast.
+    rest : ndarray
+        R, a numerator over the `denominator` of the mechanism alone.
+    poles, residues : ndarray of complex, shape (n, B)
     """
-    numerator, denominator = mechanism.transfer()
-    bottom = np.ones((1, mechanism.batch))
-    for factor in filters:
-        numerator = multiply(numerator, factor.numerator)
-        bottom = multiply(bottom, factor.denominator)
+    numerator, bottom = filtered(numerator, np.ones((1, denominator.shape[1])), filters)
     poles = np.concatenate([_simple_roots(factor.denominator) for factor in filters])
     gaps = poles[:, None] - poles[None, :]
     gaps[np.arange(len(poles)), np.arange(len(poles))] = 1.0
@@ -54,18 +62,7 @@ def behind_fast_filters(
     rest = _divided(
         _difference(numerator, multiply(denominator, _sum(poles, residues, bottom[-1]))), bottom
     )
-    rest = rest[: len(denominator) - 1]
-    response, good = from_polynomials(rest, denominator, delay_s, frequency_hz, period_s)
-    response += from_poles(poles.T, residues.T, delay_s, frequency_hz, period_s)
-    return response, good
-
-
-def fast_filters(filters: Sequence[Filter], batch: int, period_s: float) -> NDArray[np.bool_]:
-    """Where a filter is faster than the series over aliases bears, shape (B,)."""
-    found = np.zeros(batch, bool)
-    for factor in filters:
-        found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > _FAST
-    return found
+    return rest[: len(denominator) - 1], poles, residues
 
 
 def _simple_roots(polynomial: Polynomial) -> Complexes:

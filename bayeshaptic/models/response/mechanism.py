@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayeshaptic.models.response.dynamic_link import Index
 from bayeshaptic.models.response.spanning import GROUND, Edges, merged, spanning_trees, with_edge
 from bayeshaptic.numerics.polynomial import Polynomial, add
 from bayeshaptic.types import Floats
@@ -59,6 +60,14 @@ class Mechanism:
     def drive(self) -> Pair:
         """What the motor pushes apart, and the encoder reads between."""
         return (self.driven, self.frame)
+
+    def rows(self, index: Index) -> Mechanism:
+        """A part of the batch."""
+        links = tuple(
+            replace(link, damping=link.damping[index], stiffness=link.stiffness[index])
+            for link in self.links
+        )
+        return replace(self, masses=tuple(mass[index] for mass in self.masses), links=links)
 
     def with_mass(self, mass: Floats, on: int, damping: Floats, stiffness: Floats) -> Mechanism:
         """With one more mass, joined to the mass number `on`."""

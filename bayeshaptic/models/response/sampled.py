@@ -33,9 +33,9 @@ from scipy.special import bernoulli, comb, factorial
 from bayeshaptic.numerics.polynomial import Polynomial
 from bayeshaptic.types import Complexes, Floats
 
-_ORDER = 28  # terms in 1/s and in s that the alias series keeps
-_REACH = 0.62  # (|p_max| + |s|) T / 2 pi up to which the series is used: relative error < 1e-9
-_HIGH = 2.2  # |s| T above which the nearest aliases are taken out of the series
+ORDER = 28  # terms in 1/s and in s that the alias series keeps
+REACH = 0.62  # (|p_max| + |s|) T / 2 pi up to which the series is used: relative error < 1e-9
+HIGH = 2.2  # |s| T above which the nearest aliases are taken out of the series
 
 
 def phi(x: Complexes) -> Complexes:
@@ -83,14 +83,14 @@ class _Nodes:
         omega = 2 * np.pi * frequency_hz
         self.period_s = period_s
         self.s = 1j * omega
-        self.reach = min(float(np.max(np.abs(omega))) * period_s, _HIGH)
-        self.high = np.flatnonzero(np.abs(omega) * period_s > _HIGH)
+        self.reach = min(float(np.max(np.abs(omega))) * period_s, HIGH)
+        self.high = np.flatnonzero(np.abs(omega) * period_s > HIGH)
         powers = np.vander(omega, 2 * 12, increasing=True)
         sign = np.array([1.0, 1.0, -1.0, -1.0] * 6)  # of Re and Im of j^p
         signed = powers * sign
         self.even, self.odd = signed[:, 0::2].copy(), signed[:, 1::2].copy()
-        scaled = np.vander(omega * period_s, _ORDER, increasing=True)
-        scaled = scaled * np.resize(np.array([1.0, 1.0, -1.0, -1.0]), _ORDER)
+        scaled = np.vander(omega * period_s, ORDER, increasing=True)
+        scaled = scaled * np.resize(np.array([1.0, 1.0, -1.0, -1.0]), ORDER)
         self.tail_even, self.tail_odd = scaled[:, 0::2].copy(), scaled[:, 1::2].copy()
         self.hold = -np.expm1(-self.s * period_s)
 
@@ -137,18 +137,18 @@ def _nodes(frequency_bytes: bytes, period_s: float) -> _Nodes:
 
 
 def laurent(numerator: Polynomial, denominator: Polynomial, period_s: float) -> Floats:
-    """Coefficients h_q T^q of P(s) = sum_q h_q s^-q for large s, q = 0.._ORDER; shape (Q, B)."""
+    """Coefficients h_q T^q of P(s) = sum_q h_q s^-q for large s, q = 0..ORDER; shape (Q, B)."""
     degree = len(denominator) - 1
     scale = period_s ** -np.arange(degree + 1)[:, None]
     bottom = denominator * scale
-    top = np.zeros((_ORDER + 1, numerator.shape[1]))
+    top = np.zeros((ORDER + 1, numerator.shape[1]))
     reversed_numerator = (numerator * scale[: len(numerator)])[::-1]
     shift = degree - (len(numerator) - 1)
-    top[shift : shift + len(numerator)] = reversed_numerator[: _ORDER + 1 - shift]
+    top[shift : shift + len(numerator)] = reversed_numerator[: ORDER + 1 - shift]
     bottom = (bottom / bottom[-1])[::-1]  # 1, d_{n-1}, ...
     top = top / (denominator[-1] * scale[-1])
     h = np.zeros_like(top)
-    for q in range(shift, _ORDER + 1):
+    for q in range(shift, ORDER + 1):
         back = min(q, degree)
         h[q] = top[q] - np.sum(bottom[1 : back + 1] * h[q - back : q][::-1], axis=0)
     return h
@@ -157,14 +157,29 @@ def laurent(numerator: Polynomial, denominator: Polynomial, period_s: float) -> 
 @lru_cache(maxsize=1)
 def _bernoulli_table() -> tuple[Floats, Floats]:
     """Coefficients of B_n(x)/n! in powers of x (row n), and (-1)^q binom(p + q, p)."""
-    top = 2 * _ORDER + 1
+    top = 2 * ORDER + 1
     numbers = bernoulli(top) / factorial(np.arange(top + 1))
     coefficients = np.zeros((top + 1, top + 1))
     for n in range(top + 1):
         powers = np.arange(n + 1)
         coefficients[n, : n + 1] = numbers[n - powers] / factorial(powers)
-    p, q = np.arange(_ORDER)[:, None], np.arange(_ORDER + 1)[None, :]
+    p, q = np.arange(ORDER)[:, None], np.arange(ORDER + 1)[None, :]
     return coefficients, (-1.0) ** q * comb(p + q, p)
+
+
+@lru_cache(maxsize=1)
+def alias_tables() -> tuple[Floats, Floats]:
+    """What `_alias_coefficients` is made of, as the compiled form reads it.
+
+    Returns
+    -------
+    bernoulli : ndarray, shape (N, N)
+        Coefficients of B_n(x)/n! in powers of x (row n).
+    binomials : ndarray, shape (ORDER + 1, ORDER)
+        (-1)^q binom(p + q, p), a row for each q.
+    """
+    bernoulli_rows, binomials = _bernoulli_table()
+    return bernoulli_rows, np.ascontiguousarray(binomials.T)
 
 
 def _alias_sums(x: Floats, far: bool) -> Floats:
@@ -178,15 +193,15 @@ def _alias_sums(x: Floats, far: bool) -> Floats:
 
 
 def _alias_coefficients(h: Floats, late: Floats, far: bool = False) -> Floats:
-    """A_p of the module's docstring, shape (_ORDER, B)."""
+    """A_p of the module's docstring, shape (ORDER, B)."""
     _, binomials = _bernoulli_table()
-    index = np.arange(_ORDER)[:, None] + np.arange(_ORDER + 1)[None, :] + 1
+    index = np.arange(ORDER)[:, None] + np.arange(ORDER + 1)[None, :] + 1
     if np.all(late == late[0]):
         return (binomials * _alias_sums(late[:1], far)[index, 0]) @ h
     beta = _alias_sums(late, far)
-    out = np.empty((_ORDER, h.shape[1]))
-    for p in range(_ORDER):
-        out[p] = np.einsum("qb,qb->b", binomials[p][:, None] * h, beta[p + 1 : p + _ORDER + 2])
+    out = np.empty((ORDER, h.shape[1]))
+    for p in range(ORDER):
+        out[p] = np.einsum("qb,qb->b", binomials[p][:, None] * h, beta[p + 1 : p + ORDER + 2])
     return out
 
 
@@ -215,7 +230,7 @@ def from_polynomials(
     """
     nodes = nodes_at(frequency_hz, period_s)
     h = laurent(numerator, denominator, period_s)
-    good = (fastest_pole(h) + nodes.reach) / (2 * np.pi) < _REACH
+    good = (fastest_pole(h) + nodes.reach) / (2 * np.pi) < REACH
     late = delay_s / period_s - np.floor(delay_s / period_s)
     response = nodes.term(numerator, denominator)
     response += nodes.tail(_alias_coefficients(h, late))
@@ -234,7 +249,7 @@ def fastest_pole(h: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         first = np.max(np.abs(h[start : start + 2]), axis=0)
         last = np.max(np.abs(h[-4:]), axis=0)
-        return (last / first) ** (1.0 / (_ORDER - start - 2))
+        return (last / first) ** (1.0 / (ORDER - start - 2))
 
 
 def _towards_nyquist(

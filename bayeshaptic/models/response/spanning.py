@@ -9,8 +9,10 @@ is an exact zero.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import combinations
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -20,27 +22,44 @@ GROUND = -1
 Pair = tuple[int, int]
 Edges = Mapping[Pair, Polynomial]
 """Two nodes, the smaller first, to the dynamic stiffness between them."""
+P = TypeVar("P")
 
 
-def with_edge(edges: Edges, first: int, second: int, stiffness: Polynomial) -> Edges:
+@dataclass(frozen=True)
+class Algebra(Generic[P]):
+    """How polynomials are added and multiplied: numbers, or a record of what is to be done."""
+
+    one: P
+    add: Callable[[P, P], P]
+    multiply: Callable[[P, P], P]
+
+
+NUMBERS: Algebra[Any] = Algebra(np.ones((1, 1)), add, multiply)
+
+
+def with_edge(
+    edges: Mapping[Pair, P], first: int, second: int, stiffness: P, algebra: Algebra[P] = NUMBERS
+) -> Mapping[Pair, P]:
     """`edges` and one more, beside what joins the two nodes already."""
     pair = (min(first, second), max(first, second))
     known = edges.get(pair)
-    return {**edges, pair: stiffness if known is None else add(known, stiffness)}
+    return {**edges, pair: stiffness if known is None else algebra.add(known, stiffness)}
 
 
-def merged(edges: Edges, nodes: tuple[int, ...]) -> Edges:
+def merged(
+    edges: Mapping[Pair, P], nodes: tuple[int, ...], algebra: Algebra[P] = NUMBERS
+) -> Mapping[Pair, P]:
     """The network with some nodes made one, which goes by the name of the smallest of them."""
     keep = min(nodes)
-    out: Edges = {}
+    out: Mapping[Pair, P] = {}
     for (i, j), stiffness in edges.items():
         i, j = keep if i in nodes else i, keep if j in nodes else j
         if i != j:
-            out = with_edge(out, i, j, stiffness)
+            out = with_edge(out, i, j, stiffness, algebra)
     return out
 
 
-def spanning_trees(edges: Edges) -> Polynomial:
+def spanning_trees(edges: Mapping[Pair, P], algebra: Algebra[P] = NUMBERS) -> P:
     """The sum over all spanning trees of the products of their edges.
 
     Node by node, that with the fewest neighbours first: the trees in which it has exactly certain
@@ -52,21 +71,21 @@ def spanning_trees(edges: Edges) -> Polynomial:
         neighbours.setdefault(j, []).append(i)
     inner = [node for node in neighbours if node != GROUND]
     if not inner:
-        return np.ones((1, 1))
+        return algebra.one
     node = min(inner, key=lambda n: len(neighbours[n]))
     own = {other: edges[min(node, other), max(node, other)] for other in neighbours[node]}
     rest = {pair: stiffness for pair, stiffness in edges.items() if node not in pair}
-    total: Polynomial | None = None
+    total: P | None = None
     for size in range(2, len(own) + 1):
         for chosen in combinations(own, size):
-            term = spanning_trees(merged(rest, chosen))
+            term = spanning_trees(merged(rest, chosen, algebra), algebra)
             for other in chosen:
-                term = multiply(term, own[other])
-            total = term if total is None else add(total, term)
-    single = spanning_trees(rest)
+                term = algebra.multiply(term, own[other])
+            total = term if total is None else algebra.add(total, term)
+    single = spanning_trees(rest, algebra)
     for_one = None
     for stiffness in own.values():
-        for_one = stiffness if for_one is None else add(for_one, stiffness)
+        for_one = stiffness if for_one is None else algebra.add(for_one, stiffness)
     assert for_one is not None
-    term = multiply(for_one, single)
-    return term if total is None else add(total, term)
+    term = algebra.multiply(for_one, single)
+    return term if total is None else algebra.add(total, term)

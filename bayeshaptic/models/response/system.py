@@ -8,11 +8,12 @@ import numpy as np
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
 from bayeshaptic.models.response.filter import Filter
-from bayeshaptic.models.response.filtered import behind_fast_filters, fast_filters
+from bayeshaptic.models.response.filtered import filtered
 from bayeshaptic.models.response.mechanism import Mechanism
+from bayeshaptic.models.response.poles import poles_and_residues
+from bayeshaptic.models.response.rational import RationalArrays, rational_form, sampled_response
 from bayeshaptic.models.response.remainder import Remainder, remainder_of, sampled_remainder
-from bayeshaptic.models.response.sampled import from_poles, from_polynomials
-from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
+from bayeshaptic.numerics.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Complexes, Floats
 
 _CHUNK = 128  # vectors at a time: the arrays of one chunk stay in the cache
@@ -64,15 +65,9 @@ class LinearSystem:
 
     def rows(self, index: Index) -> LinearSystem:
         """A part of the batch."""
-        mechanism = self.mechanism
-        links = tuple(
-            replace(link, damping=link.damping[index], stiffness=link.stiffness[index])
-            for link in mechanism.links
-        )
-        masses = tuple(mass[index] for mass in mechanism.masses)
         return replace(
             self,
-            mechanism=replace(mechanism, masses=masses, links=links),
+            mechanism=self.mechanism.rows(index),
             delay_s=self.delay_s[index],
             filters=tuple(factor.rows(index) for factor in self.filters),
             dynamic_links=tuple(link.rows(index) for link in self.dynamic_links),
@@ -80,11 +75,7 @@ class LinearSystem:
 
     def transfer(self) -> tuple[Polynomial, Polynomial]:
         """Numerator and denominator of the rational part, continuous, without the delay."""
-        numerator, denominator = self.mechanism.transfer()
-        for factor in self.filters:
-            numerator = multiply(numerator, factor.numerator)
-            denominator = multiply(denominator, factor.denominator)
-        return numerator, denominator
+        return filtered(*self.mechanism.transfer(), self.filters)
 
     def poles(self) -> tuple[Complexes, Complexes]:
         """Poles and residues of the rational part without the delay, each of shape (B, n).
@@ -92,16 +83,7 @@ class LinearSystem:
         The residues assume simple poles; beside a double pole they blow up (`sampled_response`
         does not use them there).
         """
-        poles = [_eigenvalues(self.mechanism.state_matrix())]
-        for factor in self.filters:
-            poles.append(roots(factor.denominator))
-        p = np.concatenate(poles, axis=1)
-        numerator, denominator = self.transfer()
-        gaps = p[:, :, None] - p[:, None, :]
-        gaps[:, np.arange(p.shape[1]), np.arange(p.shape[1])] = 1.0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            residues = evaluate(numerator, p.T).T / (denominator[-1][:, None] * gaps.prod(axis=2))
-        return p, residues
+        return poles_and_residues(self.mechanism, self.filters)
 
     def continuous_response(self, s: Complexes) -> Complexes:
         """P(s) without hold and delay at points `s` of shape (L,); shape (B, L)."""
@@ -120,45 +102,15 @@ class LinearSystem:
     def sampled_response(self, frequency_hz: Floats, period_s: float) -> Complexes:
         """The exact sampled response at frequencies of shape (L,); shape (B, L)."""
         frequency_hz = np.asarray(frequency_hz, float)
-        out = np.empty((self.batch, len(frequency_hz)), complex)
-        for start in range(0, self.batch, _CHUNK):
-            rows = slice(start, min(start + _CHUNK, self.batch))
-            out[rows] = self._chunk_response(rows, frequency_hz, period_s)
-        return out
-
-    def _chunk_response(self, rows: slice, frequency_hz: Floats, period_s: float) -> Complexes:
-        part = self.rows(rows) if self.batch > _CHUNK else self
-        response = part._rational_response(frequency_hz, period_s)
-        if part.dynamic_links:
-            response += sampled_remainder(part.remainder, part.delay_s, frequency_hz, period_s)
+        response = sampled_response(self.rational_form(frequency_hz, period_s))
+        if self.dynamic_links:
+            for start in range(0, self.batch, _CHUNK):
+                part = self.rows(slice(start, start + _CHUNK))
+                response[start : start + _CHUNK] += sampled_remainder(
+                    part.remainder, part.delay_s, frequency_hz, period_s
+                )
         return response
 
-    def _rational_response(self, frequency_hz: Floats, period_s: float) -> Complexes:
-        """The rational part, by the fastest way that holds for each row."""
-        fast = fast_filters(self.filters, self.batch, period_s)
-        if fast.any() and not fast.all():
-            response = np.empty((self.batch, len(frequency_hz)), complex)
-            for part in (fast, ~fast):
-                response[part] = self.rows(part)._rational_response(frequency_hz, period_s)
-            return response
-        if fast.any():
-            response, good = behind_fast_filters(
-                self.mechanism, self.filters, self.delay_s, frequency_hz, period_s
-            )
-        else:
-            numerator, denominator = self.transfer()
-            response, good = from_polynomials(
-                numerator, denominator, self.delay_s, frequency_hz, period_s
-            )
-        if not good.all():
-            bad = self.rows(~good)
-            response[~good] = from_poles(*bad.poles(), bad.delay_s, frequency_hz, period_s)
-        return response
-
-
-def _eigenvalues(matrices: Floats) -> Complexes:
-    """Eigenvalues of a batch; nan for parameters so far away that a matrix overflows."""
-    finite = np.isfinite(matrices).all(axis=(1, 2))
-    values = np.full(matrices.shape[:2], np.nan, complex)
-    values[finite] = np.linalg.eigvals(matrices[finite])
-    return values
+    def rational_form(self, frequency_hz: Floats, period_s: float) -> RationalArrays:
+        """The rational part, ready to be evaluated at frequencies of shape (L,)."""
+        return rational_form(self.mechanism, self.filters, self.delay_s, frequency_hz, period_s)

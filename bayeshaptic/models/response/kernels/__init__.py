@@ -1,0 +1,1 @@
+"""Inner loops, compiled; imported by the functions that call them."""
