@@ -22,10 +22,12 @@ def kernel(function: F) -> F: ...
 
 
 @overload
-def kernel(*, inline: bool = False) -> Callable[[F], F]: ...
+def kernel(*, inline: bool = False, exact: bool = False) -> Callable[[F], F]: ...
 
 
-def kernel(function: F | None = None, *, inline: bool = False) -> F | Callable[[F], F]:
+def kernel(
+    function: F | None = None, *, inline: bool = False, exact: bool = False
+) -> F | Callable[[F], F]:
     """Decorator: compile `function` when it is first called, without Python objects.
 
     Sums are taken in the order written, by one thread; a division by zero gives inf or nan.
@@ -37,14 +39,16 @@ def kernel(function: F | None = None, *, inline: bool = False) -> F | Callable[[
         is renewed when that file changes, and no other.
     inline : bool
         Part of the kernels that call it: nothing is kept of it by itself.
+    exact : bool
+        Sums in the order in which they are written, so that every machine finds the same.
     """
     if function is None:
-        return partial(kernel, inline=inline)  # type: ignore[return-value]
+        return partial(kernel, inline=inline, exact=exact)  # type: ignore[return-value]
     import numba
 
     _listen()
     njit: Any = numba.njit
-    options = {"fastmath": _FAST, "error_model": "numpy", "nogil": True}
+    options = {"fastmath": False if exact else _FAST, "error_model": "numpy", "nogil": True}
     try:
         compiled: F = njit(cache=not inline, **options)(function)
     except RuntimeError:  # no folder that can be written: compiled anew in each process

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -76,8 +77,9 @@ class EccentricEncoder(Effect):
 class _Cube(SmoothLaw):
     coefficient: float
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        return -self.coefficient * v**3
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        return -constants[0] * v**3
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,9 @@ class _Lopsided(SmoothLaw):
     level: float
     velocity: float
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        return -self.level * math.tanh(v / self.velocity) * (1.4 if v > 0 else 0.6)
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        return -constants[0] * math.tanh(v / constants[1]) * (1.4 if v > 0 else 0.6)
 
 
 @dataclass(frozen=True)
@@ -94,8 +97,9 @@ class _Stops(SmoothLaw):
     stiffness: float
     free: float
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        return -self.stiffness * (max(q - self.free, 0.0) + min(q + self.free, 0.0))
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        return -constants[0] * (max(q - constants[1], 0.0) + min(q + constants[1], 0.0))
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from bayeshaptic.rig import (
     run_wall,
     simulate,
 )
+from bayeshaptic.rig.dynamics.stepper import Stepper
 from bayeshaptic.rig.dynamics.structure import FRAME, Link, Structure
 
 PERIOD = 1e-3
@@ -441,3 +442,30 @@ def test_a_new_effect_is_one_small_class() -> None:
         )
     finally:
         del REGISTRY["test_brake"]
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        ("coulomb_friction",),
+        ("stribeck_friction", "reflex"),
+        ("dahl_friction", "backlash", "force_ripple"),
+        ("drag", "hardening_spring", "extra_delay"),
+    ],
+    ids=lambda effects: " ".join(effects),
+)
+def test_compiled_steps_are_the_plain_ones(effects: tuple[str, ...]) -> None:
+    bench = HELD
+    for effect in effects:
+        bench = bench.with_effect(effect)
+    rng = np.random.default_rng(2)
+    acting, hand = 4.0 * rng.normal(size=151), 0.1 * rng.normal(size=151)
+    plain, compiled = (Stepper(bench.plant(), PERIOD, plain=plain) for plain in (True, False))
+    found = []
+    for stepper in (plain, compiled):
+        stepper.start(np.zeros(stepper.plant.states))
+        halves = [(acting[:76], hand[:76]), (acting[75:], hand[75:])]
+        found.append(np.concatenate([stepper.run(*half) for half in halves]))
+    size = np.abs(found[0]).max(axis=0)
+    assert np.all(np.abs(found[1] - found[0]) <= 1e-11 * size)
+    assert np.all(size[: 2 * len(bench.plant().places)] > 0)

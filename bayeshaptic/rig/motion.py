@@ -102,13 +102,11 @@ def respond(
 def _step_through(stepper: Stepper, parts: list[Block], force: Array, hand: Array) -> Array:
     """States at every sample, shape (N, n), by time steps."""
     whole, _ = split_delay(stepper.plant.delay_s, stepper.period_s)
-    acting = [0.0] * (whole + 1) + force.tolist()
-    hands = hand.tolist()
-    states = np.empty((len(force), stepper.plant.states))
+    acting = np.concatenate([np.zeros(whole + 1), force])
+    states = []
     for block in parts:
         if block.first:
             stepper.retune(block.plant)
-        for k in range(block.first, block.stop):
-            states[k] = stepper.state
-            stepper.advance(acting[k], acting[k + 1], hands[k], hands[k + 1])
-    return states
+        own = slice(block.first, block.stop + 1)
+        states.append(stepper.run(acting[own], hand[own]))
+    return np.concatenate(states)

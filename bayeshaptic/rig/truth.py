@@ -23,7 +23,7 @@ from bayeshaptic.rig.dynamics.propagate import (
     split_delay,
     stretches,
 )
-from bayeshaptic.rig.dynamics.stepper import delay_lookup
+from bayeshaptic.rig.dynamics.step_tables import delay_lookup
 from bayeshaptic.rig.setup import Setup
 
 # Moments of the recording at which a mechanism that changes is looked at.

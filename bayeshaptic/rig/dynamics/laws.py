@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 from typing import ClassVar
 
 
@@ -13,18 +14,24 @@ class Law:
     Attributes
     ----------
     dry : bool
-        True for friction that sticks: the time stepper then asks for `bound` instead of `force`.
+        True for friction that sticks: the time stepper finds its force.
     """
 
     dry: ClassVar[bool] = False
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """The fields, in their order."""
+        return astuple(self)  # type: ignore[call-overload]
 
 
 @dataclass(frozen=True)
 class SmoothLaw(Law):
     """A force that is a continuous function of the motion."""
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        """The force at the end of a step.
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        """The force at the end of a step; compiled, so that it takes numbers and no object.
 
         Parameters
         ----------
@@ -34,6 +41,8 @@ class SmoothLaw(Law):
             The force at its beginning.
         dq : float
             How far q moved in it.
+        constants : sequence of float
+            As `constants`.
         """
         raise NotImplementedError
 
@@ -45,8 +54,9 @@ class PowerSpring(SmoothLaw):
     coefficient: float
     power: int = 3
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        return -self.coefficient * q**self.power
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        return -constants[0] * q ** int(constants[1])
 
 
 @dataclass(frozen=True)
@@ -61,10 +71,11 @@ class Gap(SmoothLaw):
     gap: float
     free_damping: float = 0.0
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        inside = min(max(q, -self.gap), self.gap)
-        lost = self.free_damping * v if inside == q else 0.0
-        return self.stiffness * inside + lost
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        inside = min(max(q, -constants[1]), constants[1])
+        lost = constants[2] * v if inside == q else 0.0
+        return constants[0] * inside + lost
 
 
 @dataclass(frozen=True)
@@ -75,8 +86,9 @@ class Ripple(SmoothLaw):
     pitch: float
     phase: float = 0.0
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        return self.amplitude * math.sin(2 * math.pi * q / self.pitch + self.phase)
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        return constants[0] * math.sin(2 * math.pi * q / constants[1] + constants[2])
 
 
 @dataclass(frozen=True)
@@ -85,8 +97,9 @@ class Drag(SmoothLaw):
 
     coefficient: float
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        return -self.coefficient * v * abs(v)
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        return -constants[0] * v * abs(v)
 
 
 @dataclass(frozen=True)
@@ -99,9 +112,10 @@ class Dahl(SmoothLaw):
     level: float
     sigma: float
 
-    def force(self, q: float, v: float, before: float, dq: float) -> float:
-        end = -math.copysign(self.level, dq)
-        return end + (before - end) * math.exp(-self.sigma * abs(dq) / self.level)
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        end = -math.copysign(constants[0], dq)
+        return end + (before - end) * math.exp(-constants[1] * abs(dq) / constants[0])
 
 
 @dataclass(frozen=True)
@@ -117,14 +131,14 @@ class DryFriction(Law):
     stribeck_velocity: float = math.inf
     dry: ClassVar[bool] = True
 
-    @property
-    def constant(self) -> bool:
-        """Whether the sliding force is the same at every velocity."""
-        return self.static == self.level
-
     def bound(self, v: float) -> float:
         """Size of the sliding force at the velocity v."""
-        if self.static == self.level:
-            return self.level
-        dip = math.exp(-((v / self.stribeck_velocity) ** 2))
-        return self.level + (self.static - self.level) * dip
+        return sliding(v, self.constants)
+
+
+def sliding(v: float, constants: Sequence[float]) -> float:
+    """Size of the sliding force of `DryFriction` at the velocity v."""
+    level, static, slow = constants
+    if static == level:
+        return level
+    return level + (static - level) * math.exp(-((v / slow) ** 2))
