@@ -545,3 +545,17 @@ def test_pickles_are_not_opened(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", t=np.array([print], dtype=object))
     with pytest.raises(InputError, match="no vectors of numbers"):
         read_recording(tmp_path / "a.npz", MAPPING)
+
+
+def test_a_part_of_a_recording(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_csv(path)
+    part = read_recording(path, MAPPING, rows=(11, 20))
+    np.testing.assert_allclose(part.force, FORCE[10:20])
+    for seconds, expected in (((0.01, 0.0195), FORCE[10:20]), ((None, 4.9e-3), FORCE[:5])):
+        np.testing.assert_allclose(read_recording(path, MAPPING, seconds=seconds).force, expected)
+    columns = "force=u,position=q"
+    part = read_recording(path, columns, period_s=2e-3, seconds=(0.019, None))
+    np.testing.assert_allclose(part.force, FORCE[10:])
+    with pytest.raises(InputError, match="nothing is left of its 50 rows"):
+        read_recording(path, MAPPING, rows=(60, 70))

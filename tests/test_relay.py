@@ -142,3 +142,14 @@ def test_commands(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert "oscillates at 101.6" in out and "settled on another crossing: vibration mode" in out
     assert cli.main(["simulate", "lhifam", "--hysteresis", "1e-4", "-o", str(path)]) == 2
     assert "--excitation relay" in capfd.readouterr().err
+
+
+def test_what_is_no_relay_recording_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    position = np.cumsum(rng.normal(size=20_000))
+    noise = Recording(rng.normal(size=20_000), position, 1e-3)
+    with pytest.raises(InputError, match="% of the force is at the levels"):
+        measure_relay(noise)
+    switching = Recording(np.sign(noise.force), position - position.mean(), 1e-3)
+    with pytest.raises(InputError, match="does not switch with the position's sign"):
+        measure_relay(switching)

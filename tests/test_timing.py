@@ -58,7 +58,9 @@ def replaced(index: int, value: float) -> np.ndarray:
 
 WRONG = {
     "about 1 samples are missing after row 7 .*1 such places": drop(EVEN, 7),
-    "about 3 samples are missing after row 100 .*is rows 101 to 4997": drop(EVEN, 100, 101, 102),
+    "about 3 samples are missing after row 100 .*to 4997: read it alone with --rows 101:4997": drop(
+        EVEN, 100, 101, 102
+    ),
     "time does not advance from row 10 to row 11 .*1 such places": replaced(10, EVEN[9]),
     "time does not advance from row 5 to row 6": replaced(5, 0.001),
     "the time in row 4 is nan": replaced(3, np.nan),

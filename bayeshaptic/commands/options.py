@@ -55,6 +55,17 @@ def band(text: str) -> tuple[float, float]:
     return low, high
 
 
+def span(text: str) -> tuple[float | None, float | None]:
+    """``A:B`` with 0 <= A < B, either of which may be left out."""
+    parts = text.split(":")
+    if len(parts) != 2 or not any(parts):
+        raise argparse.ArgumentTypeError(f"{text!r} must be A:B, for example 2:30, 2: or :30")
+    low, high = (_number(part) if part else None for part in parts)
+    if (low or 0.0) < 0.0 or (high is not None and high <= (low or 0.0)):
+        raise argparse.ArgumentTypeError(f"{text!r} must have 0 <= A < B")
+    return low, high
+
+
 def add_analysis_options(parser: argparse.ArgumentParser) -> None:
     """The options that say how recordings are read and analysed."""
     reading = parser.add_argument_group("how the recording is read")
@@ -76,6 +87,19 @@ def add_analysis_options(parser: argparse.ArgumentParser) -> None:
         type=positive,
         metavar="Q",
         help="one encoder count, in m or rad (default: from the device, or from the data)",
+    )
+    part = reading.add_mutually_exclusive_group()
+    part.add_argument(
+        "--rows",
+        type=span,
+        metavar="A:B",
+        help="read rows A to B only, counted from 1; either may be left out",
+    )
+    part.add_argument(
+        "--seconds",
+        type=span,
+        metavar="A:B",
+        help="read from A to B seconds after the first row only; either may be left out",
     )
     reading.add_argument(
         "--allow-outside",
@@ -162,6 +186,8 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         seed=arguments.seed,
         close_loop=not arguments.no_loop,
         allow_outside=arguments.allow_outside,
+        rows=arguments.rows,
+        seconds=arguments.seconds,
     )
 
 

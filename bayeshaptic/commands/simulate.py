@@ -62,10 +62,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--excitation",
-        choices=("noise", "multisine", "relay"),
+        choices=("noise", "multisine", "chirp", "prbs", "step", "relay"),
         default="noise",
-        help="white noise in the band, a multisine with lines 1 Hz apart, or a relay experiment, "
-        "force = -F sign(position) (default: noise)",
+        help="white noise in the band, a multisine with lines 1 Hz apart, a chirp through the "
+        "band, a pseudo-random binary sequence, steps twice a second, or a relay experiment, force "
+        "= -F sign(position) (default: noise)",
     )
     parser.add_argument(
         "--hysteresis",
@@ -103,6 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="the same seed gives the same recording (default: 0)",
     )
+    parser.add_argument("--force", action="store_true", help="overwrite FILE where it exists")
     add_quiet(parser)
 
 
@@ -111,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.rig.recording import write_recording
 
-    refuse_place(arguments.output)
+    refuse_place(arguments.output, arguments.force)
     bench = bench_from(arguments)
     recording = record(arguments, bench)
     path = write_recording(arguments.output, recording)
@@ -162,14 +164,20 @@ def bench_from(arguments: argparse.Namespace) -> Bench:
 
 
 def excitation_from(arguments: argparse.Namespace, bench: Bench) -> Excitation:
-    """White noise, or a multisine of the same level and band."""
-    from bayeshaptic.rig.excitation import Multisine, WhiteNoise
+    """The excitation, of the bench's level and band."""
+    from bayeshaptic.rig.excitation import BinaryNoise, Chirp, Multisine, Steps, WhiteNoise
 
-    low, high = bench.band_hz
+    (low, high), rms, seconds = bench.band_hz, bench.force_rms, arguments.seconds
     if arguments.excitation == "noise":
-        return WhiteNoise(bench.force_rms, high, low, arguments.seconds)
-    periods = max(round(arguments.seconds), 1)
-    return Multisine(bench.force_rms, low, high, spacing_hz=1.0, periods=periods)
+        return WhiteNoise(rms, high, low, seconds)
+    if arguments.excitation == "chirp":
+        return Chirp(rms, low, high, seconds)
+    if arguments.excitation == "prbs":
+        return BinaryNoise(rms, high, seconds)
+    if arguments.excitation == "step":
+        return Steps(rms, seconds=seconds)
+    periods = max(round(seconds), 1)
+    return Multisine(rms, low, high, spacing_hz=1.0, periods=periods)
 
 
 def parse_effect(text: str) -> tuple[str, dict[str, float]]:
@@ -193,15 +201,18 @@ def parse_effect(text: str) -> tuple[str, dict[str, float]]:
     return name.strip(), fields
 
 
-def refuse_place(path: Path) -> None:
+def refuse_place(path: Path, force: bool) -> None:
     """Say before any work that a file cannot be written there.
 
     Raises
     ------
     InputError
-        Where `path` is a folder, or its folder does not exist.
+        Where `path` is a folder, its folder does not exist, or there is such a file and not
+        `force`.
     """
     if path.is_dir():
         raise InputError(f"{path} is a folder; name a file, such as {path / 'recording.csv.gz'}")
     if not path.absolute().parent.is_dir():
         raise InputError(f"{path.parent}: no such folder; make it first")
+    if path.exists() and not force:
+        raise InputError(f"{path} exists; name another file, or overwrite it with --force")

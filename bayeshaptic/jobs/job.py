@@ -29,6 +29,8 @@ class Settings:
         Whether to look for what the model lacks.
     allow_outside : bool
         Whether a study may read files outside its folder.
+    rows, seconds : (float or None, float or None), or None
+        The part of a recording that is read.
     """
 
     columns: str | None = None
@@ -42,6 +44,8 @@ class Settings:
     seed: int = 0
     close_loop: bool = True
     allow_outside: bool = False
+    rows: tuple[float | None, float | None] | None = None
+    seconds: tuple[float | None, float | None] | None = None
 
 
 @dataclass(frozen=True)

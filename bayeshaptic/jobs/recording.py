@@ -35,6 +35,8 @@ def report_recording(job: Job, progress: Progress | None) -> Reported:
         encoder_resolution=resolution,
         kind=device.kind if device else None,
         default_period_s=device.period_s if device else None,
+        rows=settings.rows,
+        seconds=settings.seconds,
     )
     if device is not None and isinstance(measurement, Recording):
         measurement = replace(measurement, device=device.name)

@@ -139,6 +139,12 @@ def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:
 def _read(job: Job) -> Study:
 
     refuse_file(job.folder)
+    for option in ("rows", "seconds"):
+        if getattr(job.settings, option) is not None:
+            raise InputError(
+                f"--{option} is for a single recording; for a study write {option} = [A, B] in "
+                f"{job.source}, beside the recording's file"
+            )
     for option in ("columns", "period_s", "encoder_resolution"):
         if getattr(job.settings, option) is not None:
             raise InputError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.units import base_unit, choose_units
 
 Columns = str | Mapping[str, str] | None
+Span = tuple[float | None, float | None]
 
 
 def read_recording(
@@ -34,6 +36,8 @@ def read_recording(
     encoder_resolution: float | None = None,
     name: str | None = None,
     kind: str | None = None,
+    rows: Span | None = None,
+    seconds: Span | None = None,
 ) -> Recording:
     """A recording from a file: CSV (also gzipped), MAT, HDF5 or NPZ.
 
@@ -53,6 +57,10 @@ def read_recording(
         The recording's name in reports; the file's by default.
     kind : {"translational", "rotational"} or None
         Decides for N and m or Nm and rad where no units are written.
+    rows : (first, last) or None
+        The part to read, in rows counted from 1, both included; None is the file's own end.
+    seconds : (from, to) or None
+        The part to read, in seconds since the first row.
 
     Returns
     -------
@@ -71,7 +79,8 @@ def read_recording(
             f"{path}: a table of a frequency response, not a recording; use read_frf or "
             "read_measurement"
         )
-    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind)
+    cut = _Cut(rows, seconds)
+    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
 
 
 def read_measurement(
@@ -82,12 +91,14 @@ def read_measurement(
     name: str | None = None,
     kind: str | None = None,
     default_period_s: float | None = None,
+    rows: Span | None = None,
+    seconds: Span | None = None,
 ) -> Recording | Etfe:
     """A recording, or a frequency response where the file's columns are those of one.
 
     Parameters
     ----------
-    path, columns, period_s, encoder_resolution, name, kind
+    path, columns, period_s, encoder_resolution, name, kind, rows, seconds
         See `read_recording`. A frequency response needs a period (see `read_frf`).
     default_period_s : float or None
         The period where the file has no time stamps, as a device file gives it; stamps come before
@@ -106,10 +117,13 @@ def read_measurement(
     mapping = parse_columns(columns)
     arrays = read_arrays(path)
     if is_frequency_response(arrays, mapping):
+        if rows is not None or seconds is not None:
+            raise InputError(f"{path}: a table of a frequency response has no rows to cut")
         return frf_from_arrays(path, arrays, mapping, period_s or default_period_s, kind=kind)
     if period_s is None and pick(arrays, "time", mapping, path, required=False) is None:
         period_s = default_period_s
-    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind)
+    cut = _Cut(rows, seconds)
+    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
 
 
 def recording_from_arrays(
@@ -189,6 +203,37 @@ def recording_from_arrays(
     )
 
 
+@dataclass(frozen=True)
+class _Cut:
+    """The part of a file that is read; see `read_recording`."""
+
+    rows: Span | None
+    seconds: Span | None
+
+    def apply(
+        self, signals: dict[str, NDArray[np.float64]], period_s: float | None, path: Path
+    ) -> dict[str, NDArray[np.float64]]:
+        """The signals' part, each of them if they differ in length."""
+        start, stop = 0, len(signals["force"])
+        if self.rows is not None:
+            first, last = self.rows
+            start, stop = int(first or 1) - 1, stop if last is None else int(last)
+        if self.seconds is not None:
+            low, high = self.seconds
+            time = signals.get("time")
+            clock = np.arange(stop) * (period_s or np.nan) if time is None else time - time[0]
+            inside = (clock >= (low or 0.0)) & (clock <= (np.inf if high is None else high))
+            found = np.flatnonzero(inside)
+            start, stop = (int(found[0]), int(found[-1]) + 1) if len(found) else (0, 0)
+        if self.rows is None and self.seconds is None:
+            return signals
+        cut = {role: values[start:stop] for role, values in signals.items()}
+        if any(len(values) == 0 for values in cut.values()):
+            count = len(signals["force"])
+            raise InputError(f"{path}: nothing is left of its {count} rows by --rows or --seconds")
+        return cut
+
+
 def _recording(
     path: Path,
     arrays: Arrays,
@@ -197,6 +242,7 @@ def _recording(
     encoder_resolution: float | None,
     name: str | None,
     kind: str | None,
+    cut: _Cut,
 ) -> Recording:
     signals: dict[str, NDArray[np.float64]] = {}
     units: dict[str, str | None] = {}
@@ -207,6 +253,7 @@ def _recording(
         values, unit = found
         units[role], factor = (None, 1.0) if unit is None else base_unit(role, unit)
         signals[role] = values * factor if factor != 1.0 else values
+    signals = cut.apply(signals, period_s, path)
     return recording_from_arrays(
         signals["force"],
         signals["position"],

@@ -12,12 +12,12 @@ from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import parse_columns
 from bayeshaptic.recordings.known_limits import Reference, read_references
-from bayeshaptic.recordings.read import Columns, read_measurement
+from bayeshaptic.recordings.read import Columns, Span, read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 
 STUDY_KEYS = ("device", "prior", "recording", "reference")
-ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns")
+ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns", "rows", "seconds")
 PRIOR_KEYS = ("median", "log_sd", "scale", "floor", "mean", "sd", "low", "high", "log")
 
 
@@ -37,6 +37,8 @@ class StudyEntry:
         Excitation level.
     columns : str, mapping or None
         This file's own mapping; None means the device's.
+    rows, seconds : (float, float) or None
+        The part to read; see `read_recording`.
     """
 
     path: Path
@@ -45,6 +47,8 @@ class StudyEntry:
     trial: int | str | None = None
     level: float | None = None
     columns: Columns = None
+    rows: Span | None = None
+    seconds: Span | None = None
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,8 @@ class Study:
             encoder_resolution=self.device.encoder_resolution,
             kind=self.device.kind,
             default_period_s=self.device.period_s,
+            rows=entry.rows,
+            seconds=entry.seconds,
         )
         if not isinstance(measurement, Recording):
             return measurement
@@ -124,8 +130,8 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
     median = 0.2, log_sd = 0.3 }``, ``b1 = { scale = 5 }`` (half-normal; with `floor` near zero),
     ``kc = { mean = 6e4, sd = 1e3 }``, ``m2 = { low = 1, high = 9 }`` (uniform; with ``log = true``
     in the logarithm). Each ``[[recording]]`` table has a `file`, relative to the study, and where
-    they apply `user`, `configuration` (a number or a name), `trial`, `level`, and `columns` of its
-    own. Recordings are
+    they apply `user`, `configuration` (a number or a name), `trial`, `level`, `rows` or
+    `seconds` (the part to read) and `columns` of its own. Recordings are
     looked for but not read; `Study.read` does that. Optional ``[[reference]]`` tables hold limits
     known from elsewhere: `label`, `held`, and `critical_stiffness` or `critical_stiffness_db`.
 
@@ -235,7 +241,22 @@ def _entry(content: object, where: str, folder: Path, home: Path | None) -> Stud
         trial=_trial(table),
         level=table.number("level"),
         columns=_columns(table.content.get("columns"), where),
+        rows=_span(table, "rows"),
+        seconds=_span(table, "seconds"),
     )
+
+
+def _span(table: Table, key: str) -> Span | None:
+    value = table.content.get(key)
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 2:
+        raise table.wrong(key, "two numbers, [from, to]")
+    ends = Table({"from": value[0], "to": value[1]}, f"{table.where}, {key}")
+    low, high = ends.number("from", 0), ends.number("to", 0, above=True)
+    if low is None or high is None or high <= low:
+        raise table.wrong(key, "two numbers, [from, to] with from < to")
+    return low, high
 
 
 def _label(table: Table, key: str) -> str | None:

@@ -1,4 +1,4 @@
-"""What is commanded: band-limited white noise, multisines."""
+"""What is commanded: band-limited white noise, multisines, chirps, binary noise, steps."""
 
 from __future__ import annotations
 
@@ -121,6 +121,93 @@ class Multisine:
         period = np.fft.irfft(spectrum, samples)
         period *= self.rms / np.sqrt(np.mean(period**2))
         return period[np.arange(-lead, self.samples(period_s)) % samples]
+
+
+@dataclass(frozen=True)
+class Chirp:
+    """A sine whose frequency grows by the same factor every second, up to the end of the record.
+
+    Attributes
+    ----------
+    rms : float
+    low_hz, high_hz : float
+    seconds : float
+    """
+
+    rms: float
+    low_hz: float
+    high_hz: float
+    seconds: float = 30.0
+
+    def samples(self, period_s: float) -> int:
+        return _sample_count(self.seconds, period_s)
+
+    def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
+        low = max(self.low_hz, 1.0 / self.seconds)
+        if not low < self.high_hz <= 0.5 / period_s:
+            raise InputError(
+                f"a chirp from {low:g} to {self.high_hz:g} Hz has to rise, and end below the "
+                f"Nyquist frequency of {0.5 / period_s:g} Hz; choose another band"
+            )
+        rate = np.log(self.high_hz / low) / self.seconds
+        time = np.arange(self.samples(period_s)) * period_s
+        sine = np.sin(2 * np.pi * low / rate * np.expm1(rate * time))
+        return np.concatenate([np.zeros(lead), np.sqrt(2) * self.rms * sine])
+
+
+@dataclass(frozen=True)
+class BinaryNoise:
+    """A pseudo-random binary sequence (of maximal length) between -rms and rms.
+
+    Attributes
+    ----------
+    rms : float
+    upper_hz : float
+        Half of the power lies below it: the level may change 2.5 times as often.
+    seconds : float
+    """
+
+    rms: float
+    upper_hz: float
+    seconds: float = 30.0
+
+    def samples(self, period_s: float) -> int:
+        return _sample_count(self.seconds, period_s)
+
+    def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
+        from scipy.signal import max_len_seq
+
+        total = lead + self.samples(period_s)
+        hold = max(1, round(1 / (2.5 * self.upper_hz * period_s)))
+        bits = int(np.ceil(np.log2(total / hold + 2)))
+        state = rng.integers(2, size=max(bits, 2))
+        state[0] = 1  # all zeros would stay
+        sequence = max_len_seq(max(bits, 2), state=state, length=-(-total // hold))[0]
+        return self.rms * (2.0 * np.repeat(sequence, hold)[:total] - 1)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps between rms and -rms.
+
+    Attributes
+    ----------
+    rms : float
+    hold_s : float
+        Between two steps.
+    seconds : float
+    """
+
+    rms: float
+    hold_s: float = 0.5
+    seconds: float = 30.0
+
+    def samples(self, period_s: float) -> int:
+        return _sample_count(self.seconds, period_s)
+
+    def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
+        step = np.floor(np.arange(self.samples(period_s)) * period_s / self.hold_s + 1e-9)
+        return np.concatenate([np.zeros(lead), self.rms * np.where(step % 2 == 0, 1.0, -1.0)])
 
 
 @dataclass(frozen=True)

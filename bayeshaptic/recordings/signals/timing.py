@@ -149,5 +149,6 @@ def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None
             f"{where}: about {round(steps[first] / period) - 1} samples are missing after row "
             f"{first + 1} (a step of {steps[first]:.6g} s where the period is {period:.6g} s; "
             f"{len(gaps)} such places); the longest part without a gap is rows "
-            f"{edges[longest] + 1} to {edges[longest + 1]}"
+            f"{edges[longest] + 1} to {edges[longest + 1]}: read it alone with --rows "
+            f"{edges[longest] + 1}:{edges[longest + 1]}"
         )

@@ -1,0 +1,151 @@
+"""``bayeshaptic inspect``: what is in a file, and how to read it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic.errors import InputError
+
+if TYPE_CHECKING:
+    from bayeshaptic.recordings.overview import Overview
+
+NAME = "inspect"
+SUMMARY = "what is in a file, and a --columns line to read it with"
+DESCRIPTION = """\
+List the columns of a file: how many samples, their range, resolution (an encoder's count) and rate,
+what each may be, and what it looks like over time. The line for --columns is a guess by names and
+by what the numbers do; look at it before you use it."""
+EXAMPLES = """\
+  bayeshaptic inspect bench.mat
+  bayeshaptic inspect bench.mat --png bench.png --write study.toml"""
+
+_MOST_COLUMNS = 40
+_WIDTH = 32
+_BARS = "▁▂▃▄▅▆▇█"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The file, and what to write."""
+    parser.add_argument("recording", type=Path, metavar="FILE", help="a recording of any format")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="draw the columns over time")
+    parser.add_argument(
+        "--write", type=Path, metavar="STUDY", help="write a study (.toml) with this file, to edit"
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite what exists")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the columns; 0."""
+    from bayeshaptic.recordings.overview import overview
+
+    for path in (arguments.png, arguments.write):
+        if path is not None and path.exists() and not arguments.force:
+            raise InputError(f"{path} exists; name another file, or overwrite it with --force")
+    found = overview(arguments.recording)
+    for line in lines(found):
+        print(line)
+    if arguments.png is not None:
+        draw(found, arguments.png)
+        print(f"picture: {arguments.png}")
+    if arguments.write is not None:
+        arguments.write.write_text(study_text(found, arguments.write), encoding="utf-8")
+        print(f"study: {arguments.write}")
+    return 0
+
+
+def lines(found: Overview) -> list[str]:
+    """The table, the doubts, and the suggested line."""
+    from bayeshaptic.recordings.overview import doubts
+
+    roles = {name: role for role, name in found.roles.items()}
+    shown = found.columns[:_MOST_COLUMNS]
+    width = max((len(_safe(one.name)) for one in shown), default=4)
+    table = [f"{'name':{width}}  samples         low to high       resolution"]
+    for one in shown:
+        step = f"{one.resolution:.4g}" if one.resolution else "-"
+        rate = f"  every {one.period:.6g}" if one.period else ""
+        picture = "" if one.period else f"  {_sparkline(found.arrays[one.name])}"
+        role = f"  {roles[one.name]}?" if one.name in roles else ""
+        table.append(
+            f"{_safe(one.name):{width}}  {one.samples:7d}  {one.low:10.4g} to {one.high:<10.4g}  "
+            f"{step:>10}{rate}{picture}{role}"
+        )
+    if len(found.columns) > len(shown):
+        table.append(f"and {len(found.columns) - len(shown)} more")
+    by_name = {one.name: one for one in found.columns}
+    for role, name in found.roles.items():
+        if doubt := doubts(by_name[name], role):
+            table.append(f"{role}: {_safe(name)}: {doubt}")
+    if found.mapping is None:
+        table.append("no force and position were recognised; name them with --columns")
+    else:
+        table.append(f'--columns "{_safe(found.mapping)}"')
+    return table
+
+
+def study_text(found: Overview, path: Path) -> str:
+    """A study with this one recording."""
+    columns = found.mapping or "time=...,force=...,position=..."
+    file = os.path.relpath(found.path.resolve(), path.resolve().parent).replace(os.sep, "/")
+    return f"""\
+# A study: one device and all its recordings. See docs/file-formats.md.
+[device]
+name = "my device"
+kind = "translational"          # or "rotational"
+# delay_s = 200e-6              # loop delay beyond the hold
+# encoder_resolution = 3.14e-6  # one count, in m or rad
+# A guess: check the names, and write factors and units, as in position=enc*3.14e-6[m].
+columns = {json.dumps(columns)}
+
+[[recording]]
+file = {json.dumps(file)}
+# user = "Anna"                 # nobody holds the device where there is no user
+"""
+
+
+def draw(found: Overview, path: Path) -> None:
+    """The columns one above the other, as a PNG."""
+    from bayeshaptic.report.figures.style import new_figure, panel
+
+    numbers = [one for one in found.columns if one.samples > 2 and one.roughness > 0]
+    named = [one for one in numbers if one.name in found.roles.values()]
+    others = [one for one in numbers if one.name not in found.roles.values()]
+    shown = [*named, *others][:12]
+    if not shown:
+        raise InputError(f"{found.path}: no column of numbers to draw")
+    figure = new_figure(1.2 * len(shown) + 0.4)
+    clock, unit = _clock(found)
+    for number, one in enumerate(shown, start=1):
+        axes = figure.add_subplot(len(shown), 1, number)
+        values = found.arrays[one.name]
+        over = clock if clock is not None and len(clock) == len(values) else range(len(values))
+        panel(axes, unit if number == len(shown) else "", title=_safe(one.name).replace("$", "S"))
+        axes.plot(over, values, linewidth=0.5)
+    figure.savefig(path, format="png")
+
+
+def _clock(found: Overview) -> tuple[Any, str]:
+    name = found.roles.get("time")
+    return (None, "row") if name is None else (found.arrays[name], _safe(name))
+
+
+def _sparkline(values: Any) -> str:
+    """The column over time in one line of text, each place a sample from there."""
+    import numpy as np
+
+    if values.dtype.kind not in "iufb" or not np.isfinite(values).any():
+        return "text" if values.dtype.kind not in "iufb" else ""
+    at = np.linspace(0, len(values) - 1, min(_WIDTH, len(values))).astype(int)
+    some = np.nan_to_num(np.asarray(values, dtype=float)[at])
+    low, high = some.min(), some.max()
+    level = (some - low) / (high - low or 1.0)
+    return "".join(_BARS[int(round(7 * share))] for share in level)
+
+
+def _safe(name: str) -> str:
+    """A name from a file without the signs that would steer a terminal."""
+    return "".join(sign if sign.isprintable() else "?" for sign in name)

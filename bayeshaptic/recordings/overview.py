@@ -1,0 +1,182 @@
+"""What is in a file: each column's range, resolution and rate, and what it may be.
+
+The guesses are for a person to look at: by the name first, then by what the numbers do. Time
+advances evenly; a position answers to a force, so it is the smoother of the two.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.recordings.columns import DEFAULT_HEADERS, name_and_unit
+from bayeshaptic.recordings.readers import Arrays, read_arrays
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+
+# Words that names of such signals have, in the order in which they are believed.
+_WORDS = {
+    "time": r"^t$|time|zeit|stamp|^sec|\bt_?\(?m?s",
+    "force": r"force|torque|kraft|moment|current|strom|^u$|tau|^f$|^i$|iq|cmd|command|volt|^vir",
+    "position": r"pos|angle|winkel|weg|theta|^q|^y$|^x$|enc|phi|displ",
+}
+# Behind these a signal is not what was commanded, or not a position.
+_OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$"
+_EVEN = 0.25  # of the period: time stamps that vary by more are none
+_MOST_ROWS = 500_000  # that are looked at
+
+
+@dataclass(frozen=True)
+class ColumnFacts:
+    """What one column of a file looks like.
+
+    Attributes
+    ----------
+    name : str
+    samples : int
+    low, high : float
+        Range; NaN where it holds text.
+    resolution : float or None
+        Common divisor of its increments: an encoder count, or the rounding of the file.
+    period : float or None
+        Median step, where the column advances evenly as time does.
+    roughness : float
+        Root mean square of its steps over its standard deviation: 1.4 is white noise.
+    unit : str or None
+        From the header.
+    """
+
+    name: str
+    samples: int
+    low: float
+    high: float
+    resolution: float | None
+    period: float | None
+    roughness: float
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class Overview:
+    """The columns of a file, longest first, and which may be time, force and position."""
+
+    path: Path
+    columns: tuple[ColumnFacts, ...]
+    roles: Mapping[str, str]
+    arrays: Arrays
+
+    @property
+    def mapping(self) -> str | None:
+        """What to give to ``--columns``; None where no force or no position was found."""
+        if not {"force", "position"} <= set(self.roles):
+            return None
+        facts = {column.name: column for column in self.columns}
+        return ",".join(
+            f"{role}={name}{_scale(role, facts[name])}" for role, name in sorted(self.roles.items())
+        )
+
+
+def overview(path: Path) -> Overview:
+    """Look at a file.
+
+    Raises
+    ------
+    InputError
+        See `read_arrays`.
+    """
+    arrays = read_arrays(path)
+    seen: dict[int, str] = {}
+    for name, values in arrays.items():
+        if len(values) > 1:
+            seen.setdefault(id(values), name)
+    facts = [_facts(name, arrays[name]) for name in seen.values()]
+    facts.sort(key=lambda one: -one.samples)
+    return Overview(path, tuple(facts), _roles(facts), arrays)
+
+
+def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
+    unit = name_and_unit(name)[1]
+    if values.dtype.kind not in "iufb":
+        return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
+    signal = np.asarray(values[:_MOST_ROWS], dtype=float)
+    signal = signal[np.isfinite(signal)]
+    if len(signal) < 3:
+        return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
+    steps = np.diff(signal)
+    step = float(np.median(steps))
+    is_time = step > 0 and np.mean(np.abs(steps - step) < _EVEN * step) > 0.99
+    spread = float(np.std(signal))
+    return ColumnFacts(
+        name,
+        len(values),
+        float(signal.min()),
+        float(signal.max()),
+        increment_unit(signal) if spread > 0 else None,
+        step if is_time else None,
+        float(np.sqrt(np.mean(steps**2))) / spread if spread > 0 else np.nan,
+        unit,
+    )
+
+
+def _roles(facts: list[ColumnFacts]) -> dict[str, str]:
+    """Time by its even steps; force and position among the signals of the same length."""
+    roles: dict[str, str] = {}
+    clocks = [one for one in facts if one.period is not None]
+    if clocks:
+        roles["time"] = min(clocks, key=lambda one: not _called(one, "time")).name
+    length = next((one.samples for one in facts if one.name == roles.get("time")), None)
+    signals = [
+        one
+        for one in facts
+        if one.period is None
+        and one.roughness > 0
+        and (length is None or one.samples == length)
+        and not re.search(_OTHERS, one.name, re.I)
+    ]
+    for role, sign in (("force", -1), ("position", 1)):
+        free = [one for one in signals if one.name not in roles.values()]
+        other = "position" if role == "force" else "force"
+        # By the name: of several the roughest, which is nearest to where the force acts. Without
+        # one the roughest is the force, and the smoothest the position.
+        if named := [one for one in free if _called(one, role)]:
+            roles[role] = max(named, key=lambda one: one.roughness).name
+        elif unnamed := [one for one in free if not _called(one, other)]:
+            roles[role] = min(unnamed, key=lambda one: sign * one.roughness).name
+    return roles
+
+
+def _called(column: ColumnFacts, role: str) -> bool:
+    last = re.split(r"[/.]", name_and_unit(column.name)[0])[-1]
+    return re.search(_WORDS[role], last, re.I) is not None
+
+
+def _scale(role: str, column: ColumnFacts) -> str:
+    """The unit to write after a name, where the header has none and the numbers speak for one."""
+    if column.unit is not None or role == "force":
+        return ""
+    if role == "time" and column.period is not None:
+        # Loops run at 100 Hz to 20 kHz.
+        for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
+            if 4e-5 <= column.period * factor <= 1.1e-2:
+                return "" if unit == "s" else f"[{unit}]"
+    return ""
+
+
+def doubts(column: ColumnFacts, role: str) -> str:
+    """What a person should settle about a column that plays a role; empty where nothing."""
+    if column.unit is not None or role == "time" or column.name in DEFAULT_HEADERS[role]:
+        return ""
+    whole = column.resolution is not None and column.resolution >= 1
+    if role == "position" and whole:
+        return "whole numbers: encoder counts? multiply by the size of one, as in *3.1e-6[m]"
+    if role == "position" and max(abs(column.low), abs(column.high)) > 10:
+        return "large for metres or radians: write the unit, as in [mm] or [deg]"
+    if role == "force" and whole:
+        return "whole numbers: converter counts? multiply by the force of one, as in *0.01[N]"
+    units = "[N], [Nm] or [A]" if role == "force" else "[m], [mm], [rad] or [deg]"
+    return f"unit not known: write it after the name, {units}"

@@ -1,0 +1,68 @@
+"""``bayeshaptic inspect`` recognises columns, and what it suggests can be used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayeshaptic import cli
+from bayeshaptic.recordings import read_recording, read_study
+from bayeshaptic.recordings.overview import overview
+
+N = 2000
+RNG = np.random.default_rng(0)
+FORCE = RNG.normal(size=N)
+POSITION = np.round(np.cumsum(np.cumsum(FORCE - FORCE.mean()))) * 3e-6
+
+
+def write(path: Path, header: str) -> Path:
+    columns = (np.arange(N), FORCE, POSITION, np.gradient(POSITION))
+    np.savetxt(path, np.column_stack(columns), header=header, comments="", delimiter=",")
+    return path
+
+
+@pytest.mark.parametrize("header", ["t,F_cmd,enc,velocity", "a,b,c,speed"])
+def test_columns_are_recognised(tmp_path: Path, header: str) -> None:
+    path = write(tmp_path / "a.csv", header)
+    found = overview(path)
+    time, force, position, _ = header.split(",")
+    assert found.roles == {"time": time, "force": force, "position": position}
+    facts = {one.name: one for one in found.columns}
+    assert facts[time].period == 1
+    assert facts[position].resolution == pytest.approx(3e-6)
+    recording = read_recording(path, found.mapping)
+    assert recording.period_s == 1e-3  # a step of one is a millisecond: no loop runs at 1 Hz
+    np.testing.assert_allclose(recording.position, POSITION, rtol=1e-12)
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path / "a.csv", "t,u,y,v\x1b[31m")
+    study, picture = tmp_path / "study.toml", tmp_path / "a.png"
+    command = ["inspect", str(path), "--write", str(study), "--png", str(picture)]
+    assert cli.main(command) == 0
+    out = capsys.readouterr().out
+    assert '--columns "force=u,position=y,time=t[ms]"' in out
+    assert "\x1b" not in out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    text = study.read_text(encoding="utf-8").replace('"my device"', '"phantom"')
+    study.write_text(text.replace('"translational"', '"rotational"'), encoding="utf-8")
+    (recording,) = read_study(study).read_all()
+    assert recording.samples == N
+    assert cli.main(command) == 2
+    assert "--force" in capsys.readouterr().err
+
+
+def test_excitations_of_the_bench(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for kind in ("chirp", "prbs", "step"):
+        path = tmp_path / f"{kind}.npz"
+        command = ["simulate", "lhifam", "--seconds", "2", "--force-rms", "2.5"]
+        command += ["--excitation", kind, "-o", str(path)]
+        assert cli.main(command) == 0
+        force = read_recording(path).force
+        assert np.sqrt(np.mean(force**2)) == pytest.approx(2.5, rel=0.05)
+        assert (len(np.unique(force)) == 2) == (kind != "chirp")
+    assert cli.main(command) == 2
+    assert "exists; name another file, or overwrite it with --force" in capsys.readouterr().err
+    assert cli.main([*command, "--force"]) == 0
