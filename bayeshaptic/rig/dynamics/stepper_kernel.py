@@ -15,10 +15,12 @@ _CORRECTIONS = 2
 @kernel(exact=True)
 def run(tables, forces, memory, acting, hand, states):  # type: ignore[no-untyped-def]
     """Take periods and note the state at the beginning of each; see `Stepper.run`."""
-    z, n = memory.z, states.shape[1]
-    end, modes, applied = np.empty_like(z), np.empty_like(memory.mode), np.empty(len(memory.mode))
+    z, mode, n = memory.z, memory.mode, states.shape[1]
+    end, modes, applied = np.empty_like(z), np.zeros_like(mode), np.empty(len(mode))
     finest = tables.matrix.shape[1] - 1
     pending = np.empty(finest + 2, np.int64)
+    places, dry, constants = tables.place, tables.dry, tables.constants
+    smooth = not np.all(dry)
     for k in range(len(states)):
         states[k] = z[:n]
         z[n + 1] = hand[k]
@@ -27,75 +29,99 @@ def run(tables, forces, memory, acting, hand, states):  # type: ignore[no-untype
         for part in range(len(tables.steps)):
             z[n] = acting[k + 1] if tables.new[part] else acting[k]
             for _ in range(tables.steps[part]):
-                _set_delayed(tables, memory, n, piece, tables.step_s[part])
+                if len(tables.back):
+                    _set_delayed(tables, memory, n, piece, tables.step_s[part])
                 # A step, or its halves where friction reverses in it, and so on.
                 pending[0] = 0
                 left = 1
                 while left:
                     left -= 1
                     level = pending[left]
-                    if _take(tables, forces, memory, n, part, level, end, modes, applied):
+                    constant, ramp = tables.constant[part, level], tables.ramp[part, level]
+                    _predict(tables.matrix[part, level], z, end)
+                    if smooth:
+                        _bend(places, dry, constants, forces, ramp, n, z, end, applied)
+                    done = True
+                    for j in range(len(dry)):
+                        if dry[j] and done:
+                            grip = tables.grip[part, level, j]
+                            done = _rub(
+                                places[j],
+                                constants[j],
+                                constant[j],
+                                ramp[j],
+                                grip,
+                                level == finest,
+                                n + 3 + j,
+                                z,
+                                mode[j],
+                                end,
+                                modes[j:],
+                            )
+                    if done:
+                        for j in range(len(dry)):
+                            if dry[j] and modes[j]:
+                                v = _at(end, places[j], 2)
+                                end[n + 3 + j] = -modes[j] * _sliding(v, constants[j])
+                        if smooth:
+                            _settle(places, dry, constants, forces, n, z, end)
                         z[:] = end
-                        memory.mode[:] = modes
+                        mode[:] = modes
                     else:
                         pending[left : left + 2] = level + 1
                         left += 2
-                _remember(tables, memory)
+                if len(tables.back):
+                    _remember(tables, memory)
                 piece += 1
 
 
 @kernel(inline=True, exact=True)
-def _take(tables, forces, memory, n, part, level, end, modes, applied):  # type: ignore[no-untyped-def]
-    """Step to `end` with the new `modes`; False where the step must be halved."""
-    z, first, count = memory.z, n + 3, len(modes)
-    matrix, ramp = tables.matrix[part, level], tables.ramp[part, level]
+def _predict(matrix, z, end):  # type: ignore[no-untyped-def]
+    """The end of a step with the forces of its beginning."""
     for i in range(len(end)):
-        end[i] = 0.0
+        total = 0.0
         for j in range(len(z)):
-            end[i] += matrix[i, j] * z[j]
-    for j in range(count):
-        applied[j] = z[first + j]
-        modes[j] = 0
-    for _ in range(_CORRECTIONS):
-        for j in range(count):
-            if not tables.dry[j]:
-                force = _smooth(tables, forces, z, end, first, j)
-                for i in range(n):
-                    end[i] += ramp[j, i] * (force - applied[j])
-                applied[j] = force
-    for j in range(count):
-        if tables.dry[j] and not _rub(tables, memory, n, part, level, end, modes, j):
-            return False
-    for j in range(count):
-        if tables.dry[j] and modes[j]:
-            end[first + j] = -modes[j] * _sliding(_at(end, tables.place[j], 2), tables, j)
-    for j in range(count):
-        if not tables.dry[j]:
-            end[first + j] = _smooth(tables, forces, z, end, first, j)
-    return True
+            total += matrix[i, j] * z[j]
+        end[i] = total
 
 
 @kernel(inline=True, exact=True)
-def _rub(tables, memory, n, part, level, end, modes, j):  # type: ignore[no-untyped-def]
-    """Add dry friction to the end of a step; False where one begins, ends or turns in it."""
-    z, mode, place = memory.z, memory.mode[j], tables.place[j]
-    before, grip = z[n + 3 + j], tables.grip[part, level, j]
-    finest = level == tables.matrix.shape[1] - 1
+def _bend(places, dry, constants, forces, ramp, n, z, end, applied):  # type: ignore[no-untyped-def]
+    """Correct it by the smooth forces there."""
+    for j in range(len(dry)):
+        applied[j] = z[n + 3 + j]
+    for _ in range(_CORRECTIONS):
+        for j in range(len(dry)):
+            if not dry[j]:
+                force = _smooth(places[j], constants[j], forces[j], n + 3 + j, z, end)
+                for i in range(n):
+                    end[i] += ramp[j, i] * (force - applied[j])
+                applied[j] = force
+
+
+@kernel(inline=True, exact=True)
+def _rub(  # type: ignore[no-untyped-def]
+    place, constants, constant, ramp, grip, finest, slot, z, mode, end, modes
+):
+    """Add dry friction to the end of a step; False where it begins, ends or turns in it.
+
+    What it does from then on goes to the first of `modes`.
+    """
+    before, static, n = z[slot], constants[1], len(end)
     v = _at(end, place, 2)
     if mode and v * mode > 0:
-        bound, static = tables.constants[j, 0], tables.constants[j, 1]
-        if static != bound:
-            force = -mode * _sliding(v, tables, j)
+        if static != constants[0]:
+            force = -mode * _sliding(v, constants)
             for i in range(n):
-                end[i] += tables.ramp[part, level, j, i] * (force - before)
-        modes[j] = mode
+                end[i] += ramp[i] * (force - before)
+        modes[0] = mode
         return True
     if mode and not finest:
         return False
     # What the velocity would gain in the step without this friction decides if it can hold.
     start = _at(z, place, 2) if mode else 0.0
     gain = v - before * grip - start
-    sticks = abs(gain) <= tables.constants[j, 1] * grip
+    sticks = abs(gain) <= static * grip
     if not sticks and not finest:
         return False
     if sticks:
@@ -103,12 +129,15 @@ def _rub(tables, memory, n, part, level, end, modes, j):  # type: ignore[no-unty
     elif mode:
         force = before * (2 * start / (start - v) - 1)
     else:
-        force = -math.copysign(tables.constants[j, 1], gain)
+        force = -math.copysign(static, gain)
     for i in range(n):
-        end[i] += tables.constant[part, level, j, i] * (force - before)
-    end[n + 3 + j] = force
-    modes[j] = 0 if sticks else int(math.copysign(1.0, gain))
-    if sticks and place[3] < 0:
+        end[i] += constant[i] * (force - before)
+    if not sticks:
+        modes[0] = int(math.copysign(1.0, gain))
+        return True
+    modes[0] = 0
+    end[slot] = force
+    if place[3] < 0:
         # A mass that stuck stands still: nothing is left of what rounding and the step moved.
         end[place[2]] = 0.0
         if mode == 0:
@@ -117,21 +146,27 @@ def _rub(tables, memory, n, part, level, end, modes, j):  # type: ignore[no-unty
 
 
 @kernel(inline=True, exact=True)
-def _smooth(tables, forces, z, end, first, j):  # type: ignore[no-untyped-def]
-    """The force of a smooth law at the end of a step."""
-    place = tables.place[j]
-    q = _at(end, place, 0)
-    moved = q - _at(z, place, 0)
-    return forces[j](q, _at(end, place, 2), z[first + j], moved, tables.constants[j])
+def _settle(places, dry, constants, forces, n, z, end):  # type: ignore[no-untyped-def]
+    """The smooth forces that the next step begins with."""
+    for j in range(len(dry)):
+        if not dry[j]:
+            end[n + 3 + j] = _smooth(places[j], constants[j], forces[j], n + 3 + j, z, end)
 
 
 @kernel(inline=True, exact=True)
-def _sliding(v, tables, j):  # type: ignore[no-untyped-def]
+def _smooth(place, constants, force, slot, z, end):  # type: ignore[no-untyped-def]
+    """The force of a smooth law at the end of a step."""
+    q, v = _at(end, place, 0), _at(end, place, 2)
+    return force(q, v, z[slot], q - _at(z, place, 0), constants)
+
+
+@kernel(inline=True, exact=True)
+def _sliding(v, constants):  # type: ignore[no-untyped-def]
     """Size of the sliding force of dry friction."""
-    level, static = tables.constants[j, 0], tables.constants[j, 1]
+    level, static = constants[0], constants[1]
     if static == level:
         return level
-    return level + (static - level) * math.exp(-((v / tables.constants[j, 2]) ** 2))
+    return level + (static - level) * math.exp(-((v / constants[2]) ** 2))
 
 
 @kernel(inline=True, exact=True)
