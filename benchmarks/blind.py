@@ -78,7 +78,7 @@ def run(job: Job) -> Outcome:
     truth = bench.true_critical_stiffness()
     model = build_model("grasped" if held else "free", device)
     began = time.process_time()
-    closed = close_loop(model, recording, ess=1000, seed=job.seed)
+    closed = close_loop(recording, model, ess=1000, seed=job.seed)
     took = time.process_time() - began
     before, after = (e["critical_stiffness"] for e in (closed.before, closed.after))
     return Outcome(

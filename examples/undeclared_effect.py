@@ -58,7 +58,7 @@ def picture(fit: bh.Fit, recording: bh.Recording) -> None:
 
 def closed(recording: bh.Recording, ess: float) -> bh.Closed:
     """Steps 4 and 5: what explains it, and what that changes."""
-    found = bh.close_loop("grasped", recording, device="lhifam", ess=ess)
+    found = bh.close_loop(recording, "grasped", device="lhifam", ess=ess)
     for candidate in sorted(found.traced.candidates, key=lambda c: -c.score)[:5]:
         verdict = "accepted" if candidate.accepted else "not needed"
         print(f"4. {candidate.title}: held-out gain {candidate.score:.0f}, {verdict}")

@@ -40,6 +40,21 @@ def fake_model(name: str, device: str | None, force_unit: str = "N") -> Model:
     )
 
 
+class FakeAnalysis(SimpleNamespace):
+    """The parts of an `Analysis`, each of which may be changed."""
+
+    closed = None
+    effect_names = ()
+    analysis = measured = property(lambda self: self)
+
+
+class FakeClosed(SimpleNamespace):
+    """The parts of a `Closed`, each of which may be changed."""
+
+    closed = property(lambda self: self)
+    measured = property(lambda self: self.base)
+
+
 def fake_analysis(
     name: str = "grasped",
     device: str | None = "lhifam",
@@ -83,7 +98,7 @@ def fake_analysis(
         q95=None,
         reason="the measured phase does not reach -180 degrees between 0.7 and 300 Hz",
     )
-    return SimpleNamespace(
+    return FakeAnalysis(
         recording=etfe.recording,
         etfe=etfe,
         device=model.device,

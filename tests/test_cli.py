@@ -25,6 +25,7 @@ from bayeshaptic.commands.simulate import parse_effect
 from bayeshaptic.commands.talk import Talk
 from bayeshaptic.devices import device_names
 from bayeshaptic.diagnosis import analysis
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs import batch, executors
 from bayeshaptic.jobs import recording as recording_job
@@ -447,8 +448,8 @@ class TestReport:
     ) -> None:
         seen: dict[str, Any] = {}
 
-        def spy(measurement: Any, **options: Any) -> None:
-            seen.update(options, measurement=measurement)
+        def spy(measurement: Any, model: str, options: Options) -> None:
+            seen.update(vars(options), measurement=measurement, model=model)
             raise InputError("seen enough")
 
         monkeypatch.setattr(recording_job, "analyse" if extra else "close_loop", spy)

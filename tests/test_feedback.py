@@ -23,7 +23,7 @@ FRICTION_N = 20.0
 
 @pytest.fixture(scope="module")
 def closed() -> Closed:
-    return bh.close_loop("rigid", servo(FRICTION_N), delay_s=0.0, ess=300)
+    return bh.close_loop(servo(FRICTION_N), "rigid", delay_s=0.0, ess=300)
 
 
 def text_of(page: Path) -> str:

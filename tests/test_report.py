@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import needs_browser, probe, run
-from fake_analysis import CASES, FEEDBACK, fake_analysis
+from fake_analysis import CASES, FEEDBACK, fake_analysis, fake_closed
 
 import bayeshaptic
 from bayeshaptic.errors import InputError, Notice
@@ -196,7 +196,7 @@ def test_too_few_draws_are_no_recommendation() -> None:
 
 
 def test_an_unexplained_remainder_is_said() -> None:
-    closed = SimpleNamespace(analysis=fake_analysis("rigid"), diagnosis={"verdict": "unexplained"})
+    closed = fake_closed("unexplained", "linear")
     found = headline(closed)
     assert found.status == "caution"
     assert "unexplained" in found.sentence

@@ -24,7 +24,6 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.tables import outcomes
 from bayeshaptic.report.misfit import misfit_is_clear
 from bayeshaptic.report.quantities import estimate
-from bayeshaptic.report.result import analysis_of, closed_of
 from bayeshaptic.report.study import write as study_write
 from bayeshaptic.report.study.words import configurations
 from bayeshaptic.report.trust import doubtful_parameters
@@ -124,17 +123,17 @@ def _the_limit_is_one(result: Any, page: str, found: Any) -> None:
     after = found["error"]["after"]["critical_stiffness"]
     if after["q50"] is not None:
         assert after == pytest.approx({q: limit[q] for q in after})
-    if closed_of(result) is not None and closed_of(result).effects:  # type: ignore[union-attr]
+    if result.closed is not None and result.closed.effects:  # type: ignore[union-attr]
         shown = estimate(limit["q50"], limit["q05"], limit["q95"], limit["unit"])
         assert shown in page  # the table of errors has the limit of the table of limits
-    stages = analysis_of(result).seconds
+    stages = result.analysis.seconds
     assert len(re.findall(r"draws in [\d.]+ m?s\b", page)) == 0
     assert all(page.count(f"{name} {spent:.1f} s") == 1 for name, spent in stages.items())
 
 
 def _the_verdict_is_one(result: Any, page: str, found: Any) -> None:
-    closed = closed_of(result)
-    if misfit_is_clear(analysis_of(result)):
+    closed = result.closed
+    if misfit_is_clear(result.analysis):
         assert "What is left is noise" not in page and "explains the recording" not in page
     if closed is None:
         return
@@ -152,7 +151,7 @@ def _doubtful_parameters_are_said_so(result: Any, page: str, found: Any) -> None
     rows = found["posterior"]["parameters"]
     assert {name for name, row in rows.items() if not row["trusted"]} == set(doubtful)
     assert page.count("not to be trusted:") == len(doubtful)
-    if found["diagnosis"]["verdict"] == "unexplained" or misfit_is_clear(analysis_of(result)):
+    if found["diagnosis"]["verdict"] == "unexplained" or misfit_is_clear(result.analysis):
         assert set(doubtful) == set(rows)
 
 

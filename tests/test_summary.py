@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from fake_analysis import CASES, fake_analysis
+from fake_analysis import CASES, FakeClosed, fake_analysis
 
 import bayeshaptic
 from bayeshaptic.report import summary, summary_json
@@ -182,8 +181,10 @@ def test_infinite_and_vanishing_limits_become_null() -> None:
 
 
 def test_what_closing_the_loop_adds() -> None:
-    closed = SimpleNamespace(
-        analysis=fake_analysis("rigid"),
+    rigid = fake_analysis("rigid")
+    closed = FakeClosed(
+        analysis=rigid,
+        base=rigid,
         diagnosis={
             "verdict": "explained",
             "residual_class": "nonlinear",

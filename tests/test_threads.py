@@ -26,7 +26,7 @@ recording = bh.recording_from_arrays(
 )
 etfe = bh.estimate_etfe(recording)
 model = bh.grasped(device="phantom")
-closed = bh.close_loop(model, recording, ess=300)
+closed = bh.close_loop(recording, model, ess=300)
 posterior = bh.sample(model, etfe, start=bh.least_squares(model, etfe), ess=300)
 # As in a user's hands: nothing around it.
 limit = bh.critical_stiffness(posterior)

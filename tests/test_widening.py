@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fake_analysis import fake_closed
+from fake_analysis import FakeAnalysis, fake_closed
 
 from bayeshaptic.recordings.study import StudyEntry
 from bayeshaptic.stability.cases import HELD
@@ -23,7 +22,7 @@ def closed(name: str, log_sd: float = 0.0, shift: float = 0.0, family: str = "li
     rng = np.random.default_rng(1)
     factor = np.exp(shift + log_sd * rng.standard_normal(len(found.analysis.limit.samples)))
     parts["limit"] = replace(parts["limit"], samples=parts["limit"].samples * factor)
-    done = replace(found, analysis=SimpleNamespace(**parts))  # type: ignore[arg-type]
+    done = replace(found, analysis=FakeAnalysis(**parts))  # type: ignore[arg-type]
     return Analysed(name, StudyEntry(Path(f"{name}.csv"), user=name), done)
 
 

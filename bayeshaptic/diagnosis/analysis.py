@@ -6,14 +6,17 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
-from bayeshaptic.devices import Device, load_device
+from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.options import REPORT_ESS, Options, measurement_of
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.choose import Choice, choose_model
 from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
-from bayeshaptic.models import Model, Prior, build_model
+from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
@@ -21,11 +24,7 @@ from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.stability.tail import TailWatch
 from bayeshaptic.threads import single_threaded
-from bayeshaptic.types import Progress
 
-# Effective draws of every parameter that a report asks for; sampling then goes on until 20 lie
-# below the critical stiffness of 0.1 % risk.
-REPORT_ESS = 4000
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
 _MISFIT_STEPS = 1500
 
@@ -72,6 +71,23 @@ class Analysis:
     noise_scale: float = 1.0
     lever_m: float | None = None
 
+    # What a report asks of any result, closed loop or not: see `bayeshaptic.diagnosis.result`.
+    @property
+    def analysis(self) -> Analysis:
+        return self
+
+    @property
+    def measured(self) -> Analysis:
+        return self
+
+    @property
+    def closed(self) -> None:
+        return None
+
+    @property
+    def effect_names(self) -> tuple[str, ...]:
+        return ()
+
 
 @dataclass
 class _Clock:
@@ -88,43 +104,22 @@ class _Clock:
 
 @single_threaded
 def analyse(
-    measurement: Recording | Etfe,
+    measurement: Recording | Etfe | str | Path,
     model: str | Model = "auto",
-    device: str | Device | None = None,
-    delay_s: float | None = None,
-    delay_sd_s: float | None = None,
-    band_hz: tuple[float, float] | None = None,
-    prior: Mapping[str, Prior] | None = None,
-    held: bool | None = None,
-    lever_m: float | None = None,
-    ess: float = REPORT_ESS,
-    seed: int = 0,
-    progress: Progress | None = None,
+    options: Options | None = None,
+    **changes: Any,
 ) -> Analysis:
     """Fit, sample, and find the critical stiffness of one measurement.
 
     Parameters
     ----------
-    measurement : Recording or Etfe
+    measurement : Recording, Etfe or path
         An `Etfe` where there is no recording (a table of a frequency response).
     model : {"auto", "rigid", "free", "grasped"} or Model
-    device : str or Device, optional
-        By default the recording's, where it names a device that is known.
-    delay_s, delay_sd_s : float, optional
-        Loop delay and its standard deviation, s; by default the device's, else free.
-    band_hz : (low, high), optional
-        By default chosen from the data.
-    prior : mapping, optional
-        Your own priors by parameter name.
-    held : bool, optional
-        Whether somebody held the device; unknown by default.
-    lever_m : float, optional
-        From the axis to the tip; by default the device's.
-    ess : float
-        Effective draws of every parameter.
-    seed : int
-    progress : callable, optional
-        Called with the share done and a word about it.
+    options : Options, optional
+    **changes
+        Single options by name: device, delay_s, delay_sd_s, band_hz, prior, held, lever_m, ess,
+        seed, progress; see `Options`.
 
     Returns
     -------
@@ -135,21 +130,9 @@ def analyse(
     InputError
         Where the measurement cannot be used, or the model does not fit it in kind.
     """
-    report = progress or (lambda share, word: None)
-    begun = begin(
-        measurement,
-        model,
-        device,
-        delay_s,
-        delay_sd_s,
-        band_hz,
-        prior,
-        held,
-        lever_m,
-        seed,
-        report,
-    )
-    done = finish(begun, begun.etfe, begun.fit, ess=ess, seed=seed, progress=report)
+    chosen = (options or Options()).with_changes(changes)
+    begun = begin(measurement_of(measurement, model, chosen), model, chosen)
+    done = finish(begun, begun.etfe, begun.fit, chosen)
     return replace(done, notices=done.notices + _residual_notice(begun))
 
 
@@ -170,39 +153,24 @@ class Begun:
 
 
 @single_threaded
-def begin(
-    measurement: Recording | Etfe,
-    model: str | Model = "auto",
-    device: str | Device | None = None,
-    delay_s: float | None = None,
-    delay_sd_s: float | None = None,
-    band_hz: tuple[float, float] | None = None,
-    prior: Mapping[str, Prior] | None = None,
-    held: bool | None = None,
-    lever_m: float | None = None,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> Begun:
+def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -> Begun:
     """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
-    report = progress or (lambda share, word: None)
     clock = _Clock()
-    if isinstance(device, str):
-        device = load_device(device)
-    if device is None and isinstance(model, Model):
-        device = model.device
+    device = options.device_of(model)
     notices: tuple[Notice, ...] = ()
     if isinstance(measurement, Recording):
         with clock.stage("checks"):
-            report(0.0, "checking the recording")
+            options.report(0.0, "checking the recording")
             notices = check_recording(measurement, device)
         with clock.stage("frequency response"):
-            report(0.03, "estimating the frequency response")
-            etfe = estimate_etfe(measurement, band_hz)
+            options.report(0.03, "estimating the frequency response")
+            etfe = estimate_etfe(measurement, options.band_hz)
     else:
         etfe = measurement
     with clock.stage("least squares"):
-        report(0.06, "fitting")
-        fit, choice = _fit(etfe, model, device, delay_s, delay_sd_s, dict(prior or {}), held, seed)
+        options.report(0.06, "fitting")
+        fit, choice = _fit(etfe, model, device, options)
+    lever_m = options.lever_m
     if lever_m is None and device is not None:
         lever_m = device.lever_m
     return Begun(etfe, device, fit, choice, notices + etfe.notices, clock.seconds, lever_m)
@@ -213,9 +181,7 @@ def finish(
     begun: Begun,
     etfe: Etfe,
     fit: Fit,
-    ess: float = REPORT_ESS,
-    seed: int = 0,
-    progress: Progress | None = None,
+    options: Options,
 ) -> Analysis:
     """Sample a fit's posterior and find its critical stiffness.
 
@@ -226,30 +192,28 @@ def finish(
         The measurement's, or what the loop made of it.
     fit : Fit
         Of the base model, or of the model with its effects.
-    ess, seed, progress
-        As in `analyse`.
+    options : Options
     """
-    report = progress or (lambda share, word: None)
     clock = _Clock(dict(begun.seconds))
     scale = fit.reduced_chi_square if fit.reduced_chi_square > MISFIT else 1.0
     # A misfit's tail means nothing, and a short run for comparison needs none.
-    watch = TailWatch(fit.model) if scale == 1.0 and ess >= REPORT_ESS else None
+    watch = TailWatch(fit.model) if scale == 1.0 and options.ess >= REPORT_ESS else None
     with clock.stage("sampling"):
         posterior = sample(
             fit.model,
             etfe,
             start=_with_noise(fit, scale),
-            ess=ess,
-            seed=seed,
-            progress=lambda share, word: report(0.1 + 0.7 * share, word),
+            ess=options.ess,
+            seed=options.seed,
+            progress=options.within(0.1, 0.8).report,
             until=watch.steps_wanted if watch else None,
             **({"most_steps": _MISFIT_STEPS} if scale > 1 else {}),
         )
     with clock.stage("critical stiffness"):
-        report(0.8, "critical stiffness")
+        options.report(0.8, "critical stiffness")
         limit = watch.limit_of(posterior) if watch else critical_stiffness(posterior)
-        etfe_limit = etfe_critical_stiffness(etfe, seed=seed)
-    report(0.9, "writing the report")
+        etfe_limit = etfe_critical_stiffness(etfe, seed=options.seed)
+    options.report(0.9, "writing the report")
     return Analysis(
         recording=etfe.recording,
         etfe=etfe,
@@ -271,19 +235,17 @@ def _fit(
     etfe: Etfe,
     model: str | Model,
     device: Device | None,
-    delay_s: float | None,
-    delay_sd_s: float | None,
-    prior: Mapping[str, Prior],
-    held: bool | None,
-    seed: int,
+    options: Options,
 ) -> tuple[Fit, Choice | None]:
     """The fit of the model that was asked for, or of the chosen one."""
+    prior, seed = dict(options.prior), options.seed
     if isinstance(model, Model):
         return least_squares(model.with_prior(prior), etfe, seed=seed), None
+    delay = options.delay_s, options.delay_sd_s
     if model == "auto":
-        choice = choose_model(etfe, device, delay_s, delay_sd_s, prior, held, seed)
+        choice = choose_model(etfe, device, *delay, prior, options.held, seed)
         return choice.fit, choice
-    built = build_model(model, device, delay_s, delay_sd_s, etfe.period_s, prior)
+    built = build_model(model, device, *delay, etfe.period_s, prior)
     return least_squares(built, etfe, seed=seed), None
 
 

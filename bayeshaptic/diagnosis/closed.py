@@ -5,15 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analysis import (
-    REPORT_ESS,
     Analysis,
-    Progress,
     begin,
     finish,
 )
@@ -25,12 +23,13 @@ from bayeshaptic.diagnosis.feedback.explain import (
     trace_force,
 )
 from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.diagnosis.options import Options, measurement_of
 from bayeshaptic.diagnosis.state import REPORT, Accepted, share
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.least_squares import Fit, polish
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.models import Model, Prior
+from bayeshaptic.models import Model
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
@@ -61,6 +60,21 @@ class Closed:
     before: Mapping[str, Any]
     after: Mapping[str, Any]
     force: ForceExplained | None = None
+
+    @property
+    def measured(self) -> Analysis:
+        """The analysis with what was measured as it was measured."""
+        return self.base
+
+    @property
+    def closed(self) -> Closed:
+        """Itself: see `bayeshaptic.diagnosis.result`."""
+        return self
+
+    @property
+    def effect_names(self) -> tuple[str, ...]:
+        """Names of the effects that were accepted."""
+        return tuple(effect.name for effect in self.effects)
 
     @property
     def model(self) -> Model:
@@ -94,27 +108,20 @@ class Closed:
 
 @single_threaded
 def close_loop(
-    model: str | Model,
-    measurement: Recording | Etfe,
-    device: str | Device | None = None,
-    delay_s: float | None = None,
-    delay_sd_s: float | None = None,
-    band_hz: tuple[float, float] | None = None,
-    prior: Mapping[str, Prior] | None = None,
-    held: bool | None = None,
-    lever_m: float | None = None,
-    ess: float = REPORT_ESS,
-    seed: int = 0,
-    progress: Progress | None = None,
+    measurement: Recording | Etfe | str | Path,
+    model: str | Model = "auto",
+    options: Options | None = None,
+    **changes: Any,
 ) -> Closed:
     """Find what the model lacks, add it, and analyse again.
 
     Parameters
     ----------
+    measurement : Recording, Etfe or path
     model : {"auto", "rigid", "free", "grasped"} or Model
-    measurement : Recording or Etfe
-    device, delay_s, delay_sd_s, band_hz, prior, held, lever_m, ess, seed, progress
-        As in `bayeshaptic.analyse`.
+    options : Options, optional
+    **changes
+        Single options by name, as in `bayeshaptic.analyse`.
 
     Returns
     -------
@@ -125,26 +132,14 @@ def close_loop(
     InputError
         Where the measurement cannot be used.
     """
-    report = progress or (lambda part, word: None)
-    begun = begin(
-        measurement,
-        model,
-        device,
-        delay_s,
-        delay_sd_s,
-        band_hz,
-        prior,
-        held,
-        lever_m,
-        seed,
-        lambda part, word: report(0.3 * part, word),
-    )
+    chosen = (options or Options()).with_changes(changes)
+    begun = begin(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.3))
     began = time.perf_counter()
     force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None
     if force is not None:  # the response is biased: whatever is traced in it may be the controller
         traced = trace_force(begun.etfe, begun.fit, force)
     else:
-        traced = trace(begun.etfe, begun.fit, lambda word: report(0.15, f"trying {word}"))
+        traced = trace(begun.etfe, begun.fit, lambda word: chosen.report(0.15, f"trying {word}"))
     tracing = time.perf_counter() - began
     changed = force is None and bool(traced.state.accepted)
     state = traced.state
@@ -152,9 +147,7 @@ def close_loop(
         begun,
         begun.etfe,
         begun.fit,
-        ess=_BEFORE_ESS if changed else ess,
-        seed=seed,
-        progress=lambda part, word: report(0.4 + 0.2 * part, word),
+        replace(chosen.within(0.4, 0.6), ess=_BEFORE_ESS if changed else chosen.ess),
     )
     analysis = base
     if changed:
@@ -162,11 +155,11 @@ def close_loop(
             begun,
             state.etfe,
             state.fit,
-            ess=ess,
-            seed=seed,
-            progress=lambda part, word: report(0.6 + 0.3 * part, word),
+            chosen.within(0.6, 0.9),
         )
-    limit = with_discrepancy(analysis.limit, analysis.posterior, begun.fit, state.fit, traced, seed)
+    limit = with_discrepancy(
+        analysis.limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed
+    )
     notices = analysis.notices + _notices(traced)
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from bayeshaptic.devices import Device, load_device
-from bayeshaptic.diagnosis.analysis import Analysis, analyse
-from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.analysis import analyse
+from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.jobs.job import Job, Settings
 from bayeshaptic.recordings.read import read_measurement, recording_name
 from bayeshaptic.recordings.recording import Recording
@@ -17,7 +18,6 @@ from bayeshaptic.report import write_report
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.reported import Reported
-from bayeshaptic.report.result import analysis_of
 from bayeshaptic.types import Progress
 
 
@@ -52,21 +52,19 @@ def _report(
     progress: Progress | None,
 ) -> Reported:
     """Analyse one measurement and write its report."""
-    options: dict[str, Any] = {
-        "model": settings.model,
-        "device": device,
-        "delay_s": settings.delay_s,
-        "delay_sd_s": settings.delay_sd_s,
-        "band_hz": settings.band_hz,
-        "held": None,
-        "seed": settings.seed,
-        "progress": progress,
-    }
+    options = Options(
+        device=device,
+        delay_s=settings.delay_s,
+        delay_sd_s=settings.delay_sd_s,
+        band_hz=settings.band_hz,
+        seed=settings.seed,
+        progress=progress,
+    )
     run = close_loop if settings.close_loop else analyse
-    return reported(name, run(measurement=measurement, **options), folder)
+    return reported(name, run(measurement, settings.model, options), folder)
 
 
-def reported(name: str, result: Analysis | Closed, folder: Path) -> Reported:
+def reported(name: str, result: Result, folder: Path) -> Reported:
     """Write the report of one analysed measurement, and say what is in it.
 
     Parameters
@@ -77,8 +75,6 @@ def reported(name: str, result: Analysis | Closed, folder: Path) -> Reported:
     """
 
     page = write_report(result, folder)
-    warnings = tuple(
-        notice.text for notice in analysis_of(result).notices if notice.level == "warning"
-    )
-    remark = in_short(result) if isinstance(result, Closed) else ""
+    warnings = tuple(notice.text for notice in result.analysis.notices if notice.level == "warning")
+    remark = in_short(result.closed) if result.closed else ""
     return Reported(name, page, headline(result), remark, warnings)

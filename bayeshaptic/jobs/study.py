@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.devices import load_device
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
@@ -162,14 +162,16 @@ def _analysed(
     return analyse_study(
         study,
         settings.model,
-        close_loop=settings.close_loop,
-        device=None if settings.device is None else load_device(settings.device),
-        delay_s=settings.delay_s,
-        delay_sd_s=settings.delay_sd_s,
-        band_hz=settings.band_hz,
-        seed=settings.seed,
-        progress=None if progress is None else _scaled(progress, _WRITING),
-        executor=executor,
+        settings.close_loop,
+        Options(
+            device=settings.device,
+            delay_s=settings.delay_s,
+            delay_sd_s=settings.delay_sd_s,
+            band_hz=settings.band_hz,
+            seed=settings.seed,
+            progress=None if progress is None else _scaled(progress, _WRITING),
+        ),
+        executor,
     )
 
 

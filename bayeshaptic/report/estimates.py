@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.report.result import analysis_of, closed_of, families_of, measured_of
+from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.result import families_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -66,14 +67,14 @@ def own_limit(analysis: Analysis) -> tuple[float, float, float] | None:
     return own.q05, own.q50, own.q95
 
 
-def witnesses(result: Any) -> tuple[Witness, ...]:
+def witnesses(result: Result) -> tuple[Witness, ...]:
     """Every estimate of the limit: model, least squares, measurement, closed-form rules.
 
     Parameters
     ----------
     result : Analysis, or what closing the loop returns
     """
-    analysis = analysis_of(result)
+    analysis = result.analysis
     limit = analysis.limit
     low, middle, high = (finite(limit.quantile(p)) for p in (0.05, 0.5, 0.95))
     fitted = least_squares_limit(analysis)
@@ -84,9 +85,9 @@ def witnesses(result: Any) -> tuple[Witness, ...]:
     return (*found, *_measured(result), *_rules(analysis))
 
 
-def correction(result: Any) -> str:
+def correction(result: Result) -> str:
     """What was done to the response before its crossing was read off; empty where nothing was."""
-    closed = closed_of(result)
+    closed = result.closed
     if closed is None or closed.force is not None or closed.analysis.etfe is closed.base.etfe:
         return ""
     if "time-varying" in families_of(result):
@@ -97,22 +98,22 @@ def correction(result: Any) -> str:
     return f"after {' and '.join(titles)} was taken off it with the model's help"
 
 
-def _measured(result: Any) -> tuple[Witness, ...]:
+def _measured(result: Result) -> tuple[Witness, ...]:
     """The response's own crossing, as it was measured and as the model corrected it."""
     changed = correction(result)
     found = []
-    own = own_limit(measured_of(result))
+    own = own_limit(result.measured)
     if own is not None:
         low, middle, high = own
         remark = "the crossing read from the response, no model"
         found.append(Witness("etfe", "measurement alone", remark, middle, low, high))
-    mended = own_limit(analysis_of(result)) if changed else None
+    mended = own_limit(result.analysis) if changed else None
     if mended is not None:
         low, middle, high = mended
         label = "measurement, worst part" if "part of" in changed else "measurement, corrected"
         remark = f"the crossing read from the response {changed}"
         found.append(Witness("corrected", label, remark, middle, low, high))
-    caveat = getattr(analysis_of(result).etfe_limit, "caveat", None)
+    caveat = getattr(result.analysis.etfe_limit, "caveat", None)
     if found and caveat:
         found[-1] = replace(found[-1], remark=f"{found[-1].remark}; {caveat}")
     return tuple(found)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.explain import has_feedback
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import decibel, own_limit
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
 from bayeshaptic.report.quantities import estimate, percent, pure, quantity
-from bayeshaptic.report.result import analysis_of, closed_of, tip_limit
+from bayeshaptic.report.result import tip_limit
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -51,12 +52,12 @@ class Headline:
     risk: float | None = None
 
 
-def headline(result: Any) -> Headline:
+def headline(result: Result) -> Headline:
     """The recommendation of an analysis, or of what closing the loop returns."""
-    analysis = analysis_of(result)
-    objections = _objections(analysis, getattr(result, "diagnosis", None))
+    analysis = result.analysis
+    objections = _objections(analysis, result.closed.diagnosis if result.closed else None)
     if objections:
-        return _untrusted(analysis, objections, closed_of(result))
+        return _untrusted(analysis, objections, result.closed)
     limit = analysis.limit
     if limit.quantile(0.05) == math.inf:
         unlimited = "Nothing limits the stiffness: the model is stable with any."
@@ -68,8 +69,8 @@ def headline(result: Any) -> Headline:
             f"{percent(HEADLINE_RISKS[-1])} (fewer than 20 of them lie below any such stiffness)"
         )
         return _untrusted(analysis, (few,))
-    diagnosis = getattr(result, "diagnosis", None) or {}
-    return _recommended(analysis, risk, diagnosis, closed_of(result))
+    diagnosis = result.closed.diagnosis if result.closed else {}
+    return _recommended(analysis, risk, diagnosis, result.closed)
 
 
 def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:

@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report import tables, words
 from bayeshaptic.report.assumptions import assumptions, priors, versions
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
@@ -17,7 +18,6 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop import tables as loop_tables
 from bayeshaptic.report.loop import words as loop_words
-from bayeshaptic.report.result import analysis_of, closed_of, measured_of
 from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
@@ -45,12 +45,12 @@ class EmbeddedPicture:
     height: int
 
 
-def render(result: Any, pictures: Mapping[str, bytes], sections: Sequence[str] = ()) -> str:
+def render(result: Result, pictures: Mapping[str, bytes], sections: Sequence[str] = ()) -> str:
     """The page of an analysis (or of what closing the loop returns) with its PNG pictures.
 
     `sections` are further ones, ready as HTML, that follow the critical stiffness.
     """
-    analysis, closed = analysis_of(result), closed_of(result)
+    analysis, closed = result.analysis, result.closed
     head = headline(result)
     return template("report.jinja").render(
         title=title(analysis),
@@ -60,7 +60,7 @@ def render(result: Any, pictures: Mapping[str, bytes], sections: Sequence[str] =
         result=result,
         analysis=analysis,
         closed=closed,
-        measured=measured_of(result),
+        measured=result.measured,
         headline=head,
         label=LABELS[head.status],
         notices=unique(analysis.notices),

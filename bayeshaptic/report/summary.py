@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.diagnosis.feedback.explain import has_feedback
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import RISKS, finite
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.result import analysis_of, measured_of, tip_limit
+from bayeshaptic.report.result import tip_limit
 from bayeshaptic.report.trust import doubtful_parameters
 from bayeshaptic.version import __version__
 
@@ -32,7 +33,7 @@ _ERROR = {
 _DIAGNOSIS = dict.fromkeys(("verdict", "residual_class", "effects", "candidates"))
 
 
-def summary(result: Any) -> dict[str, Any]:
+def summary(result: Result) -> dict[str, Any]:
     """Everything that `summary.json` holds, as plain dictionaries, lists, strings and floats.
 
     Parameters
@@ -46,13 +47,14 @@ def summary(result: Any) -> dict[str, Any]:
     dict
         SI units; None for what is missing, and for numbers that are infinite or not a number.
     """
-    analysis = analysis_of(result)
-    diagnosis = _DIAGNOSIS | dict(getattr(result, "diagnosis", None) or {})
-    error = {name: getattr(result, name, None) for name in ("before", "after")}
+    analysis = result.analysis
+    closed = result.closed
+    diagnosis = _DIAGNOSIS | dict(closed.diagnosis if closed else {})
+    error = {name: getattr(closed, name, None) for name in ("before", "after")}
     return plain(
         {
             "version": __version__,
-            "recording": _recording(measured_of(result)),
+            "recording": _recording(result.measured),
             "etfe": _etfe(analysis),
             "model": {
                 "name": analysis.model.name,
@@ -69,7 +71,7 @@ def summary(result: Any) -> dict[str, Any]:
     )
 
 
-def summary_json(result: Any) -> str:
+def summary_json(result: Result) -> str:
     """`summary` as text; strict JSON, without NaN and infinity."""
     return json.dumps(summary(result), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
@@ -145,8 +147,8 @@ def _least_squares(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _posterior(result: Any) -> dict[str, Any]:
-    posterior, doubtful = analysis_of(result).posterior, doubtful_parameters(result)
+def _posterior(result: Result) -> dict[str, Any]:
+    posterior, doubtful = result.analysis.posterior, doubtful_parameters(result)
     return {
         "parameters": {
             name: {**found, "trusted": name not in doubtful}
@@ -177,7 +179,7 @@ def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _recommendation(result: Any) -> dict[str, Any]:
+def _recommendation(result: Result) -> dict[str, Any]:
     """What the sentence at the top of the page says, as numbers."""
     head = headline(result)
     return {

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import RISKS, decibel, finite, witnesses
 from bayeshaptic.report.quantities import interval, percent, pretty_unit, quantity, scale, spread_of
-from bayeshaptic.report.result import analysis_of, measured_of, tip_limit
+from bayeshaptic.report.result import tip_limit
 from bayeshaptic.report.summary import QUANTILES
 from bayeshaptic.report.trust import doubtful_parameters
 
@@ -46,9 +47,9 @@ class ParameterRow:
     remarks: str
 
 
-def parameters(result: Any) -> tuple[ParameterRow, ...]:
+def parameters(result: Result) -> tuple[ParameterRow, ...]:
     """Least squares beside the posterior, a row a parameter."""
-    analysis, doubtful = analysis_of(result), doubtful_parameters(result)
+    analysis, doubtful = result.analysis, doubtful_parameters(result)
     fit, posterior, model = analysis.fit, analysis.posterior, analysis.model
     rows = []
     for i, (name, found) in enumerate(posterior.summary().items()):
@@ -126,9 +127,9 @@ def crossings(analysis: Analysis) -> Rows:
     )
 
 
-def comparison(result: Any) -> Rows:
+def comparison(result: Result) -> Rows:
     """Every estimate of the limit: (name, 5 %, middle, 95 %, dB, difference in dB, remark)."""
-    analysis, found = analysis_of(result), witnesses(result)
+    analysis, found = result.analysis, witnesses(result)
     ours = decibel(found[0].middle or 0.0)
     ours_spread = spread_of(found[0].low or 0.0, found[0].high or 0.0)
     rows = []
@@ -182,18 +183,16 @@ def measured(analysis: Analysis) -> Rows:
     return tuple(rows)
 
 
-def provenance(result: Any) -> Rows:
+def provenance(result: Result) -> Rows:
     """Where the numbers come from: the file and its hash, and the time each step took."""
     rows: list[tuple[str, ...]] = []
-    recording = measured_of(result).recording
+    recording = result.measured.recording
     source = None if recording is None else recording.source
     if source is not None:
         rows.append(("File", source.as_posix()))
         if source.is_file():
             rows.append(("SHA-256", hashlib.sha256(source.read_bytes()).hexdigest()))
-    took = ", ".join(
-        f"{name} {seconds:.1f} s" for name, seconds in analysis_of(result).seconds.items()
-    )
+    took = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in result.analysis.seconds.items())
     if took:
         rows.append(("Time taken", took))
     return tuple(rows)

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayeshaptic.diagnosis.feedback.explain import has_feedback
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.misfit import misfit_is_clear
-from bayeshaptic.report.result import analysis_of, closed_of, families_of, is_unexplained
+from bayeshaptic.report.result import families_of, is_unexplained
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
 
 
-def doubtful_parameters(result: Any) -> dict[str, str]:
+def doubtful_parameters(result: Result) -> dict[str, str]:
     """Name to the reason, for each parameter whose interval may miss its true value.
 
     A residual that is not explained, or feedback, makes all of them doubtful.  The posterior
     takes the fitted law of a force as exact; that makes those doubtful which taking it off moved
     by more than their own standard deviation.
     """
-    analysis, closed = analysis_of(result), closed_of(result)
+    analysis, closed = result.analysis, result.closed
     names = analysis.model.names
     if has_feedback(analysis.notices):
         return dict.fromkeys(names, "feedback biases it")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.figures.residuals import third_octaves
 from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear
 from bayeshaptic.report.quantities import estimate, interval, percent, pure, quantity
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -93,9 +93,9 @@ def delay(analysis: Analysis) -> str:
     )
 
 
-def agreement(result: Any) -> str:
+def agreement(result: Result) -> str:
     """The model's limit beside the measurement's own, as measured and as it was corrected."""
-    analysis, limit = analysis_of(result), analysis_of(result).limit
+    analysis, limit = result.analysis, result.analysis.limit
     found = {w.key: w for w in witnesses(result)}
     raw, own = found.get("etfe"), found.get("corrected", found.get("etfe"))
     if own is None or own.middle is None or own.low is None or own.high is None:

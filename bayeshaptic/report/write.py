@@ -6,14 +6,13 @@ import os
 import shutil
 import uuid
 from pathlib import Path
-from typing import Any
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, draw_pictures
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.html import render
-from bayeshaptic.report.result import analysis_of
 from bayeshaptic.report.section import Section
 from bayeshaptic.report.summary import summary_json
 from bayeshaptic.report.walls.section import (
@@ -30,7 +29,7 @@ _LAST = "summary.json"
 
 
 @single_threaded
-def write_report(result: Any, out_dir: str | Path) -> Path:
+def write_report(result: Result, out_dir: str | Path) -> Path:
     """Write report.html, summary.json, limits.json and .csv, posterior.nc and the figures.
 
     The files are made in a hidden folder and moved when all of them are there: an interrupted run
@@ -67,8 +66,8 @@ def write_report(result: Any, out_dir: str | Path) -> Path:
     return out / "report.html"
 
 
-def _write_all(result: Any, folder: Path) -> None:
-    analysis = analysis_of(result)
+def _write_all(result: Result, folder: Path) -> None:
+    analysis = result.analysis
     pictures = draw_pictures(result)
     sections = _sections(result, folder)
     for part in (pictures, *(section.pictures for section in sections)):
@@ -80,9 +79,9 @@ def _write_all(result: Any, folder: Path) -> None:
     (folder / _LAST).write_text(summary_json(result), encoding="utf-8", newline="\n")
 
 
-def _sections(result: Any, folder: Path) -> tuple[Section, ...]:
+def _sections(result: Result, folder: Path) -> tuple[Section, ...]:
     """The sections about stable walls, with their table in `folder`."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     head = headline(result)
     case = case_of(result)
     table = table_of([case])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bayeshaptic.diagnosis.analysis import Analysis
-from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.study import StudyEntry
 
 
@@ -18,7 +18,7 @@ class Analysed:
     name : str
         Of the file, without its ending; numbered where two have the same.
     entry : StudyEntry
-    result : Analysis, Closed or None
+    result : Result or None
         None where it failed.
     error : str or None
         Why, in one line.
@@ -26,19 +26,15 @@ class Analysed:
 
     name: str
     entry: StudyEntry
-    result: Analysis | Closed | None = field(default=None, repr=False)
+    result: Result | None = field(default=None, repr=False)
     error: str | None = None
 
     @property
     def analysis(self) -> Analysis | None:
         """The analysis; of a closed loop that with its effects."""
-        if isinstance(self.result, Closed):
-            return self.result.analysis
-        return self.result
+        return self.result.analysis if self.result else None
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that were accepted."""
-        if isinstance(self.result, Closed):
-            return tuple(effect.name for effect in self.result.effects)
-        return ()
+        return self.result.effect_names if self.result else ()

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bayeshaptic.devices import Device
-from bayeshaptic.diagnosis.analysis import REPORT_ESS, Analysis, analyse
-from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.analysis import analyse
+from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, describe
 from bayeshaptic.inference.population.infer import Population
-from bayeshaptic.models import Prior, prior_from_table
+from bayeshaptic.models import prior_from_table
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.stability.cases import Case, DeviceLimit
@@ -84,12 +86,10 @@ class Task:
 
     number: int
     study: Study
-    device: Device
     entry: StudyEntry
     model: str
-    prior: Mapping[str, Prior]
     close_loop: bool
-    options: Mapping[str, Any]
+    options: Options
 
 
 @dataclass(frozen=True)
@@ -105,14 +105,9 @@ def analyse_study(
     study: Study,
     model: str = "auto",
     close_loop: bool = False,
-    device: Device | None = None,
-    delay_s: float | None = None,
-    delay_sd_s: float | None = None,
-    band_hz: tuple[float, float] | None = None,
-    ess: float = REPORT_ESS,
-    seed: int = 0,
-    progress: Progress | None = None,
+    options: Options | None = None,
     executor: Executor | None = None,
+    **changes: Any,
 ) -> StudyAnalysis:
     """Analyse every recording of a study, then what they say together.
 
@@ -124,18 +119,13 @@ def analyse_study(
         Where "auto", a recording with a user is grasped and one without is rigid or free.
     close_loop : bool
         Whether to look for what the model lacks in every recording.
-    device : Device, optional
-        Instead of the study's own.
-    delay_s, delay_sd_s, band_hz
-        As in `bayeshaptic.analyse`.
-    ess : float
-        Effective draws of every parameter of a recording.
-    seed : int
-    progress : callable, optional
-        Called with the share done and a word about it.
+    options : Options, optional
+        A device here takes the place of the study's own.
     executor : callable, optional
         Where the recordings are analysed (see `bayeshaptic.jobs.executors`); by default here,
         one after the other.
+    **changes
+        Single options by name, as in `bayeshaptic.analyse`.
 
     Returns
     -------
@@ -147,25 +137,22 @@ def analyse_study(
     InputError
         Where a prior of the study cannot be understood.
     """
-    report = progress or (lambda share, word: None)
     prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
-    device = study.device if device is None else device
-    options = {
-        "delay_s": delay_s,
-        "delay_sd_s": delay_sd_s,
-        "band_hz": band_hz,
-        "ess": ess,
-        "seed": seed,
-    }
+    chosen = (options or Options()).with_changes(changes)
+    device = chosen.device_of(model) or study.device
+    chosen = replace(chosen, device=device, prior=prior | dict(chosen.prior))
     tasks = [
-        Task(number, study, device, entry, model, prior, close_loop, options)
+        Task(number, study, entry, model, close_loop, replace(chosen, progress=None))
         for number, entry in enumerate(study.entries)
     ]
+    report = chosen.report
     began = time.perf_counter()
     recordings = _analysed(tasks, report, executor)
     seconds = {"recordings": time.perf_counter() - began}
     whole = study_cases(
-        recordings, seed, lambda share, word: report(_RECORDINGS + (1 - _RECORDINGS) * share, word)
+        recordings,
+        chosen.seed,
+        lambda share, word: report(_RECORDINGS + (1 - _RECORDINGS) * share, word),
     )
     report(1.0, "done")
     return StudyAnalysis(
@@ -178,14 +165,11 @@ def analyse_study(
     )
 
 
-def analyse_entry(task: Task, progress: Progress | None = None) -> Analysis | Closed:
+def analyse_entry(task: Task, progress: Progress | None = None) -> Result:
     """Read and analyse one recording of a study."""
-    measurement = task.study.read(task.entry)
-    options = dict(task.options, device=task.device, prior=task.prior, progress=progress)
-    options["held"] = task.entry.user is not None
-    if task.close_loop:
-        return close_loop(task.model, measurement, **options)
-    return analyse(measurement, task.model, **options)
+    options = replace(task.options, held=task.entry.user is not None, progress=progress)
+    run = close_loop if task.close_loop else analyse
+    return run(task.study.read(task.entry), task.model, options)
 
 
 def _analysed(

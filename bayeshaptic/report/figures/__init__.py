@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import (
     crossings,
     marginals,
@@ -87,11 +88,12 @@ FORCE_PICTURES = (
 )
 
 
-def draw_pictures(result: Any) -> dict[str, bytes]:
+def draw_pictures(result: Result) -> dict[str, bytes]:
     """Every figure of an analysis, or of a closed loop, as PNG, by name."""
     found = {picture.name: png(picture.draw(result)) for picture in PICTURES}
-    if hasattr(result, "traced"):
-        for picture in LOOP_PICTURES if result.force is None else FORCE_PICTURES:
-            if picture.shown(result):
-                found[picture.name] = png(picture.draw(result))
+    closed = result.closed
+    if closed is not None:
+        for picture in LOOP_PICTURES if closed.force is None else FORCE_PICTURES:
+            if picture.shown(closed):
+                found[picture.name] = png(picture.draw(closed))
     return found

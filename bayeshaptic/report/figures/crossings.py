@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import thinned
 from bayeshaptic.report.quantities import Scale, quantity, scale
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,9 +26,9 @@ MARKERS = "ovDs^"
 LINEAR_DEG = 10.0
 
 
-def draw(result: Any) -> Figure:
+def draw(result: Result) -> Figure:
     """Stiffness above, phase from -180 degrees below, up to the Nyquist frequency."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     etfe, limit = analysis.etfe, analysis.limit
     low_hz, half = float(etfe.frequency_hz[0]), 0.5 / etfe.period_s
     found = [(hz, k) for hz, k in _at_median(analysis) if hz > 0.02 * low_hz]

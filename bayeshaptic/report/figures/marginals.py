@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.quantities import Scale, scale
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,9 +21,9 @@ COLUMNS = 4
 BINS = 36
 
 
-def draw(result: Any) -> Figure:
+def draw(result: Result) -> Figure:
     """A small panel a parameter, each with its own unit; densities without an axis."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     model = analysis.model
     columns = min(COLUMNS, max(model.size, 3))
     rows = -(-model.size // columns)

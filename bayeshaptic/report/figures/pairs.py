@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.quantities import scale
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,9 +41,9 @@ def strongest(matrix: NDArray[Any], count: int = SHOWN) -> list[int]:
     return sorted(chosen)
 
 
-def draw(result: Any) -> Figure:
+def draw(result: Result) -> Figure:
     """Scatter and contours below the diagonal; all correlations as a map in the empty corner."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     draws = analysis.posterior.draws[:: max(len(analysis.posterior.draws) // 20_000, 1)]
     matrix = correlation(draws)
     chosen = strongest(matrix)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,9 +46,9 @@ def third_octaves(frequency_hz: NDArray[Any], residual: NDArray[Any]) -> BandRes
     return BandResidual(centre, np.sqrt(power), low, high)
 
 
-def draw(result: Any) -> Figure:
+def draw(result: Result) -> Figure:
     """Real and imaginary part over frequency above, the rms in third octaves below."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     order = np.argsort(analysis.fit.frequency_hz)
     frequency, residual = analysis.fit.frequency_hz[order], analysis.fit.residual[order]
     figure = style.new_figure(4.2)

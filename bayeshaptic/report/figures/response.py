@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import ResponseBand, response_band
 from bayeshaptic.report.quantities import pretty_unit
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from bayeshaptic.recordings.response.etfe import Etfe
 
 
-def draw(result: Any) -> Figure:
+def draw(result: Result) -> Figure:
     """Gain, phase, measured over model, and the coherence where there is one."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     etfe, band = analysis.etfe, response_band(analysis)
     known = bool(np.isfinite(etfe.coherence).any())
     heights = (2.8, 2.0, 1.7, 1.0) if known else (2.8, 2.0, 1.7)

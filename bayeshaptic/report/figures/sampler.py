@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,9 +19,9 @@ RANK_BINS = 20
 STEPS_SHOWN = 400
 
 
-def draw(result: Any) -> Figure:
+def draw(result: Result) -> Figure:
     """Trace and ranks of the parameter that mixes worst, effective draws and R-hat of all."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     posterior = analysis.posterior
     worst = int(np.argmax(posterior.rhat))
     name = style.short(posterior.model.names[worst])

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import RISKS, Witness, decibel, own_limit, witnesses
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.quantities import Scale, percent, scale
-from bayeshaptic.report.result import analysis_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,9 +23,9 @@ WIDEST = 4.0  # times the histogram's own width, to show the measurement's inter
 LOG_BEYOND = 8.0  # a distribution wider than this factor is drawn on a logarithmic axis
 
 
-def draw(result: Any) -> Figure:
+def draw(result: Result) -> Figure:
     """The histogram by binding crossing above; every estimate of the limit on one axis below."""
-    analysis, rows = analysis_of(result), witnesses(result)
+    analysis, rows = result.analysis, witnesses(result)
     figure = style.new_figure(3.3 + 0.42 + 0.21 * len(rows))
     top, bottom = figure.subplots(2, 1, height_ratios=(3.0, 0.42 + 0.21 * len(rows)))
     _histogram(top, analysis, rows)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures.walls import curve as limits_curve
 from bayeshaptic.report.figures.walls import kb as limits_kb
-from bayeshaptic.report.result import analysis_of, closed_of
 from bayeshaptic.report.section import Section, section
 from bayeshaptic.report.walls.rules import rules_of
 from bayeshaptic.report.walls.words import rule_rows, width_rows, words
@@ -73,9 +73,9 @@ def table_of(
     )
 
 
-def case_of(result: Any) -> Case:
+def case_of(result: Result) -> Case:
     """An analysis, or what closing the loop returns, as a case by itself."""
-    analysis = analysis_of(result)
+    analysis = result.analysis
     held = analysis.model.name == "grasped"
     user = None if analysis.recording is None else analysis.recording.user
     label = f"held by {user}" if user else "held" if held else "nobody holds it"
@@ -84,9 +84,9 @@ def case_of(result: Any) -> Case:
     return Case(label, HELD if held else FREE, analysis.model, draws, analysis.limit)
 
 
-def friction_of(result: Any) -> float | None:
+def friction_of(result: Result) -> float | None:
     """The Coulomb friction that closing the loop found, or None."""
-    closed = closed_of(result)
+    closed = result.closed
     for effect in () if closed is None else closed.effects:
         if _FRICTION in effect.estimates:
             return float(effect.estimates[_FRICTION].mean)
