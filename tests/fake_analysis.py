@@ -51,7 +51,9 @@ class FakeAnalysis(SimpleNamespace):
 class FakeClosed(SimpleNamespace):
     """The parts of a `Closed`, each of which may be changed."""
 
+    effects, force = (), None
     closed = property(lambda self: self)
+    verdict = property(lambda self: self.diagnosis["verdict"])
     measured = property(lambda self: self.base)
 
 
