@@ -37,10 +37,12 @@ SEGMENT = 2048  # samples, where the recording is long enough
 LEAST_SEGMENTS = 8
 SINUSOIDAL = 0.8  # share of the motion's variance that the oscillation has
 LEAST_STEADY_S = 15.0  # what Diaz and Gil recorded
-# A relay's force is at its two levels, and follows the position's sign but for hysteresis and the
-# sample in which it switches (97 % of a recording at 60 Hz); an open loop's agrees in half of them.
+# A relay's force is at its two levels, if they wander (34 % of noise and 63 % of a sine are
+# as near), and its sign and the position's are those of one oscillation, up to a delay in samples.
+_NEAR_LEVEL = 0.4
 _AT_LEVEL = 0.8
-_FOLLOWING = 0.65
+_LATEST = 64
+_TOGETHER = 0.3  # 0.02 of a binary sequence in open loop
 _CERTAIN_DB = 0.7  # a critical stiffness that is less certain than this is none
 
 
@@ -110,17 +112,21 @@ class RelayMeasurement:
 def _refuse_no_relay(force: Floats, position: Floats, name: str) -> None:
     """Refuse a force of many levels, and one that does not switch with the position."""
     level = np.median(np.abs(force))
-    at_level = np.mean(np.abs(np.abs(force) - level) <= 0.05 * level)
+    at_level = np.mean(np.abs(np.abs(force) - level) <= _NEAR_LEVEL * level)
     if at_level < _AT_LEVEL:
         raise InputError(
             f"{name}: not a relay recording: {100 * at_level:.0f} % of the force is at the levels "
             "±h of a relay; use 'bayeshaptic report'"
         )
-    following = np.mean(np.sign(force) == np.sign(position))
-    if max(following, 1.0 - following) < _FOLLOWING:
+    signs = np.sign(force), np.sign(position - np.median(position))
+    together = max(
+        abs(float(np.mean(signs[0][: len(force) - lag] * signs[1][lag:])))
+        for lag in range(0, min(_LATEST, len(force) // 2))
+    )
+    if together < _TOGETHER:
         raise InputError(
-            f"{name}: not a relay recording: the force does not switch with the position's sign "
-            f"(they agree in {100 * following:.0f} % of the samples); use 'bayeshaptic report'"
+            f"{name}: not a relay recording: the force does not switch with the position (their "
+            f"signs correlate by {together:.2f} at most); use 'bayeshaptic report'"
         )
 
 
