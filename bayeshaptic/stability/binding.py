@@ -58,13 +58,14 @@ def binding_kinds(system: LinearSystem, frequency_hz: Floats, period_s: float) -
     """
     mechanism = system.mechanism
     s = (2j * np.pi * np.nan_to_num(frequency_hz)).astype(complex)
-    own = evaluate(mechanism.transfer()[0], s)
+    own = evaluate(mechanism.mutual(mechanism.drive, mechanism.drive), s)
     device_opposes = np.zeros(len(s), bool)
     hand_opposes = np.zeros(len(s), bool)
     for mass in range(len(mechanism.masses)):
         if mass == mechanism.frame:
             continue
-        opposes = (evaluate(mechanism.transfer_to(mass)[0], s) * np.conj(own)).real < 0
+        motion = evaluate(mechanism.mutual(mechanism.drive, (mass, mechanism.frame)), s)
+        opposes = (motion * np.conj(own)).real < 0
         if mass == mechanism.hand:
             hand_opposes |= opposes
         else:

@@ -12,7 +12,7 @@ from bayeshaptic.numerics.roots import bracketed_roots
 from bayeshaptic.stability.responses.evaluated import EvaluableSystem, EvaluatedResponse
 from bayeshaptic.stability.responses.grid import search_grid
 from bayeshaptic.stability.responses.linked import linked_response
-from bayeshaptic.stability.responses.response import Response, pole_response
+from bayeshaptic.stability.responses.response import PoleResponse, Response, pole_response
 from bayeshaptic.types import Floats, Ints
 
 _CHUNK = 64  # rows at a time: the arrays of one chunk stay in the cache
@@ -88,7 +88,59 @@ def rational(system: LinearSystem | EvaluableSystem) -> bool:
 
 
 def search(response: Response, period_s: float) -> Crossings:
-    """Every crossing of `response`: scan, look into the dips, refine, add the real ends."""
+    """Every crossing of `response` and the real ends: compiled where it has finitely many poles."""
+    if isinstance(response, PoleResponse):
+        row, theta, gain = _compiled_search(response)
+    else:
+        row, theta, gain = plain_search(response)
+    static, nyquist = response.at_ends()
+    batch = len(response.delay)
+    ends = np.arange(batch)
+    row = np.concatenate([row, ends, ends])
+    theta = np.concatenate([theta, np.zeros(batch), np.full(batch, np.pi)])
+    gain = np.concatenate([gain, static, nyquist])
+    with np.errstate(invalid="ignore"):
+        keep = (gain < 0) & np.isfinite(gain)
+    stiffness = -1.0 / gain[keep]
+    frequency = theta[keep] / (2 * np.pi * period_s)
+    return Crossings(*_padded(row[keep], stiffness, frequency, batch), response.stable_at_rest())
+
+
+def _compiled_search(response: PoleResponse) -> tuple[Ints, Floats, Floats]:
+    """What `plain_search` gives, a row at a time."""
+    from bayeshaptic.stability import crossings_kernel
+
+    batch = len(response.delay)
+    # The phase of the delay passes -180 degrees every other turn, and each pole may turn it once.
+    most = 2 * int(response.delay.max()) + 4 * response.poles.shape[1] + 8
+    theta, gain = np.empty((2, batch, most))
+    count = np.empty(batch, int)
+    crossings_kernel.find(
+        crossings_kernel.Poles(
+            response.poles,
+            response.direct,
+            response.late,
+            response.centre,
+            response.delay,
+            response.exact,
+            response.log_points,
+        ),
+        theta,
+        gain,
+        count,
+    )
+    used = np.arange(theta.shape[1]) < count[:, None]
+    return np.nonzero(used)[0], theta[used], gain[used]
+
+
+def plain_search(response: Response) -> tuple[Ints, Floats, Floats]:
+    """Crossings between the ends: scan, look into the dips, refine.
+
+    Returns
+    -------
+    row, theta, gain : ndarray, shape (M,)
+        Of which loop, at which angle, and the real value of the response there.
+    """
     batch = len(response.delay)
     scans = [
         _scan(response, slice(start, min(start + _CHUNK, batch)))
@@ -100,17 +152,7 @@ def search(response: Response, period_s: float) -> Crossings:
         return _sine(response.at(row[index], theta[:, None])[:, 0])
 
     theta = bracketed_roots(value, low, high, s_low, s_high)
-    gain = response.at(row, theta[:, None])[:, 0].real
-    static, nyquist = response.at_ends()
-    ends = np.arange(batch)
-    row = np.concatenate([row, ends, ends])
-    theta = np.concatenate([theta, np.zeros(batch), np.full(batch, np.pi)])
-    gain = np.concatenate([gain, static, nyquist])
-    with np.errstate(invalid="ignore"):
-        keep = (gain < 0) & np.isfinite(gain)
-    stiffness = -1.0 / gain[keep]
-    frequency = theta[keep] / (2 * np.pi * period_s)
-    return Crossings(*_padded(row[keep], stiffness, frequency, batch), response.stable_at_rest())
+    return row, theta, response.at(row, theta[:, None])[:, 0].real
 
 
 def _sine(response: NDArray[np.complex128]) -> Floats:

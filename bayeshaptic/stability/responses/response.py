@@ -18,9 +18,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.models.response.filtered import filtered
 from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.models.response.transfer import transfer
+from bayeshaptic.numerics.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Complexes, Floats
 
 Rows = NDArray[np.int_]
@@ -161,8 +163,9 @@ def _simple_poles(
     Moving a double pole to p +- h changes the denominator by h^2 relative to |s - p|^2, and costs
     eps |s - p| / h in rounding: both far below 1e-6 wherever a crossing can be.
     """
-    poles = system.poles()[0]
-    numerator, denominator = system.transfer()
+    top, bottom = (polynomial.T for polynomial in transfer(system.mechanism))
+    numerator, denominator = filtered(top, bottom, system.filters)
+    poles = _poles(system, bottom)
     poles = np.take_along_axis(poles, np.argsort(np.abs(poles), axis=1), axis=1)
     integrators = np.cumprod(denominator == 0, axis=0).sum(axis=0)
     at_zero = np.arange(poles.shape[1]) < integrators[:, None]
@@ -180,6 +183,29 @@ def _simple_poles(
     poles.real = np.where((poles.real == 0) & ~at_zero, -1e-14 * np.abs(poles), poles.real)
     residues = evaluate(numerator, poles.T).T / (denominator[-1][:, None] * gaps.prod(axis=2))
     return poles, residues, integrators
+
+
+def _poles(system: LinearSystem, denominator: Polynomial) -> Complexes:
+    """Poles, shape (B, n): roots of the mechanism's `denominator` and of the filters'.
+
+    Eigenvalues where these do not settle.
+    """
+    from bayeshaptic.numerics.polynomial_roots import find_roots
+
+    factors = [denominator, *(f.denominator for f in system.filters)]
+    degrees = [len(factor) - 1 for factor in factors]
+    poles = np.empty((system.batch, sum(degrees)), complex)
+    settled = np.ones((len(factors), system.batch), bool)
+    for factor, end, degree, fine in zip(
+        factors, np.cumsum(degrees), degrees, settled, strict=True
+    ):
+        own = np.empty((system.batch, degree), complex)
+        find_roots(np.ascontiguousarray(factor.T), own, fine)
+        poles[:, end - degree : end] = own
+    unsettled = np.flatnonzero(~settled.all(axis=0))
+    if unsettled.size:
+        poles[unsettled] = system.rows(unsettled).poles()[0]
+    return poles
 
 
 def _gaps(poles: Complexes) -> Complexes:
