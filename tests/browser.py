@@ -20,17 +20,25 @@ _PROBE = """
 <script>
 window.addEventListener("load", () => {
   const boxes = [];
+  const folded = element => {  // what a closed <details> holds has a place, but is not shown
+    const part = element.closest("details:not([open])");
+    return part !== null && element.closest("summary") === null;
+  };
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     const node = walker.currentNode;
     if (!node.data.trim() || node.parentElement.closest("script")) continue;
+    if (folded(node.parentElement)) continue;
     const range = document.createRange();
     range.selectNodeContents(node);
     for (const r of range.getClientRects())
       if (r.width > 1 && r.height > 1) boxes.push([r, node.data.trim().slice(0, 40)]);
   }
-  const images = [...document.images];
-  for (const image of images) boxes.push([image.getBoundingClientRect(), image.alt]);
+  const images = [...document.querySelectorAll(".plot svg, .plot img")];
+  const label = image => image.alt || image.getAttribute("aria-label");
+  for (const image of images)
+    if (!folded(image))
+      boxes.push([image.getBoundingClientRect(), label(image)]);
   const overlaps = [];
   for (let i = 0; i < boxes.length; i++)
     for (let j = i + 1; j < boxes.length; j++) {
@@ -45,7 +53,10 @@ window.addEventListener("load", () => {
     overlaps: overlaps,
     width: page.scrollWidth, window: page.clientWidth,
     height: page.scrollHeight,
-    images: images.map(image => [image.alt, image.naturalWidth, image.clientWidth]),
+    images: images.map(image => [
+      label(image), image.naturalWidth || image.viewBox.baseVal.width,
+      folded(image) ? 0 : image.getBoundingClientRect().width,
+    ]),
     requests: performance.getEntriesByType("resource").map(entry => entry.name.slice(0, 60)),
   };
   const note = document.createElement("pre");

@@ -124,7 +124,7 @@ def _reason(best: str, candidates: Mapping[str, Candidate], noise: float, held: 
         said = "The study says that somebody held it. " if held else "The study names no user. "
     text = (
         f"{said}Chosen: {best} ({_WORDS[best]}, {chosen.model.size} parameters), "
-        f"reduced chi-square {chosen.reduced_chi_square:.3g}."
+        f"reduced chi-square {_plain(chosen.reduced_chi_square)}."
     )
     for name, other in candidates.items():
         if name == best:
@@ -132,13 +132,18 @@ def _reason(best: str, candidates: Mapping[str, Candidate], noise: float, held: 
         behind = other.score - candidates[best].score
         text += (
             f" {name.capitalize()} ({other.fit.model.size} parameters) has "
-            f"{other.fit.reduced_chi_square:.3g}, and an information criterion (BIC) "
-            f"{abs(behind):.3g} {'worse' if behind > 0 else 'better'}."
+            f"{_plain(other.fit.reduced_chi_square)}, and an information criterion (BIC) "
+            f"{_plain(abs(behind))} {'worse' if behind > 0 else 'better'}."
         )
     if noise >= MISFIT:
         text += (
-            f" No candidate reaches the noise: the criterion takes {noise:.3g} times its variance, "
-            "and a richer model must also halve the squared residual, or it only stands in for "
-            "what is missing."
+            f" No candidate reaches the noise: the criterion takes {_plain(noise)} times its "
+            "variance, and a richer model must also halve the squared residual, or it only stands "
+            "in for what is missing."
         )
     return text
+
+
+def _plain(value: float) -> str:
+    """Three digits without powers of ten."""
+    return f"{float(f'{value:.3g}'):,.10g}"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.report.figures.style import png
+from bayeshaptic.report.figures.style import Drawn, drawn
 from bayeshaptic.report.html import embedded, template
 
 if TYPE_CHECKING:
@@ -21,12 +21,12 @@ class Section:
     ----------
     html : str
         A ``<section>`` with its pictures inside.
-    pictures : mapping of str to bytes
-        The same pictures as PNG, by name.
+    pictures : mapping of str to Drawn
+        The same pictures, by name.
     """
 
     html: str = field(repr=False)
-    pictures: Mapping[str, bytes] = field(repr=False)
+    pictures: Mapping[str, Drawn] = field(repr=False)
 
 
 def section(name: str, figures: Mapping[str, tuple[Figure, str]], **values: Any) -> Section:
@@ -41,6 +41,6 @@ def section(name: str, figures: Mapping[str, tuple[Figure, str]], **values: Any)
     **values
         What else the template reads.
     """
-    files = {key: png(figure) for key, (figure, _) in figures.items()}
+    files = {key: drawn(figure, key) for key, (figure, _) in figures.items()}
     pictures = {key: embedded(key, files[key], words) for key, (_, words) in figures.items()}
     return Section(template(name).render(pictures=pictures, **values), files)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,13 +10,22 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import RISKS, decibel, finite, witnesses
-from bayeshaptic.report.quantities import interval, percent, pretty_unit, quantity, scale, spread_of
+from bayeshaptic.report.quantities import (
+    interval,
+    percent,
+    pretty_unit,
+    pure,
+    quantity,
+    scale,
+    spread_of,
+)
 from bayeshaptic.report.result import tip_limit
 from bayeshaptic.report.summary import QUANTILES
 from bayeshaptic.report.trust import doubtful_parameters
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.models.prior import Prior
 
 Rows = tuple[tuple[str, ...], ...]
 _DASH = "\N{EN DASH}"
@@ -32,7 +40,8 @@ _OUTCOMES = {
 class ParameterRow:
     """One parameter: all numbers in the unit of the row.
 
-    `reference` is the device file's value, a dash without one.
+    `reference` is the device file's value, a dash without one; `shrinkage` the posterior's width as
+    a share of the prior's.
     """
 
     name: str
@@ -45,6 +54,7 @@ class ParameterRow:
     ess: str
     rhat: str
     remarks: str
+    shrinkage: str = _DASH
 
 
 def parameters(result: Result) -> tuple[ParameterRow, ...]:
@@ -61,7 +71,7 @@ def parameters(result: Result) -> tuple[ParameterRow, ...]:
         if found["prior_dominated"]:
             remarks.append("the prior decides this one")
         if name in doubtful:
-            remarks.append(f"not to be trusted: {doubtful[name]}")
+            remarks.append("not to be trusted")
         rows.append(
             ParameterRow(
                 name,
@@ -74,9 +84,19 @@ def parameters(result: Result) -> tuple[ParameterRow, ...]:
                 f"{min(found['ess_bulk'], found['ess_tail']):.0f}",
                 f"{found['rhat']:.3f}",
                 "; ".join(text for text in remarks if text),
+                _shrinkage(model.prior(name), found["q05"], found["q95"]),
             )
         )
     return tuple(rows)
+
+
+def _shrinkage(prior: Prior, low: float, high: float) -> str:
+    """The width of the 90 % interval over that of the prior."""
+    wide = float(np.diff(prior.quantile(np.array([0.05, 0.95])))[0])
+    if not (np.isfinite(wide) and wide > 0):
+        return _DASH
+    share = 100 * (high - low) / wide
+    return "over 100 %" if share > 100 else f"{pure(share, 2)} %"
 
 
 def limit(analysis: Analysis) -> Rows:
@@ -180,21 +200,6 @@ def measured(analysis: Analysis) -> Rows:
         rows.insert(1, ("Device file", analysis.device.name))
     elif recording is not None and recording.device:
         rows.insert(1, ("Device", recording.device))
-    return tuple(rows)
-
-
-def provenance(result: Result) -> Rows:
-    """Where the numbers come from: the file and its hash, and the time each step took."""
-    rows: list[tuple[str, ...]] = []
-    recording = result.measured.recording
-    source = None if recording is None else recording.source
-    if source is not None:
-        rows.append(("File", source.as_posix()))
-        if source.is_file():
-            rows.append(("SHA-256", hashlib.sha256(source.read_bytes()).hexdigest()))
-    took = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in result.analysis.seconds.items())
-    if took:
-        rows.append(("Time taken", took))
     return tuple(rows)
 
 

@@ -29,7 +29,7 @@ def doubtful_parameters(result: Result) -> dict[str, str]:
     if is_unexplained(result) or misfit_is_clear(analysis):
         return dict.fromkeys(names, "part of the recording is unexplained")
     if closed is not None and "nonlinear" in families_of(result):
-        return dict.fromkeys(_moved(closed), "its error takes the fitted force as exact")
+        return dict.fromkeys(_moved(closed), "the posterior takes the fitted force as exact")
     return {}
 
 

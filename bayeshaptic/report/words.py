@@ -12,6 +12,7 @@ from bayeshaptic.report.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.figures.residuals import third_octaves
 from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear
 from bayeshaptic.report.quantities import estimate, interval, percent, pure, quantity
+from bayeshaptic.report.trust import doubtful_parameters
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -153,3 +154,33 @@ def hump(analysis: Analysis) -> str:
         f"More than one crossing may set the limit: {', '.join(parts)}. A mean or a single best "
         "fit hides this; the quantiles do not."
     )
+
+
+def doubtful(result: Result) -> str:
+    """Which parameters a misfit makes doubtful; empty where none is."""
+    found = doubtful_parameters(result)
+    if not found:
+        return ""
+    if len(found) == len(result.analysis.model.names):
+        (why,) = set(found.values())
+        return f"None of these intervals is to be trusted: {why}."
+    reasons = " or ".join(dict.fromkeys(found.values()))
+    return (
+        f"The intervals of {', '.join(found)} are not to be trusted ({reasons}): they may miss the "
+        "true value by many times their width. That of the limit is widened for it."
+    )
+
+
+def response_caption(result: Result) -> str:
+    """Under the frequency response."""
+    text = (
+        "Measured response (empirical transfer function estimate) with error bars of two standard "
+        "deviations, and the model's 90 % band. The band is often narrower than the line; the "
+        "third panel shows it enlarged."
+    )
+    closed = result.closed
+    if closed is not None and closed.effects and closed.force is None:
+        text += " Dashed: the model as declared, before what it lacked was added" + (
+            "; crosses: the response as it was measured." if correction(result) else "."
+        )
+    return text

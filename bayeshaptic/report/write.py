@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import InputError
-from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, draw_pictures
+from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.html import render
@@ -71,8 +71,8 @@ def _write_all(result: Result, folder: Path) -> None:
     pictures = draw_pictures(result)
     sections = _sections(result, folder)
     for part in (pictures, *(section.pictures for section in sections)):
-        for name, png in part.items():
-            (folder / f"{name}.png").write_bytes(png)
+        for name, drawn in part.items():
+            (folder / f"{name}.png").write_bytes(drawn.png)
     analysis.posterior.save(folder / "posterior.nc")
     page = render(result, pictures, [section.html for section in sections])
     (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
@@ -98,10 +98,8 @@ def _move(draft: Path, out: Path) -> None:
     if not out.exists():
         draft.rename(out)
         return
-    for picture in (
-        *LOOP_PICTURES,
-        *FORCE_PICTURES,
-    ):  # one of an older report would contradict this one
+    # One of an older report would contradict this one.
+    for picture in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES):
         if not (draft / f"{picture.name}.png").exists():
             (out / f"{picture.name}.png").unlink(missing_ok=True)
     for path in sorted(draft.iterdir(), key=lambda path: path.name == _LAST):

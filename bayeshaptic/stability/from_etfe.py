@@ -208,5 +208,5 @@ def _caveat(fits: list[LocalFit], side: Floats, lowest: float, unit: str) -> str
     stiffness, frequency = min(places)
     return (
         f"near {frequency:.3g} Hz the phase is nearer to -180 degrees than its noise; if it "
-        f"crosses there, the limit is {stiffness:.3g} {unit}"
+        f"crosses there, the limit is {float(f'{stiffness:.3g}'):,g} {unit}"
     )

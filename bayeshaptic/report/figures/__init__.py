@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import (
+    answer,
     crossings,
     marginals,
     pairs,
+    record,
     residuals,
     response,
     sampler,
@@ -25,14 +27,12 @@ from bayeshaptic.report.figures.loop import inverse as loop_inverse
 from bayeshaptic.report.figures.loop import residual as loop_residual
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.figures.loop import tests as loop_tests
-from bayeshaptic.report.figures.style import png
+from bayeshaptic.report.figures.style import Drawn, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bayeshaptic.diagnosis.closed import Closed
-
-__all__ = ["FORCE_PICTURES", "LOOP_PICTURES", "PICTURES", "Picture", "draw_pictures", "png"]
+__all__ = ["FORCE_PICTURES", "LOOP_PICTURES", "PICTURES", "Picture", "draw_pictures"]
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,23 @@ class Picture:
     name: str
     draw: Callable[[Any], Figure]
     alternative: str
-    shown: Callable[[Closed], bool] = lambda closed: True
+    shown: Callable[[Any], bool] = lambda result: True
 
 
 PICTURES = (
+    Picture(
+        "answer",
+        answer.draw,
+        "Model, deterministic fit, measurement and rules: each one's limit with its 90 % interval",
+    ),
     Picture("stiffness", stiffness.draw, "Distribution of the critical stiffness by crossing"),
     Picture("response", response.draw, "Measured gain, phase and coherence with the model's band"),
+    Picture(
+        "record",
+        record.draw,
+        "Force and position over time, their spectra, and how often each value occurs",
+        shown=record.is_shown,
+    ),
     Picture("residuals", residuals.draw, "Residual over frequency in units of the noise"),
     Picture("crossings", crossings.draw, "Stiffness and phase over frequency, with every crossing"),
     Picture("marginals", marginals.draw, "Posterior, prior and least squares of each parameter"),
@@ -88,12 +99,9 @@ FORCE_PICTURES = (
 )
 
 
-def draw_pictures(result: Result) -> dict[str, bytes]:
-    """Every figure of an analysis, or of a closed loop, as PNG, by name."""
-    found = {picture.name: png(picture.draw(result)) for picture in PICTURES}
-    closed = result.closed
+def draw_pictures(result: Result) -> dict[str, Drawn]:
+    """Every figure of an analysis, or of a closed loop, by name."""
+    chosen, closed = list(PICTURES), result.closed
     if closed is not None:
-        for picture in LOOP_PICTURES if closed.force is None else FORCE_PICTURES:
-            if picture.shown(closed):
-                found[picture.name] = png(picture.draw(closed))
-    return found
+        chosen += LOOP_PICTURES if closed.force is None else FORCE_PICTURES
+    return {p.name: drawn(p.draw(result), p.name) for p in chosen if p.shown(result)}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.estimates import correction
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import ResponseBand, response_band
 from bayeshaptic.report.quantities import pretty_unit
@@ -58,6 +59,7 @@ def draw(result: Result) -> Figure:
             zorder=3,
             label="model, posterior median",
         )
+    _before(gain, phase, result, modelled)
     style.legend(gain, loc="lower left")
     _difference(panels[2], etfe, band, 20 / np.log(10) * error)
     if known:
@@ -70,6 +72,29 @@ def draw(result: Result) -> Figure:
     panels[-1].set_xlabel("frequency, Hz", fontsize=style.FONT)
     figure.align_ylabels(panels)
     return figure
+
+
+def _before(gain: Axes, phase: Axes, result: Result, modelled: NDArray[Any]) -> None:
+    """The model as declared, and the response as measured, where they were changed."""
+    closed = result.closed
+    if closed is None or not closed.effects or closed.force is not None:
+        return
+    base, frequency = closed.base, closed.analysis.etfe.frequency_hz
+    if correction(result):
+        raw = base.etfe
+        near = np.interp(raw.frequency_hz, frequency, modelled)
+        look: dict[str, Any] = {"color": style.PRIOR, "markersize": 2.6, "zorder": 1}
+        gain.plot(raw.frequency_hz, raw.gain_db, "x", label="as measured", **look)
+        phase.plot(raw.frequency_hz, _near(raw.phase_deg, near), "x", **look)
+    declared = base.fit.response(frequency)
+    dashed: dict[str, Any] = {
+        "color": style.OTHER,
+        "linewidth": 1.1,
+        "linestyle": "--",
+        "zorder": 4,
+    }
+    gain.plot(frequency, 20 * np.log10(np.abs(declared)), label="model as declared", **dashed)
+    phase.plot(frequency, _near(np.degrees(np.angle(declared)), modelled), **dashed)
 
 
 def _difference(axes: Axes, etfe: Etfe, band: ResponseBand, error: NDArray[Any]) -> None:

@@ -24,13 +24,15 @@ LOG_BEYOND = 8.0  # a distribution wider than this factor is drawn on a logarith
 
 
 def draw(result: Result) -> Figure:
-    """The histogram by binding crossing above; every estimate of the limit on one axis below."""
-    analysis, rows = result.analysis, witnesses(result)
-    figure = style.new_figure(3.3 + 0.42 + 0.21 * len(rows))
-    top, bottom = figure.subplots(2, 1, height_ratios=(3.0, 0.42 + 0.21 * len(rows)))
-    _histogram(top, analysis, rows)
-    _forest(bottom, rows, analysis.limit.unit)
+    """The histogram by binding crossing, with risks, least squares and the measurement's own."""
+    figure = style.new_figure(3.3)
+    draw_on(figure.subplots(), result)
     return figure
+
+
+def draw_on(axes: Axes, result: Result) -> None:
+    """The same on axes that are there."""
+    _histogram(axes, result.analysis, witnesses(result))
 
 
 def _histogram(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...]) -> None:
@@ -170,35 +172,3 @@ def _decibel_axis(axes: Axes, row: Scale, unit: str) -> None:
     top.tick_params(labelsize=style.FONT - 0.5, width=0.6, length=3)
     top.spines["top"].set_linewidth(0.6)
     top.set_xlabel(f"dB re 1 {unit}", fontsize=style.FONT)
-
-
-def _forest(axes: Axes, rows: tuple[Witness, ...], unit: str) -> None:
-    """Every estimate of the limit, a row each, in dB."""
-    style.panel(axes, f"critical stiffness, dB re 1 {unit}")
-    axes.grid(False, axis="y")
-    for place, witness in enumerate(rows):
-        if witness.middle is None or witness.middle <= 0:
-            continue
-        middle = decibel(witness.middle)
-        reach = [[0.0], [0.0]]
-        if witness.low is not None and witness.high is not None and witness.low > 0:
-            ends = middle - decibel(witness.low), decibel(witness.high) - middle
-            reach = [[max(end, 0.0)] for end in ends]
-        ours = witness.key == "posterior"
-        axes.errorbar(
-            [middle],
-            [place],
-            xerr=reach,
-            fmt="o" if ours else "s",
-            color=style.MODEL if ours else style.DATA,
-            markersize=4.5 if ours else 3.5,
-            linewidth=2.0 if ours else 1.1,
-            capsize=3,
-            markerfacecolor=None if ours else "white",
-        )
-    axes.set_yticks(range(len(rows)), [row.label for row in rows])
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    low, high = axes.get_xlim()
-    if high - low < 1.0:
-        axes.set_xlim(0.5 * (low + high) - 0.5, 0.5 * (low + high) + 0.5)
-    axes.ticklabel_format(axis="x", useOffset=False)

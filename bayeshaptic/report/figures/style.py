@@ -8,6 +8,8 @@ style or marker.
 from __future__ import annotations
 
 import io
+import re
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ WIDTH_IN = 7.4  # the text width of an A4 page
 FONT = 8.5
 SMALL = 7.0
 DPI = 140
+MOST_SVG = 110_000  # characters: beyond, the PNG is the smaller one
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
@@ -95,8 +98,59 @@ def short(name: str) -> str:
     return "delay" if name == "delay_s" else name
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """A figure that is drawn.
+
+    Attributes
+    ----------
+    png : bytes
+        For the file beside the page.
+    svg : str or None
+        For the page itself; None where it is too large for one.
+    """
+
+    png: bytes = field(repr=False)
+    svg: str | None = field(default=None, repr=False)
+
+
+def drawn(figure: Figure, name: str) -> Drawn:
+    """The figure as PNG, and as SVG where that is small; `name` tells its parts from others'."""
+    vector = svg(figure, name)
+    return Drawn(png(figure), vector if len(vector) <= MOST_SVG else None)
+
+
 def png(figure: Figure) -> bytes:
     """The figure as PNG; the same figure gives the same bytes."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
+
+
+def svg(figure: Figure, name: str) -> str:
+    """The figure as an SVG element for a page; the same figure gives the same text.
+
+    Without what a page does not need; hundredths of a point are enough, and parts are named after
+    the figure, so that those of several figures do not meet.
+    """
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' d="([^"]*)"', lambda found: f' d="{_rounded(found[1])}"', text)
+    used = set(re.findall(r'href="#([^"]+)"', text)) | set(re.findall(r"url\(#([^)]+)\)", text))
+    names = {key: f"{name}-{number}" for number, key in enumerate(_ids(text)) if key in used}
+    text = re.sub(r' id="([^"]+)"', lambda m: f' id="{names[m[1]]}"' if m[1] in used else "", text)
+    text = re.sub(r'href="#([^"]+)"', lambda m: f'href="#{names[m[1]]}"', text)
+    text = re.sub(r"url\(#([^)]+)\)", lambda m: f"url(#{names[m[1]]})", text)
+    return re.sub(r">\s+<", "><", text).strip()
+
+
+def _ids(text: str) -> list[str]:
+    return list(dict.fromkeys(re.findall(r' id="([^"]+)"', text)))
+
+
+def _rounded(path: str) -> str:
+    path = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", path)
+    return " ".join(path.split())

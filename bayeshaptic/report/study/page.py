@@ -7,20 +7,35 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.report.assumptions import versions
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
-from bayeshaptic.report.html import LABELS, embedded, style, template, unique, written
+from bayeshaptic.report.html import LABELS, embedded, frame, template, unique, with_contents
 from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
 from bayeshaptic.report.study.headline import study_headline, what_binds
 from bayeshaptic.report.study.words import configurations, hands, missing, people
-from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
+    from bayeshaptic.report.figures.style import Drawn
     from bayeshaptic.study.analysis import StudyAnalysis
+
+
+_CONTENTS = (
+    ("summary", "Summary"),
+    ("limit", "Limit"),
+    ("people", "People"),
+    ("configurations", "Configurations"),
+    ("recordings", "Recordings"),
+    ("walls", "Walls"),
+    ("guidance", "What next"),
+    ("notices", "Warnings"),
+    ("missing", "What is missing"),
+    ("assumptions", "Assumptions"),
+    ("provenance", "Provenance"),
+)
 
 
 def render_study(
     study: StudyAnalysis,
-    pictures: Mapping[str, bytes],
+    pictures: Mapping[str, Drawn],
     pages: Mapping[str, str],
     parts: Sequence[str] = (),
 ) -> str:
@@ -29,8 +44,7 @@ def render_study(
     Parameters
     ----------
     study : StudyAnalysis
-    pictures : mapping of str to bytes
-        PNG by name.
+    pictures : mapping of str to Drawn
     pages : mapping of str to str
         Where each recording's own report is, relative to this page.
     parts : sequence of str
@@ -38,10 +52,9 @@ def render_study(
     """
     head = study_headline(study)
     words = {picture.name: picture.alternative for picture in STUDY_PICTURES}
-    return template("study.jinja").render(
+    page = template("study.jinja").render(
+        **frame(),
         study=study,
-        version=__version__,
-        style=style(),
         headline=head,
         label=LABELS[head.status],
         notices=unique(tuple(n for n in study.notices if n.topic != "recordings")),
@@ -59,11 +72,11 @@ def render_study(
         configurations=configurations(study),
         parts=tuple(parts),
         lacking=missing(study),
-        pictures={name: embedded(name, png, words.get(name, "")) for name, png in pictures.items()},
+        pictures={name: embedded(name, one, words.get(name, "")) for name, one in pictures.items()},
         assumptions=assumptions(study),
         versions=versions(),
-        written=written(),
     )
+    return with_contents(page, _CONTENTS)
 
 
 def _people_caption(study: StudyAnalysis) -> str:

@@ -78,8 +78,8 @@ def _write_all(study: StudyAnalysis, folder: Path, links: Mapping[str, str], wal
     pictures = draw_study_pictures(study)
     sections = _sections(study, folder) if walls else []
     for shown in (pictures, *(part.pictures for part in sections)):
-        for name, png in shown.items():
-            (folder / f"{name}.png").write_bytes(png)
+        for name, drawn in shown.items():
+            (folder / f"{name}.png").write_bytes(drawn.png)
     page = render_study(study, pictures, links, [part.html for part in sections])
     (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
     (folder / _LAST).write_text(population_json(study), encoding="utf-8", newline="\n")

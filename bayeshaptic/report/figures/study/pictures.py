@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from bayeshaptic.report.figures.study import configurations as study_configurations
 from bayeshaptic.report.figures.study import limit as study_limit
 from bayeshaptic.report.figures.study import people as study_people
-from bayeshaptic.report.figures.style import png
+from bayeshaptic.report.figures.style import Drawn, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,6 +49,6 @@ STUDY_PICTURES = (
 )
 
 
-def draw_study_pictures(study: StudyAnalysis) -> dict[str, bytes]:
-    """Every figure of a study as PNG, by name."""
-    return {p.name: png(p.draw(study)) for p in STUDY_PICTURES if p.shown(study)}
+def draw_study_pictures(study: StudyAnalysis) -> dict[str, Drawn]:
+    """Every figure of a study, by name."""
+    return {p.name: drawn(p.draw(study), p.name) for p in STUDY_PICTURES if p.shown(study)}

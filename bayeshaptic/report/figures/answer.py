@@ -1,0 +1,80 @@
+"""The answer at a glance: every estimate of the limit on one axis, and the stiffness to render."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.estimates import Witness, decibel, witnesses
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.quantities import estimate, quantity
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_NARROWEST_DB = 1.0
+_NAMES = {"posterior": "model, with its uncertainty", "least_squares": "deterministic fit"}
+
+
+def draw(result: Result) -> Figure:
+    """A row an estimate, in dB; the numbers stand at the right."""
+    rows = shown(result)
+    figure = style.new_figure(0.75 + 0.27 * max(len(rows), 1))
+    draw_on(style.panel(figure.subplots()), result)
+    return figure
+
+
+def shown(result: Result) -> tuple[Witness, ...]:
+    """The estimates that have a place on the axis."""
+    return tuple(w for w in witnesses(result) if w.middle is not None and w.middle > 0)
+
+
+def draw_on(axes: Axes, result: Result) -> None:
+    """The same on axes that are there."""
+    rows, unit = shown(result), result.analysis.limit.unit
+    style.panel(axes, f"critical stiffness, dB re 1 {unit}")
+    axes.grid(False, axis="y")
+    stiffness = headline(result).stiffness
+    if stiffness is not None:
+        axes.axvline(decibel(stiffness), color=style.CYCLE[2], linewidth=1.6, zorder=1)
+    for place, witness in enumerate(rows):
+        assert witness.middle is not None
+        middle, reach = decibel(witness.middle), [[0.0], [0.0]]
+        if witness.low is not None and witness.high is not None and witness.low > 0:
+            ends = middle - decibel(witness.low), decibel(witness.high) - middle
+            reach = [[max(end, 0.0)] for end in ends]
+        ours = witness.key == "posterior"
+        axes.errorbar(
+            [middle],
+            [place],
+            xerr=reach,
+            fmt="o" if ours else "s",
+            color=style.MODEL if ours else style.DATA,
+            markerfacecolor=style.MODEL if ours else "white",
+            markersize=5.5 if ours else 4,
+            linewidth=3.0 if ours else 1.2,
+            capsize=3,
+        )
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_yticks(range(len(rows)), [_NAMES.get(w.key, w.label) for w in rows])
+    low, high = axes.get_xlim()
+    if high - low < _NARROWEST_DB:
+        centre = 0.5 * (low + high)
+        axes.set_xlim(centre - _NARROWEST_DB / 2, centre + _NARROWEST_DB / 2)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    _numbers(axes, rows, unit)
+
+
+def _numbers(axes: Axes, rows: tuple[Witness, ...], unit: str) -> None:
+    right = axes.secondary_yaxis("right")
+    right.set_yticks(range(len(rows)), [_number(witness, unit) for witness in rows])
+    right.tick_params(labelsize=style.FONT - 0.5, length=0)
+    right.spines["right"].set_visible(False)
+
+
+def _number(witness: Witness, unit: str) -> str:
+    if witness.middle is None or witness.low is None or witness.high is None:
+        return quantity(witness.middle, unit, digits=4)
+    return estimate(witness.middle, witness.low, witness.high, unit)

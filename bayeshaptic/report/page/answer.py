@@ -1,0 +1,101 @@
+"""The first screen under the sentence: the interval, the model, what binds, how far to trust it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.quantities import estimate, percent, quantity
+from bayeshaptic.report.result import tip_limit
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.report.tables import Rows
+
+_WORTH_NAMING = 0.001
+# Of benchmarks/README.md: how often 90 % intervals of K_CR held the truth of simulated recordings,
+# and of how many; a test compares them.
+FARED = {
+    "consistent": (85, 100, "with nothing beside the model"),
+    "explained": (89, 150, "with an effect of the library"),
+    "unexplained": (94, 63, "with an effect that nothing promises to find"),
+}
+
+
+def facts(result: Result) -> Rows:
+    """(what, value): the interval, the tip, what binds, the model, whom it speaks for."""
+    analysis = result.analysis
+    limit, tip = analysis.limit, tip_limit(analysis)
+    rows: list[tuple[str, ...]] = [("Critical stiffness", _interval(limit))]
+    if tip is not None:
+        rows.append(("At the tip", _interval(tip)))
+    rows.append(("What binds", _binding(analysis)))
+    rows.append(("Model", _model(result)))
+    rows.append(("Speaks for", _holder(analysis)))
+    return tuple(rows)
+
+
+def fared(result: Result) -> str:
+    """How such intervals did where the truth is known; empty where the loop was left open."""
+    closed = result.closed
+    if closed is None or closed.force is not None:
+        return ""
+    held, count, which = FARED[closed.verdict]
+    return (
+        f"How such intervals fared: of {count} simulated recordings {which}, "
+        f"{held} % of the 90 % intervals held the true limit."
+    )
+
+
+def _interval(limit: Any) -> str:
+    low, middle, high = (limit.quantile(p) for p in (0.05, 0.5, 0.95))
+    if not all(math.isfinite(value) for value in (low, middle, high)):
+        return "none: stable with any stiffness" if low == math.inf else "not bounded above"
+    text = f"{estimate(middle, low, high, limit.unit)}, median and 90 % interval"
+    if low <= 0:
+        return text
+    levels = (limit.db(p) for p in (0.5, 0.05, 0.95))
+    return text + "; {:.1f} ({:.1f} to {:.1f}) dB".format(*levels)
+
+
+def _binding(analysis: Analysis) -> str:
+    likely = [c for c in analysis.limit.crossings if c.probability >= _WORTH_NAMING]
+    if not likely:
+        return "nothing"
+    alone = len(likely) == 1
+    return ", or ".join(
+        c.label if alone else f"{c.label} ({percent(c.probability)})" for c in likely
+    )
+
+
+def _model(result: Result) -> str:
+    analysis, closed = result.analysis, result.closed
+    structure = analysis.model.structure
+    text = f"{structure.name}: {structure.title.partition(', equation')[0]}"
+    if closed is not None and closed.effects:
+        text += f"; with {' and '.join(effect.title for effect in closed.effects)}"
+    return text
+
+
+def _holder(analysis: Analysis) -> str:
+    recording = analysis.recording
+    user = None if recording is None else recording.user
+    place = None if recording is None else recording.configuration
+    where = "" if place is None else f", configuration {place}"
+    if analysis.model.name == "grasped":
+        return f"{f'the grip of {user}' if user else 'the grip'} in this recording{where}"
+    if user:
+        return f"the device as {user} held it in this recording{where}"
+    return f"the device with nobody holding it{where}"
+
+
+def caption(result: Result) -> str:
+    """Under the bar of all estimates."""
+    analysis = result.analysis
+    level = analysis.limit.quantile(0.5)
+    said = f" (median {quantity(level, analysis.limit.unit)})" if math.isfinite(level) else ""
+    return (
+        f"Every estimate of the limit on one axis{said}: bars are 90 % intervals, the vertical "
+        "line is the stiffness of the sentence above. The rules hold for rigid devices only."
+    )

@@ -1,0 +1,91 @@
+"""The four lights of the first screen: recording, fit, loop, sampler."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+GOOD, DOUBT, BAD = "good", "doubt", "bad"
+SIGNS = {GOOD: "\N{CHECK MARK}", DOUBT: "!", BAD: "\N{MULTIPLICATION SIGN}"}
+_SEEN = {
+    "consistent": (GOOD, "nothing to find"),
+    "explained": (GOOD, "explained"),
+    "unexplained": (DOUBT, "unexplained"),
+}
+# Warnings of these topics are of the fit, the loop or the sampler, and shown by their lights.
+_ELSEWHERE = {"misfit", "unexplained", "residual", "critical stiffness"}
+_SPOILING = {"feedback"}
+
+
+@dataclass(frozen=True)
+class Light:
+    """One light.
+
+    Attributes
+    ----------
+    name : str
+        "Recording", "Fit", "Loop" or "Sampler".
+    state : {"good", "doubt", "bad"}
+    word : str
+        What it is, in two or three words.
+    section : str
+        Where on the page more of it stands.
+    """
+
+    name: str
+    state: str
+    word: str
+    section: str
+
+    @property
+    def sign(self) -> str:
+        """What stands for the colour where there is none."""
+        return SIGNS[self.state]
+
+
+def lights(result: Result) -> tuple[Light, ...]:
+    """The four lights of a result."""
+    analysis = result.analysis
+    return _recording(analysis), _fit(analysis), _loop(result), _sampler(analysis)
+
+
+def _recording(analysis: Analysis) -> Light:
+    found = {n.topic for n in analysis.notices if n.level == "warning"} - _ELSEWHERE
+    if found & _SPOILING:
+        return Light("Recording", BAD, "feedback", "notices")
+    if found:
+        return Light("Recording", DOUBT, ", ".join(sorted(found)), "notices")
+    return Light("Recording", GOOD, "no objection", "measured")
+
+
+def _fit(analysis: Analysis) -> Light:
+    if misfit_is_clear(analysis):
+        return Light("Fit", BAD, f"{misfit_factor(analysis)} times the noise", "leftover")
+    if misfit_is_faint(analysis):
+        return Light("Fit", DOUBT, "slightly above noise", "leftover")
+    return Light("Fit", GOOD, "noise is left", "leftover")
+
+
+def _loop(result: Result) -> Light:
+    closed = result.closed
+    if closed is None:
+        return Light("Loop", DOUBT, "left open", "assumptions")
+    section = "force" if closed.force is not None else "lacked"
+    state, word = _SEEN[closed.verdict]
+    if state == GOOD and misfit_is_clear(closed.analysis):
+        return Light("Loop", BAD, "misfit remains", section)
+    return Light("Loop", state, word, section)
+
+
+def _sampler(analysis: Analysis) -> Light:
+    if not analysis.posterior.converged:
+        return Light("Sampler", BAD, "not converged", "sampler")
+    if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
+        return Light("Sampler", BAD, "limits not confirmed", "sampler")
+    return Light("Sampler", GOOD, "converged", "sampler")

@@ -1,0 +1,118 @@
+"""A methods paragraph to paste, true for this run, with its references as BibTeX."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.quantities import interval, quantity
+from bayeshaptic.report.result import is_unexplained
+from bayeshaptic.version import __version__
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.recordings.response.etfe import Etfe
+
+_BIBTEX = {
+    "diaz2010": """@article{diaz2010,
+  author = {D{\\'i}az, I{\\~n}aki and Gil, Jorge Juan},
+  title = {Influence of Vibration Modes and Human Operator on the Stability of Haptic Rendering},
+  journal = {IEEE Transactions on Robotics},
+  volume = {26}, number = {1}, year = {2010}
+}""",
+    "emcee": """@article{emcee,
+  author = {Foreman-Mackey, Daniel and Hogg, David W. and Lang, Dustin and Goodman, Jonathan},
+  title = {emcee: The {MCMC} Hammer},
+  journal = {Publications of the Astronomical Society of the Pacific},
+  volume = {125}, number = {925}, pages = {306--312}, year = {2013}
+}""",
+    "pintelon2012": """@book{pintelon2012,
+  author = {Pintelon, Rik and Schoukens, Johan},
+  title = {System Identification: A Frequency Domain Approach},
+  publisher = {Wiley-IEEE Press}, edition = {2}, year = {2012}
+}""",
+    "vehtari2021": """@article{vehtari2021,
+  author = {Vehtari, Aki and Gelman, Andrew and Simpson, Daniel and Carpenter, Bob
+    and B{\\"u}rkner, Paul-Christian},
+  title = {Rank-normalization, folding, and localization: an improved $\\widehat{R}$ for assessing
+    convergence of {MCMC}},
+  journal = {Bayesian Analysis}, volume = {16}, number = {2}, pages = {667--718}, year = {2021}
+}""",
+    "kennedy2001": """@article{kennedy2001,
+  author = {Kennedy, Marc C. and O'Hagan, Anthony},
+  title = {Bayesian calibration of computer models},
+  journal = {Journal of the Royal Statistical Society: Series B},
+  volume = {63}, number = {3}, pages = {425--464}, year = {2001}
+}""",
+}
+
+
+def methods(result: Result) -> str:
+    """What was done, in one paragraph with the keys of its references in square brackets."""
+    analysis = result.analysis
+    return " ".join(
+        (*_measured(analysis.etfe), _model(analysis), _sampled(analysis), *_loop(result), _limit())
+    )
+
+
+def bibtex(result: Result) -> str:
+    """The references that `methods` names."""
+    text = methods(result)
+    return "\n\n".join(entry for key, entry in _BIBTEX.items() if f"[{key}]" in text)
+
+
+def _measured(etfe: Etfe) -> tuple[str, ...]:
+    band = interval(*etfe.band_hz, "Hz")
+    if etfe.recording is None:
+        return (f"The frequency response was given as a table ({band}).",)
+    length = quantity(etfe.recording.duration_s, "s")
+    rate = quantity(1 / etfe.period_s, "Hz")
+    how = (
+        "by a local polynomial method [pintelon2012] in windows of neighbouring lines"
+        if etfe.period_lines is None
+        else f"at the {etfe.period_lines} excited lines of its steady periods"
+    )
+    return (
+        f"The device's response to a commanded force was recorded for {length} at {rate}, and "
+        f"estimated {how} with its noise ({band}).",
+    )
+
+
+def _model(analysis: Analysis) -> str:
+    model = analysis.model
+    return (
+        f"A mechanism of {model.size} parameters ({model.structure.title}) with an exact "
+        "zero-order hold and a fractional loop delay [diaz2010] was fitted to it."
+    )
+
+
+def _sampled(analysis: Analysis) -> str:
+    posterior = analysis.posterior
+    ensembles, steps, walkers, _ = posterior.chains.shape
+    least = min(posterior.ess_bulk.min(), posterior.ess_tail.min())
+    return (
+        f"Its posterior was sampled with {ensembles} independent ensembles of {walkers} walkers "
+        f"[emcee] for {steps} steps (largest R-hat {posterior.rhat.max():.3f}, at least "
+        f"{least:.0f} effective draws a parameter [vehtari2021])."
+    )
+
+
+def _loop(result: Result) -> tuple[str, ...]:
+    closed = result.closed
+    if closed is None:
+        return ()
+    found = " and ".join(effect.title for effect in closed.effects)
+    count = len(closed.traced.before)
+    text = f"The residual was put to {count} tests for effects that the model lacks"
+    text += f", and {found} was added." if found else "; none was added."
+    if is_unexplained(result):
+        text += " What remained unexplained widens the limit by a random discrepancy [kennedy2001]."
+    return (text,)
+
+
+def _limit() -> str:
+    return (
+        "The critical stiffness is the smallest stiffness at which the sampled loop loses "
+        "stability [diaz2010], found for every draw over all crossings of the response. The "
+        f"analysis was made with bayeshaptic {__version__}."
+    )
