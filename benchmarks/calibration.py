@@ -22,7 +22,7 @@ from bayeshaptic.rig.noise import tremor_density, wander_density
 from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.stability.critical import critical_stiffness
 
-_MOST_STEPS = 2500  # a run that has not converged by then is counted as it is
+_MOST = 640_000  # evaluations: a run that has not converged by then is counted as it is
 CASES = ("lhifam free", "lhifam grasped", "phantom free", "phantom grasped")
 
 
@@ -107,7 +107,7 @@ def one_recording(case: str, seed: int, ess: float = 2000, seconds: float = 30.0
     began = time.process_time()
     fit = least_squares(model, etfe)
     fitted = time.process_time()
-    posterior = sample(model, etfe, start=fit, ess=ess, seed=seed, most_steps=_MOST_STEPS)
+    posterior = sample(model, etfe, start=fit, ess=ess, seed=seed, most_evaluations=_MOST)
     sampled = time.process_time()
     limit = critical_stiffness(posterior, max_draws=8000)
     draws = posterior.draws

@@ -38,13 +38,13 @@ def test_the_least_of_two_independent_cases() -> None:
     assert found.probability_unstable(95.0) == pytest.approx(below, abs=0.006)
 
 
-def test_safe_wants_twenty_draws_below() -> None:
+def test_safe_wants_draws_in_the_tail() -> None:
     rng = np.random.default_rng(2)
-    found = device_limit([case("nobody holds it", rng.normal(100, 5, 1900))])
+    found = device_limit([case("nobody holds it", rng.normal(100, 5, 500))])
     assert found.safe(0.05) == pytest.approx(100 - 1.645 * 5, abs=1.0)
     assert found.safe(0.01) is None and found.safe(0.001) is None
     many = [
-        case("nobody holds it", rng.normal(100, 5, 1900)),
+        case("nobody holds it", rng.normal(100, 5, 500)),
         case("user ana", 1e6 + rng.normal(size=60_000)),
     ]
     assert device_limit(many).safe(0.01) is None  # draws of a case that never binds do not count
@@ -52,7 +52,7 @@ def test_safe_wants_twenty_draws_below() -> None:
 
 def test_few_draws_of_the_binding_case_limit_the_whole() -> None:
     rng = np.random.default_rng(3)
-    few, plenty = rng.normal(100, 5, 1000), rng.normal(100, 5, 50_000)
+    few, plenty = rng.normal(100, 5, 400), rng.normal(100, 5, 50_000)
     both = device_limit([case("nobody holds it", few), case("user ana", plenty)])
     assert both.safe(0.05) is not None and both.safe(0.01) is None
     alone = device_limit([case("user ana", plenty)])

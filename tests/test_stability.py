@@ -348,7 +348,8 @@ def test_quantiles_and_risk():
     assert limit.safe(0.05) == pytest.approx(limit.quantile(0.05))
     assert limit.probability_unstable(limit.quantile(0.3)) == pytest.approx(0.3, abs=1e-3)
     assert limit.safe(0.01) is not None  # 38 below
-    assert limit.safe(0.001) is None  # 4 below
+    tail = limit.low_quantile(0.001)  # 4 below: a fitted tail
+    assert tail.fitted and tail.value == limit.safe(0.001) < limit.safe(0.01)
     # The first vector of the first walker is the first sample, the last of the last the last.
     chains = posterior.chains
     ends = critical_stiffness(posterior.model, np.stack([chains[0, 0, 0], chains[-1, -1, -1]]))
@@ -361,7 +362,8 @@ def test_correlated_draws_are_not_counted_as_independent():
     limit = critical_stiffness(sticky)
     assert len(limit.samples) == 32_000
     assert limit.effective < 4500
-    assert limit.safe(0.005) is None  # 160 draws below, and 16 effective ones
+    # 160 draws below, and 16 effective ones
+    assert limit.low_quantile(0.005).fitted and not limit.low_quantile(0.01).fitted
 
 
 def test_long_posteriors_are_thinned_along_the_chains():

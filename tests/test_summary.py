@@ -137,8 +137,11 @@ def test_numbers_are_those_of_the_analysis() -> None:
 
 
 def test_a_risk_that_the_draws_cannot_tell_is_null() -> None:
-    # 3200 draws: 3 of them lie below the stiffness of 0.1 % risk.
-    assert summary(fake_analysis())["critical_stiffness"]["safe"]["0.001"] is None
+    # Of 256 draws 13 lie in the lowest 5 %: too few to fit a tail to.
+    analysis = fake_analysis()
+    few = analysis.limit.samples[:256]
+    analysis.limit = dataclasses.replace(analysis.limit, samples=few)
+    assert summary(analysis)["critical_stiffness"]["safe"]["0.001"] is None
 
 
 def test_a_parameter_at_its_bound_has_no_error_bar() -> None:

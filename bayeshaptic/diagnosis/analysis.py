@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device
-from bayeshaptic.diagnosis.options import REPORT_ESS, Options, measurement_of
+from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
+from bayeshaptic.diagnosis.options import Options, measurement_of
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.choose import Choice, choose_model
 from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
@@ -20,13 +21,14 @@ from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
-from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
+from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
-from bayeshaptic.stability.tail import TailWatch
 from bayeshaptic.threads import single_threaded
 
+# Evaluations of the likelihood that one posterior may take.
+_MOST_EVALUATIONS = 400_000
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
-_MISFIT_STEPS = 1500
+_MISFIT_EVALUATIONS = 100_000
 
 
 @dataclass(frozen=True)
@@ -182,6 +184,7 @@ def finish(
     etfe: Etfe,
     fit: Fit,
     options: Options,
+    small_risks: bool = True,
 ) -> Analysis:
     """Sample a fit's posterior and find its critical stiffness.
 
@@ -193,25 +196,26 @@ def finish(
     fit : Fit
         Of the base model, or of the model with its effects.
     options : Options
+    small_risks : bool
+        Whether the stiffness at a small risk is to be known, too.
     """
     clock = _Clock(dict(begun.seconds))
     scale = fit.reduced_chi_square if fit.reduced_chi_square > MISFIT else 1.0
-    # A misfit's tail means nothing, and a short run for comparison needs none.
-    watch = TailWatch(fit.model) if scale == 1.0 and options.ess >= REPORT_ESS else None
+    # A misfit's tail means nothing, and a limit for comparison needs none.
+    watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
     with clock.stage("sampling"):
         posterior = sample(
             fit.model,
             etfe,
             start=_with_noise(fit, scale),
-            ess=options.ess,
             seed=options.seed,
             progress=options.within(0.1, 0.8).report,
-            until=watch.steps_wanted if watch else None,
-            **({"most_steps": _MISFIT_STEPS} if scale > 1 else {}),
+            most_evaluations=_MISFIT_EVALUATIONS if scale > 1 else _MOST_EVALUATIONS,
+            **({"rule": watch} if options.ess is None else {"ess": options.ess}),
         )
     with clock.stage("critical stiffness"):
         options.report(0.8, "critical stiffness")
-        limit = watch.limit_of(posterior) if watch else critical_stiffness(posterior)
+        limit = watch.limit_of(posterior)
         etfe_limit = etfe_critical_stiffness(etfe, seed=options.seed)
     options.report(0.9, "writing the report")
     return Analysis(

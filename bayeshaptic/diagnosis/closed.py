@@ -34,8 +34,6 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
 
-_BEFORE_ESS = 1000
-
 
 @dataclass(frozen=True)
 class Closed:
@@ -147,7 +145,8 @@ def close_loop(
         begun,
         begun.etfe,
         begun.fit,
-        replace(chosen.within(0.4, 0.6), ess=_BEFORE_ESS if changed else chosen.ess),
+        chosen.within(0.4, 0.6),
+        small_risks=not changed,
     )
     analysis = base
     if changed:

@@ -16,10 +16,6 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Progress
 
-# Effective draws of every parameter that a report asks for; sampling then goes on until 20 lie
-# below the critical stiffness of 0.1 % risk.
-REPORT_ESS = 4000
-
 
 @dataclass(frozen=True)
 class Options:
@@ -39,8 +35,9 @@ class Options:
         Whether somebody held the device; unknown by default.
     lever_m : float or None
         From the axis to the tip; by default the device's.
-    ess : float
-        Effective draws of every parameter.
+    ess : float or None
+        Effective draws of every parameter; by default what the limit wants
+        (`bayeshaptic.diagnosis.limit_known`).
     seed : int
     progress : callable or None
         Called with the share done, 0 to 1, and a word about it.
@@ -53,7 +50,7 @@ class Options:
     prior: Mapping[str, Prior] = field(default_factory=dict)
     held: bool | None = None
     lever_m: float | None = None
-    ess: float = REPORT_ESS
+    ess: float | None = None
     seed: int = 0
     progress: Progress | None = field(default=None, compare=False)
 

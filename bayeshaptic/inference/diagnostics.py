@@ -10,6 +10,11 @@ from bayeshaptic.inference.arviz_statistics import effective_sample_size, split_
 from bayeshaptic.types import Floats
 
 RHAT_LIMIT = 1.01
+# Draws that a statistic is computed from: R-hat is known to a few thousandths from so many, and
+# effective draws can be counted from ten times as many as are asked for.
+_FOR_RHAT = 8000
+_FOR_ESS = 10.0
+_FEWEST_STEPS = 16  # of a chain, for its autocorrelation
 
 
 @dataclass(frozen=True)
@@ -19,8 +24,7 @@ class Diagnostics:
     Attributes
     ----------
     rhat : ndarray, shape (P,)
-        Rank-normalised split R-hat with each ensemble as a chain (the walkers of one ensemble are
-        not independent chains).
+        Rank-normalised split R-hat with each ensemble as a chain.
     ess_bulk, ess_tail : ndarray, shape (P,)
         Effective sample sizes with each walker as a chain (interleaved walkers would look like
         far too many draws).
@@ -31,23 +35,44 @@ class Diagnostics:
     ess_tail: Floats
 
     @property
+    def fewest(self) -> Floats:
+        """Effective sample size of every column, bulk or tail, shape (P,)."""
+        return np.minimum(self.ess_bulk, self.ess_tail)
+
+    @property
     def ess(self) -> float:
         """The smallest effective sample size, bulk or tail, of any column."""
-        return float(min(self.ess_bulk.min(), self.ess_tail.min()))
+        return float(self.fewest.min())
 
 
-def diagnose(chains: Floats) -> Diagnostics:
+def diagnose(chains: Floats, ess: float | None = None) -> Diagnostics:
     """Diagnostics of chains of shape (ensembles, steps, walkers, P).
 
     A. Vehtari, A. Gelman, D. Simpson, B. Carpenter, P.-C. Buerkner, "Rank-normalization, folding,
     and localization: an improved R-hat", Bayesian Analysis 16 (2021); computed by ArviZ.
+
+    Parameters
+    ----------
+    chains : ndarray
+    ess : float, optional
+        So many effective draws are of interest: longer chains are thinned to ten times that.
     """
-    ensembles, steps, walkers, size = chains.shape
+    few = thinned(chains, _FOR_RHAT)
+    ensembles, steps, walkers, size = few.shape
     # A whole ensemble as a chain, in the order of time.
-    as_ensembles = chains.reshape(ensembles, steps * walkers, size)
-    as_walkers = chains.transpose(0, 2, 1, 3).reshape(ensembles * walkers, steps, size)
+    as_ensembles = few.reshape(ensembles, steps * walkers, size)
+    counted = chains if ess is None else thinned(chains, _FOR_ESS * ess)
+    as_walkers = counted.transpose(0, 2, 1, 3).reshape(ensembles * walkers, -1, size)
     return Diagnostics(
         np.array([split_rhat(as_ensembles[..., p]) for p in range(size)]),
         np.array([effective_sample_size(as_walkers[..., p], "bulk") for p in range(size)]),
         np.array([effective_sample_size(as_walkers[..., p], "tail") for p in range(size)]),
     )
+
+
+def thinned(chains: Floats, draws: float) -> Floats:
+    """Every so many steps of chains (ensembles, S, walkers, P), at least `draws` draws if there."""
+    ensembles, steps, walkers = chains.shape[:3]
+    wanted = max(draws / (ensembles * walkers), _FEWEST_STEPS)
+    every = max(int(steps / wanted), 1)
+    return chains[:, every - 1 :: every]

@@ -21,7 +21,7 @@ from bayeshaptic.types import Floats
 
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
-_REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
+REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
 _KEPT_STARTS = 24
 _REWINDOWINGS = 2
 
@@ -147,7 +147,7 @@ def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
 def search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
     """The coordinates of a fit, and its bounds in them."""
     here = coordinates(model)
-    low, high = (here.coordinate(bound) for bound in reach(model, _REACH_SDS))
+    low, high = (here.coordinate(bound) for bound in reach(model, REACH_SDS))
     return here, low, high
 
 

@@ -91,16 +91,7 @@ class Posterior:
 
         Compared in the coordinate of sampling, by the central 68 % ranges.
         """
-        out = {}
-        for name, column in zip(self.names, self.draws.T, strict=True):
-            prior = self.model.prior(name)
-            log = prior.coordinate == "log"
-            own = np.quantile(column, [0.16, 0.84])
-            believed = prior.quantile([0.16, 0.84])
-            if log:
-                own, believed = np.log(own), np.log(believed)
-            out[name] = bool(np.ptp(own) > _DOMINATED * np.ptp(believed))
-        return out
+        return dict(zip(self.names, prior_dominated(self.model, self.draws), strict=True))
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Mean, sd, quantiles, unit and diagnostics of every parameter, by name."""
@@ -128,3 +119,16 @@ class Posterior:
     def save(self, path: str | Path) -> Path:
         """Write it to `path` as netCDF for `load_posterior`; never leaves half a file."""
         return save_posterior(self, Path(path))
+
+
+def prior_dominated(model: Model, draws: Floats) -> list[bool]:
+    """Whether `draws`, shape (n, P), of each parameter are hardly narrower than its prior."""
+    out = []
+    for name, column in zip(model.names, draws.T, strict=True):
+        prior = model.prior(name)
+        own = np.quantile(column, [0.16, 0.84])
+        believed = prior.quantile([0.16, 0.84])
+        if prior.coordinate == "log":
+            own, believed = np.log(own), np.log(believed)
+        out.append(bool(np.ptp(own) > _DOMINATED * np.ptp(believed)))
+    return out

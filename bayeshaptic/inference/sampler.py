@@ -4,33 +4,59 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.coordinates import sampling_coordinates
-from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.coordinates import reach, sampling_coordinates
+from bayeshaptic.inference.least_squares import (
+    REACH_SDS,
+    Fit,
+    least_squares,
+    summarise,
+    weighted_residuals,
+)
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
-from bayeshaptic.inference.sampling.ensembles import Ensemble, refitted, warmed_up
+from bayeshaptic.inference.sampling.ensembles import (
+    ENSEMBLES,
+    WALKERS,
+    Ensembles,
+    LogDensity,
+    refitted,
+    warmed_up,
+)
 from bayeshaptic.inference.sampling.importance import adapt
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
+from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
+from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
-Until = Callable[[Floats], int]
-"""Called with the chains (ensembles, S, walkers, P): how many steps they should have in all."""
-
 DEFAULT_ESS = 2000
-_FIRST_STEPS = 100
-_PATIENCE = 2.0  # a run that must still grow by this factor is better begun again,
-_MIXED = 0.06  # unless it has this many effective draws a draw: an autocorrelation of 16 steps
+MOST_EVALUATIONS = 1_500_000
+_FIRST_STEPS = 32
+_MARGIN = 1.1  # a forecast of the steps that are needed, and a little further
+_LEAST_GROWTH, _MOST_GROWTH = 1.3, 2.0
+_MIXED = 0.06  # effective draws a draw, an autocorrelation of 16 steps: below, a proposal is refit
 _REFITS = 4
-_MOST_STEPS = 6000
+_POLISH, _SETTLED = 200, 1e-3  # steps of the fit, at most, and the gain that is none
+
+
+@dataclass
+class _Counted:
+    """A density that counts how often it is evaluated."""
+
+    density: LogDensity
+    count: int = 0
+
+    def __call__(self, phi: Floats) -> Floats:
+        self.count += len(np.atleast_2d(phi))
+        return self.density(phi)
 
 
 @single_threaded
@@ -41,14 +67,15 @@ def sample(
     ess: float = DEFAULT_ESS,
     seed: int = 0,
     progress: Progress | None = None,
-    most_steps: int = _MOST_STEPS,
-    until: Until | None = None,
+    most_evaluations: int = MOST_EVALUATIONS,
+    rule: Rule | None = None,
 ) -> Posterior:
     """Draw from the posterior of `model`'s parameters given `etfe`.
 
     A Student t proposal is fitted to the peak, adapted by importance sampling and by a warm-up,
     and frozen; four independent emcee ensembles of 64 walkers then run until R-hat between
-    ensembles is below 1.01 and every parameter has `ess` effective draws, bulk and tail.
+    ensembles is below 1.01 and every parameter has `ess` effective draws, bulk and tail.  They are
+    looked at where they have grown by up to twice.
 
     Parameters
     ----------
@@ -62,11 +89,12 @@ def sample(
         Same seed, same draws.
     progress : callable, optional
         Called with the share done and a word about it.
-    most_steps : int
-        Steps of an ensemble after which to give up; the result then says it has not converged.
-    until : callable, optional
-        Called with the converged chains, shape (ensembles, S, walkers, P): how many steps they
-        should have in all.  For what needs more draws than the parameters do.
+    most_evaluations : int
+        Evaluations of the likelihood after which to give up, a cap that is the same on every
+        machine; the result then says it has not converged.
+    rule : callable, optional
+        What to ask for instead of `ess`: judges chains of natural values, shape (ensembles, S,
+        walkers, P), and returns a `bayeshaptic.inference.stopping.Verdict`.
 
     Returns
     -------
@@ -87,36 +115,33 @@ def sample(
     began = time.perf_counter()
     report = progress or (lambda share, word: None)
     fit = start if start is not None else least_squares(model, etfe, seed=seed)
+    asked = rule or EveryParameter(fit.model, ess)
     report(0.02, "finding the peak")
+    fit = _converged(fit)
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     density = Density(fit.likelihood, here)
     seeds = np.random.SeedSequence(seed)
     tune, run, refit = seeds.spawn(3)
     peak, proposal = laplace(density, start_of(here, fit))
     report(0.1, "adapting the proposal")
-    adapted = adapt(density, proposal, np.random.default_rng(tune))
+    counted = _Counted(density)
+    adapted = adapt(counted, proposal, np.random.default_rng(tune))
     report(0.2, "warming up")
-    ensembles = warmed_up(density, adapted, run, peak, redrawing(here, fit))
-    more = until or (lambda natural: natural.shape[1])
-    chains, found = _run(
+    ensembles = warmed_up(counted, adapted, run, peak, redrawing(here, fit))
+    chains, found, verdict = _run(
         ensembles,
-        ess,
-        most_steps,
-        lambda phi: more(here.natural(phi)),
+        lambda phi: asked(here.natural(phi)),
+        lambda: most_evaluations - counted.count,
         report,
         np.random.default_rng(refit),
     )
-    natural = here.natural(chains)
-    log_likelihood = _log_likelihoods(density, chains, found)
-    diagnostics = diagnose(natural)
-    converged = _is_done(diagnostics, ess)
     return Posterior(
         fit.model,
-        natural,
-        log_likelihood,
-        diagnostics,
-        converged,
-        _message(fit.model, diagnostics, ess, converged, chains.shape[1]),
+        here.natural(chains),
+        _log_likelihoods(density, chains, found),
+        verdict.diagnostics,
+        verdict.done,
+        _message(verdict, counted.count),
         time.perf_counter() - began,
         seed,
         fit.windows,
@@ -124,56 +149,54 @@ def sample(
     )
 
 
+def _converged(fit: Fit) -> Fit:
+    """The fit, followed to its optimum along ridges that are straight in sampling coordinates.
+
+    In the logarithms of a fit they are bent, and it may have stopped halfway.
+    """
+    here = sampling_coordinates(fit.model, fit.theta, fit.sd)
+    low, high = (here.coordinate(end) for end in reach(fit.model, REACH_SDS))
+    start = here.coordinate(fit.theta[None])
+    residuals = weighted_residuals(fit.likelihood, here)
+    phi, _ = minimise(residuals, start, low, high, _POLISH, _SETTLED)
+    return summarise(fit.model, fit.windows, here.natural(phi)[0], fit.starts)
+
+
 def _run(
-    ensembles: list[Ensemble],
-    ess: float,
-    most_steps: int,
-    until: Until,
+    ensembles: Ensembles,
+    rule: Rule,
+    left: Callable[[], int],
     report: Progress,
     rng: np.random.Generator,
-) -> tuple[Floats, Floats]:
-    """Advance all ensembles side by side until they are done, forecasting how far to go.
+) -> tuple[Floats, Floats, Verdict]:
+    """Advance all ensembles until they are done, or no evaluations are `left`.
 
-    Where that is far, the proposal is fitted again to the draws at hand, and these are thrown
-    away: what is kept comes from one frozen proposal.
+    Where they mix badly, the proposal is fitted again to the draws at hand, and these are thrown
+    away: what is kept comes from one frozen proposal.  Where that does not help, only every so many
+    steps are kept: neighbours say the same.
     """
-    chains: list[Floats] = []
-    densities: list[Floats] = []
-    gone, steps, more, refits = 0, 0, min(_FIRST_STEPS, most_steps), 0
+    kept: list[tuple[Floats, Floats]] = []
+    steps, more, every, refits = 0, _FIRST_STEPS, 1, 0
     while True:
-        advanced = []
-        for index, ensemble in enumerate(ensembles):
-            advanced.append(ensemble.advance(more))
-            share = 0.25 + 0.75 * (steps + more * (index + 1) / len(ensembles)) / (steps + more)
-            report(min(share, 0.99), f"step {gone + more}")
-        chains.append(np.stack([chain for chain, _ in advanced]))
-        densities.append(np.stack([values for _, values in advanced]))
-        gone, steps = gone + more, steps + more
-        joined = np.concatenate(chains, axis=1)
-        diagnostics = diagnose(joined)
-        done = _is_done(diagnostics, ess)
-        if done and gone < most_steps:
-            more = min(until(joined) - steps, most_steps - gone)
-            if more > 0:
-                continue
-        if done or gone >= most_steps:
-            return joined, np.concatenate(densities, axis=1)
-        # Effective draws grow with the steps: go as far as that promises, and a little further.
-        wanted = 1.05 * steps * ess / max(diagnostics.ess, 1.0)
-        slow = diagnostics.ess < _MIXED * joined[..., 0].size and wanted > _PATIENCE * steps
-        again = refits < _REFITS and 4 * more <= most_steps - gone
-        if (slow or diagnostics.rhat.max() > RHAT_LIMIT) and again:
-            ensembles = refitted(ensembles, joined, np.concatenate(densities, axis=1), rng)
-            more, steps, refits = 2 * more, 0, refits + 1
-            chains.clear()
-            densities.clear()
-        else:
-            more = int(np.clip(wanted - steps, _FIRST_STEPS, 4 * steps))
-        more = min(more, most_steps - gone)
-
-
-def _is_done(diagnostics: Diagnostics, ess: float) -> bool:
-    return bool(diagnostics.ess >= ess and diagnostics.rhat.max() < RHAT_LIMIT)
+        report(0.25 + 0.74 * steps / (steps + more), f"step {every * (steps + more)}")
+        kept.append(ensembles.advance(more, every))
+        chains, values = (np.concatenate(part, axis=1) for part in zip(*kept, strict=True))
+        verdict = rule(chains)
+        steps = chains.shape[1]
+        affordable = left() // (ENSEMBLES * WALKERS * every)
+        if verdict.done or affordable < _FIRST_STEPS:
+            return chains, values, verdict
+        slow = verdict.diagnostics.ess < _MIXED * values.size
+        if slow and refits < _REFITS and 2 * every * steps <= affordable * every:
+            ensembles = refitted(ensembles, chains, values, rng)
+            more, steps, every, refits = 2 * every * steps, 0, 1, refits + 1
+            kept.clear()
+            continue
+        if np.median(verdict.diagnostics.fewest) < _MIXED * values.size and steps > _FIRST_STEPS:
+            kept, steps, every = [(chains[:, 1::2], values[:, 1::2])], steps // 2, 2 * every
+        growth = _MARGIN / max(verdict.share, 1e-3)
+        growth = float(np.clip(growth, _LEAST_GROWTH, _MOST_GROWTH))
+        more = max(min(int((growth - 1) * steps), affordable), 1)
 
 
 def _log_likelihoods(density: Density, chains: Floats, values: Floats) -> Floats:
@@ -184,20 +207,11 @@ def _log_likelihoods(density: Density, chains: Floats, values: Floats) -> Floats
     return values - prior.reshape(values.shape)
 
 
-def _message(
-    model: Model, diagnostics: Diagnostics, ess: float, converged: bool, steps: int
-) -> str:
-    worst = model.names[int(np.argmax(diagnostics.rhat))]
-    fewest = np.minimum(diagnostics.ess_bulk, diagnostics.ess_tail)
-    least = model.names[int(np.argmin(fewest))]
-    facts = (
-        f"R-hat between the independent ensembles is at most {diagnostics.rhat.max():.4f} "
-        f"({worst}) and every parameter has at least {fewest.min():.0f} effective draws, "
-        f"bulk and tail ({least} has the fewest)"
-    )
-    if converged:
-        return f"Converged because {facts}."
+def _message(verdict: Verdict, evaluations: int) -> str:
+    if verdict.done:
+        return f"Converged because {verdict.facts}."
     return (
-        f"Not converged after {steps} steps: {facts}, where {RHAT_LIMIT} and {ess:.0f} were asked "
-        "for. The interval may be too narrow; more data, a simpler model or tighter priors help."
+        f"Not converged after {evaluations} evaluations of the likelihood: {verdict.facts}, where "
+        f"{verdict.asked} were asked for. The interval may be too narrow; more data, a simpler "
+        "model or tighter priors help."
     )

@@ -126,7 +126,8 @@ def safe(analysis: Analysis) -> Rows:
         else:
             row = [quantity(found, analysis.limit.unit, digits=4), _db(found)]
         if tip is not None:
-            row.append(_DASH if found is None else quantity(tip.quantile(risk), tip.unit, digits=4))
+            there = None if found is None else tip.safe(risk)
+            row.append(_DASH if there is None else quantity(there, tip.unit, digits=4))
         shown.setdefault(tuple(row), []).append(risk)
     # Risks that are one number to the digits shown are said once.
     return tuple(

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
-from bayeshaptic.stability.critical import ENOUGH_BELOW, MOST_DRAWS, CriticalStiffness
+from bayeshaptic.stability.critical import MOST_DRAWS, CriticalStiffness
 from bayeshaptic.stability.effective import effective_draws
+from bayeshaptic.stability.tail import low_quantile, quantiles
 from bayeshaptic.types import Floats, Ints
 
 FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
@@ -99,9 +100,8 @@ class DeviceLimit:
     def quantile(self, p: ArrayLike) -> Any:
         """The stiffness that the limit is below with probability `p`; a float, or an array."""
         levels = np.asarray(p, float)
-        method = "linear" if np.isfinite(self.samples).all() else "inverted_cdf"
-        quantile = np.quantile(self.samples, levels, method=method)  # type: ignore[call-overload]
-        return float(quantile) if levels.ndim == 0 else quantile
+        found = quantiles(self.samples, levels)
+        return float(found) if levels.ndim == 0 else found
 
     def db(self, p: ArrayLike = 0.5) -> Any:
         """`quantile` of `p` in decibels, 20 log10 of the number in `unit`."""
@@ -116,18 +116,21 @@ class DeviceLimit:
     def safe(self, risk: float) -> float | None:
         """The stiffness that is unstable in some case with probability `risk`.
 
-        None where fewer than 20 effective draws lie below it.
+        As that of one case: a quantile of the draws, or of a tail fitted to the lowest; None where
+        they are too few for either.
         """
-        stiffness = self.quantile(risk)
-        if self._effective_below(stiffness) < ENOUGH_BELOW:
-            return None
-        return float(stiffness)
+        found = low_quantile(self.samples, risk, self.effective_at)
+        return None if found is None else found.value
 
-    def _effective_below(self, stiffness: float) -> float:
-        """Effective draws below `stiffness`, by the variances of the cases' shares F_c below it.
+    def effective_at(self, stiffness: float) -> float:
+        """Effective draws of the share below `stiffness`, by the variances of the cases' shares.
 
         With F = 1 - prod (1 - F_c) and var F_c = F_c (1 - F_c) / n_c, as many independent draws as
         would give the same variance of F.
+
+        Parameters
+        ----------
+        stiffness : float
         """
         variance, above = 0.0, 1.0
         for samples, chains in _independent(self.cases):
@@ -140,7 +143,7 @@ class DeviceLimit:
             return 0.0 if above == 1.0 else float(len(self.samples))
         risk = 1 - above
         # var F = above^2 sum F_c / ((1 - F_c) n_c), and n = F (1 - F) / var F.
-        return risk * risk / (above * variance)
+        return risk / (above * variance)
 
 
 def device_limit(cases: Sequence[Case], seed: int = 0) -> DeviceLimit:

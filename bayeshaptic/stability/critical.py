@@ -14,11 +14,11 @@ from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_
 from bayeshaptic.stability.crossings import find_crossings, rational
 from bayeshaptic.stability.effective import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
+from bayeshaptic.stability.tail import LowQuantile, low_quantile, quantiles
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Ints
 
-ENOUGH_BELOW = 20  # effective draws below a stiffness that is called safe
-MOST_DRAWS = 150_000  # 0.1 % risk needs 20,000 effective draws
+MOST_DRAWS = 150_000
 MOST_SEARCHED = 30_000  # of a loop without a finite set of poles, whose search is slow
 _CHUNK = 4096
 _CHECKED = 64
@@ -73,11 +73,8 @@ class CriticalStiffness:
     def quantile(self, p: ArrayLike) -> Any:
         """The stiffness that K_CR is below with probability `p`; a float, or an array as `p`."""
         levels = np.asarray(p, float)
-        if np.isfinite(self.samples).all():
-            quantile = np.quantile(self.samples, levels)
-        else:  # nothing can be interpolated between a number and infinity
-            quantile = np.quantile(self.samples, levels, method="inverted_cdf")
-        return float(quantile) if levels.ndim == 0 else quantile
+        found = quantiles(self.samples, levels)
+        return float(found) if levels.ndim == 0 else found
 
     def db(self, p: ArrayLike = 0.5) -> Any:
         """`quantile` of `p` in decibels, 20 log10 of the number in `unit`."""
@@ -92,17 +89,34 @@ class CriticalStiffness:
     def safe(self, risk: float) -> float | None:
         """The stiffness that is unstable with probability `risk`.
 
-        None where fewer than 20 effective draws lie below it (or where there is one model only):
-        the number would be an accident of the draws.
+        The quantile of the draws where 20 effective ones lie below it; else that of a generalised
+        Pareto distribution fitted to the lowest of them.  None where these are too few for either
+        (or where there is one model only): the number would be an accident of the draws.
         """
-        if self.effective_below(risk) < ENOUGH_BELOW:
-            return None
-        return float(self.quantile(risk))
+        found = self.low_quantile(risk)
+        return None if found is None else found.value
+
+    def low_quantile(self, risk: float) -> LowQuantile | None:
+        """What `safe` says, with its Monte-Carlo error.
+
+        Parameters
+        ----------
+        risk : float
+        """
+        return low_quantile(self.samples, risk, self.effective_at)
+
+    def effective_at(self, stiffness: float) -> float:
+        """Effective number of draws that the share below a stiffness is counted from.
+
+        Parameters
+        ----------
+        stiffness : float
+        """
+        return effective_draws((self.samples < stiffness).reshape(self.chains, -1))
 
     def effective_below(self, risk: float) -> float:
         """Effective number of draws below the stiffness of probability `risk`."""
-        below = (self.samples < self.quantile(risk)).reshape(self.chains, -1)
-        return effective_draws(below) * risk
+        return self.effective_at(self.quantile(risk)) * risk
 
     def tip(self, lever_m: float) -> CriticalStiffness:
         """The same at the tip of a rotational device's lever arm `lever_m`: K / lever^2, in N/m.

@@ -1,66 +1,119 @@
-"""How long a sampler must run until a small risk can be stated."""
+"""Quantiles at small risks from few draws, with their Monte-Carlo error.
+
+Where 20 effective draws lie below a quantile of the draws, it is stated as it is.  Beyond that a
+generalised Pareto distribution is fitted to the lowest draws, as in Pareto smoothed importance
+sampling, and its quantile is stated; the fit must pass a test of Kolmogorov and Smirnov, and its
+error be small beside the central 90 % interval.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
-from bayeshaptic.models.model import Model
-from bayeshaptic.stability.critical import (
-    ENOUGH_BELOW,
-    CriticalStiffness,
-    critical_stiffness,
-    most_draws,
-)
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayeshaptic.numerics.pareto import fit_pareto
 from bayeshaptic.types import Floats
 
-LEAST_RISK = 0.001
-_MARGIN = 1.1
-_FEWEST = 2.0  # effective draws in the tail, below which the forecast takes that many
+ENOUGH_BELOW = 20  # effective draws below a quantile that is stated as it is
+PRECISE = 0.2  # of the 90 % interval: a larger error of a fitted tail, and nothing is stated
+_SHARE = 0.05  # of the draws that a tail is fitted to; halved while it does not fit
+_FEWEST = 40  # effective draws of a tail
+# Of sqrt(n) times the largest difference of distributions: 95 % of fits to eight smooth laws stay
+# below 0.9 to 1.1.
+_FITS = 1.3
 
 
 @dataclass(frozen=True)
-class _Chains:
-    """What `critical_stiffness` reads of a posterior."""
-
-    model: Model
-    chains: Floats
-
-
-@dataclass
-class TailWatch:
-    """Follows growing chains until enough effective draws lie below the stiffness of a small risk.
+class LowQuantile:
+    """A quantile of a distribution that draws stand for.
 
     Attributes
     ----------
-    model : Model
-    risk : float
-    limit : CriticalStiffness or None
-        Of the chains that were seen last.
+    value : float
+    error : float
+        Monte-Carlo standard deviation.
+    fitted : bool
+        Whether it comes from a fitted tail.
     """
 
-    model: Model
-    risk: float = LEAST_RISK
-    limit: CriticalStiffness | None = field(default=None, init=False)
+    value: float
+    error: float
+    fitted: bool
 
-    def steps_wanted(self, chains: Floats) -> int:
-        """Steps that chains of shape (ensembles, S, walkers, P) should have in all.
 
-        S or fewer where they are long enough already, or as long as can be afforded.
-        """
-        steps, draws = chains.shape[1], chains[..., 0].size
-        model = self.model
-        most = most_draws(model, chains[0, 0, 0])
-        if draws >= most:
-            return steps
-        self.limit = critical_stiffness(_Chains(model, chains), before=self.limit)
-        below = self.limit.effective_below(self.risk)
-        if below >= ENOUGH_BELOW:
-            return steps
-        # Within a factor of three: the forecast from a few draws is rough.
-        wanted = min(_MARGIN * ENOUGH_BELOW / max(below, _FEWEST), 3.0) * steps
-        return int(min(wanted, most * steps // draws))
+def low_quantile(
+    samples: Floats, risk: float, effective: Callable[[float], float]
+) -> LowQuantile | None:
+    """The quantile at `risk` of what `samples`, shape (n,), are draws of.
 
-    def limit_of(self, posterior: Any) -> CriticalStiffness:
-        """The limit over all draws of `posterior`, whose chains were watched."""
-        return critical_stiffness(posterior, before=self.limit)
+    None where they do not say it.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n,)
+        Infinite where nothing is limited.
+    risk : float
+    effective : callable
+        From a threshold to the number of independent draws that would give the share of samples
+        below it as well.
+    """
+    ordered = np.sort(samples)
+    own = quantile_with_error(ordered, risk, effective)
+    if risk * effective(own.value) >= ENOUGH_BELOW:
+        return own
+    low, high = quantiles(ordered, np.array([0.05, 0.95]))
+    share = max(_SHARE, 5 * risk)
+    while share >= 2 * risk:
+        tail = _fitted(ordered, risk, share, effective)
+        if tail is not None:
+            return tail if tail.error <= PRECISE * (high - low) else None
+        share /= 2
+    return None
+
+
+def quantile_with_error(
+    ordered: Floats, p: float, effective: Callable[[float], float]
+) -> LowQuantile:
+    """The quantile at `p` of draws in ascending order, half of what its error in p covers."""
+    value = float(quantiles(ordered, p))
+    sd = np.sqrt(p * (1 - p) / max(effective(value), 1.0))
+    low, high = quantiles(ordered, np.clip([p - sd, p + sd], 0, 1))
+    return LowQuantile(value, 0.5 * float(high - low) if low < high else 0.0, False)
+
+
+def quantiles(samples: Floats, p: ArrayLike) -> Any:
+    """Quantiles of samples of which some may be infinite."""
+    levels = np.asarray(p, float)
+    if np.isfinite(samples).all():
+        return np.quantile(samples, levels)
+    # Nothing can be interpolated between a number and infinity.
+    return np.quantile(samples, levels, method="inverted_cdf")
+
+
+def _fitted(
+    ordered: Floats, risk: float, share: float, effective: Callable[[float], float]
+) -> LowQuantile | None:
+    """From a tail fitted to the lowest `share` of the draws; None where they are too few or odd."""
+    count = int(share * len(ordered))
+    threshold = float(ordered[count])
+    worth = share * effective(threshold)
+    if worth < _FEWEST or not np.isfinite(threshold):
+        return None
+    excess = (threshold - ordered[:count])[::-1]
+    if not excess[count // 4] > 0:
+        return None
+    tail = fit_pareto(excess).towards_exponential(worth)
+    off = np.abs(np.arange(0.5, count) / count - (1 - tail.above(excess))).max()
+    if not off * np.sqrt(worth) < _FITS:
+        return None
+    beyond = risk / share
+    # The share below the threshold is an estimate, too: it moves the quantile along the tail.
+    along = tail.scale * beyond**-tail.shape
+    variance = tail.variance(beyond, worth) + along**2 * (1 - share) / worth
+    value = threshold - tail.quantile(beyond)
+    positive = ordered[0] > 0  # then so is what is below it
+    return LowQuantile(max(value, 0.0) if positive else value, float(np.sqrt(variance)), True)

@@ -253,7 +253,7 @@ def _sampled(
     off = x - mean
     first = student(mean, (weight[:, None] * off).T @ off, 8.0)
     ensembles = warmed_up(density, adapt(density, first, rng), seed)
-    proposal = ensembles[0].proposal
+    proposal = ensembles.proposal
     y = proposal.mixture.sample(rng, int(_PROPOSED * count))
     x = proposal.straightening.bent(y)
     found = _resampled(

@@ -13,7 +13,7 @@ from bayeshaptic.inference.population.walkers import EVERY, Walkers
 from bayeshaptic.inference.sampling.ensembles import (
     ENSEMBLES,
     WALKERS,
-    Ensemble,
+    Ensembles,
     refitted,
 )
 from bayeshaptic.numerics.mixture import student
@@ -123,19 +123,17 @@ def sample_level(
     return LevelChains(joined, diagnostics, tuple(walkers))
 
 
-def run_ensembles(ensembles: list[Ensemble], rng: np.random.Generator, ess: float) -> LevelChains:
+def run_ensembles(ensembles: Ensembles, rng: np.random.Generator, ess: float) -> LevelChains:
     """Draws of a few parameters on ridges, from ensembles that are warmed up.
 
     Their proposal is fitted again until one that is frozen gives `ess` effective draws.
     """
     steps = _FIRST_STEPS
     for _ in range(_REFITS):
-        runs = [ensemble.advance(steps) for ensemble in ensembles]
-        chains = np.stack([chain for chain, _ in runs])
+        chains, values = ensembles.advance(steps)
         diagnostics = diagnose(chains)
         if diagnostics.ess >= ess and diagnostics.rhat.max() < RHAT_LIMIT:
             break
-        values = np.stack([value for _, value in runs])
         ensembles = refitted(ensembles, chains, values, rng)
         steps = int(np.clip(1.2 * steps * ess / diagnostics.ess, 2 * steps, 4 * steps))
     return LevelChains(chains, diagnostics)

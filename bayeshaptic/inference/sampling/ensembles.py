@@ -1,9 +1,9 @@
-"""Independent emcee ensembles with a frozen proposal, and how they are warmed up."""
+"""Independent ensembles of emcee walkers with a frozen proposal, and how they are warmed up."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,15 @@ from bayeshaptic.numerics.straightening import Straightening, nothing_to_straigh
 from bayeshaptic.types import Floats
 
 LogDensity = Callable[[Floats], Floats]
-_REDRAWN = 0.25  # of such moves, for each of the others
+Move = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
+"""From walkers (W, P) to proposed ones, with log density of proposing the way back over there."""
+_REDRAWN = 0.25  # of redrawing moves, for each of the others
 ENSEMBLES = 4
 WALKERS = 64
-_WARM_UP = 80
-_ROUNDS = 12  # of warm-up, at most
+_WARM_UP = (2, 2, 4, 4, 6, 6, 6, 6)  # steps a parameter in each round
+_FEWEST = 8  # steps that a proposal is fitted to
+_IDLE = 2  # rounds without a gain
+_WARM, _FROZEN = 0.6, 0.75  # of the moves that are independent proposals; the others differences
 _GOOD = 0.4  # acceptance of independent proposals from which another round gains nothing
 _CLIMB = 0.1  # rise of the mean log density, in its standard deviations, that is no accident
 _MOST_POINTS = 20_000  # that a proposal is fitted to
@@ -28,22 +32,53 @@ _MOST_COMPONENTS = 6  # more follow the accidents of the draws
 _MISSED = 2.0  # log of density over proposal, above the median, from which a place is missed
 _TAILS = 3
 _TRIED = 1000
+_ARCHIVE = 4000
+_LEAPS = 0.1  # of the differences that are taken whole: from one hump to another
+_JITTER = 1e-5
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """Independent proposals: a mixture in straight coordinates."""
+    """What walkers propose, in straight coordinates; walkers share it, and nothing else.
+
+    Attributes
+    ----------
+    straightening : Straightening
+    mixture : StudentMixture
+        Of independent proposals.
+    archive : ndarray, shape (n, P)
+        Points whose differences are steps.
+    """
 
     straightening: Straightening
     mixture: StudentMixture
+    archive: Floats = field(repr=False)
+
+    def independent(self, walkers: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
+        """A draw from the mixture for each walker."""
+        drawn = self.mixture.sample(_generator(rng), len(walkers))
+        return drawn, self.mixture.log_density(walkers) - self.mixture.log_density(drawn)
+
+    def differences(self, walkers: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
+        """A step by the difference of two points of the archive for each walker.
+
+        Differential evolution from the past (C. J. F. ter Braak and J. A. Vrugt, Statistics and
+        Computing 18, 2008), with an archive that does not change: all walkers move at once, and
+        each is a chain of its own.
+        """
+        generator, (count, size) = _generator(rng), walkers.shape
+        ends = self.archive[generator.integers(len(self.archive), size=(2, count))]
+        length = np.where(generator.uniform(size=count) < _LEAPS, 1.0, 2.38 / np.sqrt(2 * size))
+        step = length[:, None] * (ends[0] - ends[1])
+        step += _JITTER * generator.standard_normal(walkers.shape)
+        return walkers + step, np.zeros(count)
 
 
 @dataclass
-class Ensemble:
-    """One emcee ensemble with its own random state; it runs in straight coordinates.
+class Ensembles:
+    """Four ensembles of 64 walkers, advanced together: one call of the density moves them all.
 
-    emcee copies the global random state into every sampler: without a state of its own,
-    "independent" ensembles would be identical.
+    They begin apart, each at draws of its own, and never see each other.
 
     Attributes
     ----------
@@ -51,10 +86,10 @@ class Ensemble:
         Log density of points of shape (B, P).
     proposal : Proposal
     share : float
-        Of the moves that are independent proposals; the others are differential evolution.
-    positions : ndarray, shape (walkers, P)
+        Of the moves that are independent proposals; the others are differences.
+    positions : ndarray, shape (ensembles * walkers, P)
     state : tuple
-        State of a `numpy.random.RandomState`.
+        State of a `numpy.random.RandomState`: emcee would copy the global one.
     redraw : callable, optional
         A proposal of a few coordinates alone, for a fifth of the moves.
     """
@@ -70,47 +105,45 @@ class Ensemble:
     def __post_init__(self) -> None:
         import emcee
 
-        straightening, mixture = self.proposal.straightening, self.proposal.mixture
-
-        def independence(coords: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
-            generator = np.random.default_rng(rng.randint(2**31))
-            drawn = mixture.sample(generator, len(coords))
-            return drawn, mixture.log_density(coords) - mixture.log_density(drawn)
-
-        size = self.positions.shape[1]
-        moves = [
-            (emcee.moves.MHMove(independence, ndim=size), self.share),
-            (emcee.moves.DEMove(), 1 - self.share),
+        straightening, size = self.proposal.straightening, self.positions.shape[1]
+        moves: list[tuple[Move, float]] = [
+            (self.proposal.independent, self.share),
+            (self.proposal.differences, 1 - self.share),
         ]
         redraw = self.redraw
         if redraw is not None:
 
-            def alone(coords: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
-                generator = np.random.default_rng(rng.randint(2**31))
-                drawn, factor = redraw(straightening.bent(coords), generator)
+            def alone(walkers: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
+                drawn, factor = redraw(straightening.bent(walkers), _generator(rng))
                 return straightening.straight(drawn), factor
 
-            moves.append((emcee.moves.MHMove(alone, ndim=size), _REDRAWN))
+            moves.append((alone, _REDRAWN))
         self.sampler = emcee.EnsembleSampler(
             len(self.positions),
             size,
             lambda y: self.density(straightening.bent(y)),
-            moves=moves,
+            moves=[(emcee.moves.MHMove(move, ndim=size), share) for move, share in moves],
             vectorize=True,
         )
         self.sampler.random_state = self.state
 
-    def advance(self, steps: int) -> tuple[Floats, Floats]:
-        """Go on by `steps`: positions (steps, walkers, P) and log densities (steps, walkers)."""
+    def advance(self, steps: int, every: int = 1) -> tuple[Floats, Floats]:
+        """Go on until `steps` more are kept, `every` so many one.
+
+        Returns
+        -------
+        positions : ndarray, shape (ensembles, steps, walkers, P)
+        log_density : ndarray, shape (ensembles, steps, walkers)
+        """
         self.sampler.reset()
         straightening = self.proposal.straightening
         start = straightening.straight(self.positions)
         # The walkers are checked for independence at the start only; later they may well meet.
-        last = self.sampler.run_mcmc(start, steps, skip_initial_state_check=True)
+        last = self.sampler.run_mcmc(start, steps, skip_initial_state_check=True, thin_by=every)
         self.positions, self.state = straightening.bent(last.coords), self.sampler.random_state
         chain = self.sampler.get_chain()
-        bent = straightening.bent(chain.reshape(-1, chain.shape[2]))
-        return bent.reshape(chain.shape), self.sampler.get_log_prob()
+        bent = straightening.bent(chain.reshape(-1, chain.shape[2])).reshape(chain.shape)
+        return _by_ensemble(bent), _by_ensemble(self.sampler.get_log_prob())
 
 
 def warmed_up(
@@ -119,57 +152,65 @@ def warmed_up(
     seed: np.random.SeedSequence,
     peak: Floats | None = None,
     redraw: Redraw | None = None,
-) -> list[Ensemble]:
+) -> Ensembles:
     """Ensembles that have forgotten their starts, with one proposal, refitted and frozen.
 
     Each begins at its own widened draws, so that R-hat between them can see a second mode; where
     these miss the support, near `peak` (by default the heaviest point).  After
     each round of warm-up the proposal is fitted to where the walkers have been.  Rounds follow
     while the walkers, out of the sample that the proposal was fitted to, accept it too rarely,
-    and that or their density still improves.
+    until neither that nor their density improves any more.
     """
-    seeds = seed.spawn(ENSEMBLES + 1)
-    rng = np.random.default_rng(seeds[-1])
+    *seeds, last = seed.spawn(ENSEMBLES + 1)
+    rng = np.random.default_rng(last)
     size = adapted.points.shape[1]
     if peak is None:
         peak = adapted.points[int(np.argmax(adapted.weights))]
-    proposal = Proposal(nothing_to_straighten(size), adapted.proposal)
-    ensembles = []
-    for own in seeds[:ENSEMBLES]:
-        start = _spread_start(density, adapted, peak, np.random.default_rng(own))
-        ensembles.append(Ensemble(density, proposal, 0.6, start, _state(own), redraw))
-    before, level = 0.0, -np.inf
-    for _ in range(_ROUNDS):
-        runs = [ensemble.advance(_WARM_UP) for ensemble in ensembles]
-        found = np.concatenate([chain[_WARM_UP // 2 :: 2].reshape(-1, size) for chain, _ in runs])
-        values = np.concatenate([value[_WARM_UP // 2 :: 2].ravel() for _, value in runs])
-        acceptance = _acceptance(density, proposal, found, values, rng)
-        proposal = _fitted(found, values, rng)
-        ensembles = [_with(e, proposal) for e in ensembles]
+    starts = [_spread_start(density, adapted, peak, np.random.default_rng(own)) for own in seeds]
+    archive = adapted.points[rng.choice(len(adapted.points), _ARCHIVE, p=adapted.weights)]
+    proposal = Proposal(nothing_to_straighten(size), adapted.proposal, archive)
+    state = np.random.RandomState(np.random.MT19937(last)).get_state()
+    ensembles = Ensembles(density, proposal, _WARM, np.concatenate(starts), state, redraw)
+    best, level, idle = 0.0, -np.inf, 0
+    for share in _WARM_UP:
+        steps = max(share * size, 2 * _FEWEST)
+        chains, log_density = ensembles.advance(steps)
+        late = slice(steps // 2, None, max(steps // 24, 1))
+        found, values = chains[:, late].reshape(-1, size), log_density[:, late].ravel()
+        acceptance = _acceptance(density, ensembles.proposal, found, values, rng)
+        ensembles = _with(ensembles, _fitted(found, values, rng))
         climbing = values.mean() - level > _CLIMB * values.std()
-        if acceptance > _GOOD or not (acceptance > 1.1 * before or climbing):
+        idle = 0 if acceptance > 1.1 * best or climbing else idle + 1
+        if acceptance > _GOOD or idle == _IDLE:
             break
-        before, level = acceptance, values.mean()
+        best, level = max(best, acceptance), max(level, values.mean())
     return ensembles
 
 
 def refitted(
-    ensembles: list[Ensemble], chains: Floats, values: Floats, rng: np.random.Generator
-) -> list[Ensemble]:
+    ensembles: Ensembles, chains: Floats, values: Floats, rng: np.random.Generator
+) -> Ensembles:
     """The ensembles where they are, with a proposal fitted to their `chains` (E, S, W, P).
 
     `values` are the log densities there, (E, S, W).
     """
     found = chains.reshape(-1, chains.shape[-1])
-    every = max(4, -(-len(found) // _MOST_POINTS))
-    proposal = _fitted(found[::every], values.ravel()[::every], rng)
-    return [_with(ensemble, proposal) for ensemble in ensembles]
+    every = max(2, -(-len(found) // _MOST_POINTS))
+    return _with(ensembles, _fitted(found[::every], values.ravel()[::every], rng))
 
 
-def _with(ensemble: Ensemble, proposal: Proposal) -> Ensemble:
-    return Ensemble(
-        ensemble.density, proposal, 0.75, ensemble.positions, ensemble.state, ensemble.redraw
-    )
+def _with(ensembles: Ensembles, proposal: Proposal) -> Ensembles:
+    return replace(ensembles, proposal=proposal, share=_FROZEN)
+
+
+def _by_ensemble(chain: Floats) -> Floats:
+    """(steps, ensembles * walkers, ...) to (ensembles, steps, walkers, ...)."""
+    split = chain.reshape(len(chain), ENSEMBLES, -1, *chain.shape[2:])
+    return np.swapaxes(split, 0, 1)
+
+
+def _generator(rng: np.random.RandomState) -> np.random.Generator:
+    return np.random.default_rng(rng.randint(2**31))
 
 
 def _fitted(found: Floats, values: Floats, rng: np.random.Generator) -> Proposal:
@@ -192,7 +233,7 @@ def _fitted(found: Floats, values: Floats, rng: np.random.Generator) -> Proposal
             break
         there = student(missed.mean(axis=0), 1.2 * np.cov(missed.T), 5.0)
         mixture = mixture.with_component(there, 0.08)
-    return Proposal(straightening, mixture)
+    return Proposal(straightening, mixture, y[rng.choice(len(y), _ARCHIVE)])
 
 
 def _acceptance(
@@ -226,7 +267,3 @@ def _spread_start(
         if len(start) >= WALKERS:
             break
     return start[:WALKERS]
-
-
-def _state(seed: np.random.SeedSequence) -> Any:
-    return np.random.RandomState(np.random.MT19937(seed)).get_state()

@@ -12,6 +12,7 @@ from bayeshaptic.numerics.mixture import StudentMixture, student
 from bayeshaptic.types import Floats
 
 _STEP = 0.1  # of finite differences, in conditional standard deviations
+_SETTLED = 1e-2  # gain of log density that is none
 _MARGIN = 2.5 * _STEP  # from where second differences stay inside the support
 
 
@@ -115,7 +116,7 @@ def _climb(
             return phi
         gain = trial_value - value
         phi, value, damping = trial, trial_value, damping * 0.1
-        if gain < 1e-4:
+        if gain < _SETTLED:
             break
     return phi
 

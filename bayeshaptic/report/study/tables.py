@@ -13,7 +13,7 @@ from bayeshaptic.report.quantities import interval, percent, pure, quantity, sca
 from bayeshaptic.report.study.words import spread_db
 from bayeshaptic.report.summary import QUANTILES
 from bayeshaptic.report.tables import Rows
-from bayeshaptic.stability.critical import ENOUGH_BELOW
+from bayeshaptic.stability.tail import ENOUGH_BELOW
 from bayeshaptic.study.recorded_cases import place_of
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayeshaptic.stability.critical import ENOUGH_BELOW
+from bayeshaptic.stability.tail import ENOUGH_BELOW
 from bayeshaptic.stability.walls.damping import Backward, Damping, LowPass
 from bayeshaptic.stability.walls.region import DRAWS, KbRegion, kb_region, with_damping
 from bayeshaptic.types import Floats

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
-from bayeshaptic.stability.critical import ENOUGH_BELOW
+from bayeshaptic.stability.tail import ENOUGH_BELOW
 from bayeshaptic.stability.walls.count import beyond_start, unstable_at_start
 from bayeshaptic.stability.walls.curve import (
     InverseCurve,
