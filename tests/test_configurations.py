@@ -18,7 +18,7 @@ from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.population.configurations import Configurations, infer_configurations
 from bayeshaptic.inference.population.infer import prior_moments, study_coordinates
-from bayeshaptic.inference.population.path import Path as Line
+from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.report.study.population_json import population_json
@@ -59,7 +59,7 @@ def inferred() -> Configurations:
     return infer_configurations(along(PLACES), PLACES, seed=1)
 
 
-def dense(line: Line, phi: Floats) -> tuple[Floats, Floats]:
+def dense(line: Trend, phi: Floats) -> tuple[Floats, Floats]:
     """Covariance of all recordings' peaks, and of the path below them, built block by block."""
     size = len(line.hand)
     amplitude, scatter, length = np.exp(phi[:size]), np.exp(phi[size:-1]), np.exp(phi[-1])
@@ -78,15 +78,15 @@ def dense(line: Line, phi: Floats) -> tuple[Floats, Floats]:
 
 
 @pytest.fixture(scope="module")
-def repeated() -> Line:
+def repeated() -> Trend:
     """Described recordings, several of them in one configuration."""
     places = (0.0, 0.5, 0.5, 1.0, 0.5, 1.0)
     line = infer_configurations(along(places), places, seed=1)._path
-    assert isinstance(line, Line)
+    assert isinstance(line, Trend)
     return line
 
 
-def test_density_against_scipy(repeated: Line) -> None:
+def test_density_against_scipy(repeated: Trend) -> None:
     middle, width = repeated.guess()
     phi = middle + width * np.random.default_rng(1).standard_normal((4, len(middle)))
     expected = []
@@ -98,7 +98,7 @@ def test_density_against_scipy(repeated: Line) -> None:
     np.testing.assert_allclose(found - found[0], np.array(expected) - expected[0], atol=1e-6)
 
 
-def test_expected_recordings_against_conditioning(repeated: Line) -> None:
+def test_expected_recordings_against_conditioning(repeated: Trend) -> None:
     phi = repeated.guess()[0]
     whole, path = dense(repeated, phi)
     count, size = repeated.mean.shape
@@ -112,7 +112,7 @@ def test_expected_recordings_against_conditioning(repeated: Line) -> None:
         np.testing.assert_allclose(spread[r], blocks[r, :, r], atol=1e-10)
 
 
-def test_drawn_paths_against_conditioning(repeated: Line) -> None:
+def test_drawn_paths_against_conditioning(repeated: Trend) -> None:
     phi = repeated.guess()[0]
     whole, path = dense(repeated, phi)
     size = len(repeated.hand)

@@ -9,7 +9,7 @@ from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.least_squares import weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
-from bayeshaptic.models.model import LinearEffect
+from bayeshaptic.models.model import Extension
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.recordings.response.windows import Windows
@@ -39,7 +39,7 @@ def starting_bases(model: Model, theta: Floats) -> Floats:
 
 
 def promising_starts(
-    model: Model, effect: LinearEffect, windows: Windows, bases: Floats, own: Floats, keep: int = 24
+    model: Model, effect: Extension, windows: Windows, bases: Floats, own: Floats, keep: int = 24
 ) -> Floats:
     """The best starting vectors for ``model.with_effect(effect)``.
 
@@ -52,12 +52,12 @@ def promising_starts(
     ----------
     model : Model
         Without the effect.
-    effect : LinearEffect
+    effect : Extension
     windows : Windows
     bases : ndarray, shape (S, P)
         Vectors of `model`: see `starting_bases`.
     own : ndarray, shape (N, number of the effect's parameters)
-        Values of the effect: `LinearEffect.starting_values`.
+        Values of the effect: `Extension.starting_values`.
     keep : int
 
     Returns

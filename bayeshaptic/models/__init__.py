@@ -1,7 +1,7 @@
 """Parameters and priors, mechanisms, the sampled response, and the rigid, free, grasped models."""
 
 from bayeshaptic.models.build import build_model, free, grasped, rigid
-from bayeshaptic.models.model import LinearEffect, Model
+from bayeshaptic.models.model import Extension, Model
 from bayeshaptic.models.parameter import Parameter
 from bayeshaptic.models.prior import (
     HalfNormal,
@@ -18,7 +18,7 @@ from bayeshaptic.models.response.system import LinearSystem
 
 __all__ = [
     "HalfNormal",
-    "LinearEffect",
+    "Extension",
     "LinearSystem",
     "LogNormal",
     "LogUniform",

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from bayeshaptic.devices import Device
 
 
-class LinearEffect(Protocol):
-    """A linear effect as a model sees it: parameters, and what they do to the system."""
+class Extension(Protocol):
+    """What extends a model, as the model sees it: parameters, and what they do to the system."""
 
     @property
     def name(self) -> str: ...
@@ -51,7 +51,7 @@ class Model:
         The device file's own values; empty without one.
     force_unit, position_unit : str
     device : Device or None
-    effects : tuple of LinearEffect
+    effects : tuple of Extension
     """
 
     structure: Structure
@@ -62,7 +62,7 @@ class Model:
     force_unit: str = "N"
     position_unit: str = "m"
     device: Device | None = None
-    effects: tuple[LinearEffect, ...] = ()
+    effects: tuple[Extension, ...] = ()
 
     @property
     def name(self) -> str:
@@ -206,7 +206,7 @@ class Model:
         known = {p.name: float(values[p.name]) for p in self.parameters if p.name in values}
         return replace(self, parameters=left, fixed={**self.fixed, **known})
 
-    def with_effect(self, effect: LinearEffect) -> Model:
+    def with_effect(self, effect: Extension) -> Model:
         """With one more linear effect, whose parameters come before the delay's."""
         own = tuple(p for p in self.parameters if p.name != "delay_s")
         delay = tuple(p for p in self.parameters if p.name == "delay_s")

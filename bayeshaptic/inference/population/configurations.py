@@ -11,10 +11,10 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.population.infer import common_model, prior_moments, study_coordinates
-from bayeshaptic.inference.population.path import Path
 from bayeshaptic.inference.population.reweighting import inside
 from bayeshaptic.inference.population.sampler import LevelChains, sample_level
 from bayeshaptic.inference.population.settling import settled
+from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
@@ -45,7 +45,7 @@ class Configurations:
     model: Model = field(repr=False)
     chains: LevelChains = field(repr=False)
     notices: tuple[Notice, ...] = ()
-    _path: Path | None = field(default=None, repr=False)
+    _path: Trend | None = field(default=None, repr=False)
     _here: Coordinates | None = field(default=None, repr=False)
 
     def grid(self, points: int) -> Floats:
@@ -117,7 +117,7 @@ def infer_configurations(
     model = common_model(posteriors)
     here = study_coordinates(model)
     mean, sd = prior_moments(model, here)
-    path = Path(
+    path = Trend(
         tuple(gaussian_likelihood(one, here) for one in posteriors),
         np.asarray(coordinate, float),
         np.isin(model.names, HAND),

@@ -12,11 +12,11 @@ from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.population.below import walled
 from bayeshaptic.inference.population.gaussian_likelihood import STEP, linearised
 from bayeshaptic.inference.population.hierarchy import Hierarchy
-from bayeshaptic.inference.population.path import Path
+from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.types import Floats
 
-L = TypeVar("L", Hierarchy, Path)
+L = TypeVar("L", Hierarchy, Trend)
 _ROUNDS = 8
 _BEYOND = 2.0  # posterior standard deviations that an expectation may lie outside its own draws
 _DRAWS = 400
@@ -33,7 +33,7 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
 
     Parameters
     ----------
-    level : Hierarchy or Path
+    level : Hierarchy or Trend
     posteriors : sequence of Posterior
         Those without their measurement keep the description that they have.
     here : Coordinates
@@ -59,7 +59,7 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
     return level
 
 
-def _expected(level: Hierarchy | Path, phi: Floats, walls: Floats) -> Floats:
+def _expected(level: Hierarchy | Trend, phi: Floats, walls: Floats) -> Floats:
     """The expected coordinates of every recording where none is below its wall, shape (R, D).
 
     Without the walls the point would run off to where there is no device, dampers below zero, and

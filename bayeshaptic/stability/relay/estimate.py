@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.stability.relay.spectra import NEAR, Spectra, oscillation
+from bayeshaptic.stability.relay.spectra import NEAR, PieceSpectra, oscillation
 from bayeshaptic.types import Floats
 
 BLOCKS = 10  # of the jackknife
@@ -26,7 +26,7 @@ class Estimate:
     critical: float
 
 
-def estimate(spectra: Spectra, order: int) -> Estimate:
+def estimate(spectra: PieceSpectra, order: int) -> Estimate:
     """U = D Y around the oscillation by least squares, D a polynomial; its value and crossing.
 
     The dynamic stiffness D = 1/G is smooth where G has a resonance.
@@ -58,7 +58,7 @@ def _nearest_root(coefficients: Floats) -> float:
     return float(real[np.argmin(np.abs(real))]) if len(real) else np.inf
 
 
-def jackknife(spectra: Spectra, whole: Estimate) -> dict[str, float]:
+def jackknife(spectra: PieceSpectra, whole: Estimate) -> dict[str, float]:
     """Standard deviations: of the frequency in Hz, of the stiffnesses' logarithms."""
     count = len(spectra.force)
     blocks = np.array_split(np.arange(count), min(BLOCKS, count))
@@ -76,7 +76,7 @@ def jackknife(spectra: Spectra, whole: Estimate) -> dict[str, float]:
     }
 
 
-def oscillation_share(spectra: Spectra, frequency_hz: float) -> float:
+def oscillation_share(spectra: PieceSpectra, frequency_hz: float) -> float:
     """The oscillation's share of the motion's variance, above half its frequency."""
     power = (np.abs(spectra.position) ** 2).mean(axis=0)
     counted = spectra.frequency_hz > 0.5 * frequency_hz

@@ -1,4 +1,4 @@
-"""Spectra of a relay experiment in pieces: the oscillation's line, and where it is steady."""
+"""PieceSpectra of a relay experiment in pieces: the oscillation's line, and where it is steady."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ NEAR = 0.3  # a line reaches so far to either side, relative to its frequency
 
 
 @dataclass(frozen=True)
-class Spectra:
+class PieceSpectra:
     """Hann-windowed, detrended, half-overlapping segments: force and position, shape (S, L)."""
 
     frequency_hz: Floats
     force: Complexes
     position: Complexes
 
-    def only(self, segments: NDArray[np.int_]) -> Spectra:
-        return Spectra(self.frequency_hz, self.force[segments], self.position[segments])
+    def only(self, segments: NDArray[np.int_]) -> PieceSpectra:
+        return PieceSpectra(self.frequency_hz, self.force[segments], self.position[segments])
 
     @property
     def bin_hz(self) -> float:
         return float(self.frequency_hz[1])
 
 
-def spectra_of(force: Floats, position: Floats, period_s: float, segment: int) -> Spectra:
+def spectra_of(force: Floats, position: Floats, period_s: float, segment: int) -> PieceSpectra:
     frequency = np.asarray(np.fft.rfftfreq(segment, period_s), float)
-    return Spectra(frequency, _transformed(force, segment), _transformed(position, segment))
+    return PieceSpectra(frequency, _transformed(force, segment), _transformed(position, segment))
 
 
 def _transformed(signal: Floats, segment: int) -> Complexes:
@@ -43,7 +43,7 @@ def _transformed(signal: Floats, segment: int) -> Complexes:
     return np.fft.rfft(flat * np.hanning(segment + 1)[:-1], axis=1)
 
 
-def oscillation(spectra: Spectra) -> tuple[float, float]:
+def oscillation(spectra: PieceSpectra) -> tuple[float, float]:
     """Centre and rms width of the oscillation's line in the force's power spectral density."""
     power = (np.abs(spectra.force) ** 2).mean(axis=0)
     power[:2] = 0.0  # what is left of a slow drift

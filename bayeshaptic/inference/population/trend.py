@@ -33,7 +33,7 @@ HAND_SCATTER = (0.1, 1.0)
 
 
 @dataclass(frozen=True)
-class Path:
+class Trend:
     """Described recordings along a coordinate.
 
     Attributes
