@@ -1,4 +1,4 @@
-"""PieceSpectra of a relay experiment in pieces: the oscillation's line, and where it is steady."""
+"""Spectra of a relay experiment in pieces: the oscillation's line, and where it is steady."""
 
 from __future__ import annotations
 
