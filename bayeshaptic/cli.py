@@ -1,7 +1,8 @@
 """The command line: parse, run one command, and turn every error into one line and a status.
 
 Exit status: 0 done; 1 a study of a batch failed, or a defect in bayeshaptic; 2 input or options
-that cannot be used; 130 interrupted. A command is one module of ``bayeshaptic.commands``.
+that cannot be used; 130 interrupted, 143 terminated. A command is one module of
+``bayeshaptic.commands``.
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import signal
 import sys
+import threading
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
@@ -78,8 +81,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     debug = arguments.debug or bool(os.environ.get("BAYESHAPTIC_DEBUG"))
     try:
-        with _warnings_in_one_line():
+        with _warnings_in_one_line(), _terminated_like_interrupted():
             return arguments.run(arguments)
+    except _Terminated:
+        complain("terminated")
+        return 143
     except KeyboardInterrupt:
         complain("interrupted")
         return 130
@@ -96,6 +102,26 @@ def main(argv: Sequence[str] | None = None) -> int:
             "the output of the same command and --debug"
         )
         return 1
+
+
+class _Terminated(BaseException):
+    """SIGTERM: workers are stopped and drafts removed on the way out, as for an interrupt."""
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    def end(*_: object) -> NoReturn:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise _Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _joined(argv: Sequence[str]) -> list[str]:

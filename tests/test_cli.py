@@ -11,6 +11,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -600,6 +601,13 @@ def double_or_fail(number: int) -> int:
     return 2 * number
 
 
+def die_at_first(mark: Path) -> str:
+    if mark.name == "1" and not mark.exists():
+        mark.touch()
+        os._exit(1)
+    return "done"
+
+
 def die(_: int) -> None:
     os._exit(3)
 
@@ -623,6 +631,16 @@ def test_a_worker_that_dies_is_a_failure_and_not_a_hang() -> None:
     ended = outcomes(executors.processes(2), die, [1, 2])
     assert set(ended) == {1, 2}
     assert all(result is None and "died" in error for result, error in ended.values())
+
+
+def test_a_worker_that_dies_takes_nobody_with_it(tmp_path: Path) -> None:
+    ended = outcomes(executors.processes(2), die_at_first, [tmp_path / str(i) for i in range(5)])
+    assert {result for result, _ in ended.values()} == {"done"}
+
+
+def test_jobs_in_a_pool_of_ones_own() -> None:
+    with ThreadPoolExecutor(2) as pool:
+        assert outcomes(executors.futures(pool), double_or_fail, [1, -2, 3]) == EXPECTED
 
 
 def test_jobs_on_a_dask_cluster() -> None:

@@ -6,8 +6,10 @@ takes a dictionary of groups.  Given the other's form, 0.x fails silently.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import shutil
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -62,7 +64,10 @@ def to_arviz(posterior: Sampled) -> Any:
     -------
     arviz.InferenceData (0.x) or xarray.DataTree (1.x)
     """
-    groups = _groups(posterior)
+    return _joined(_groups(posterior))
+
+
+def _joined(groups: dict[str, Any]) -> Any:
     az = arviz()
     if int(az.__version__.split(".")[0]) < 1:  # 1.x has the old name too, but not the old thing
         return az.InferenceData(**groups)
@@ -73,9 +78,14 @@ def to_arviz(posterior: Sampled) -> Any:
 
 def save_posterior(posterior: Sampled, path: Path) -> Path:
     """Write `posterior` as netCDF, first beside `path` and then in its place."""
+    groups = _groups(posterior)
+    # The HDF5 library does not survive a disk that fills up while it writes.
+    needed = sum(group.nbytes for group in groups.values()) + (1 << 20)
+    if shutil.disk_usage(path.absolute().parent).free < needed:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        to_arviz(posterior).to_netcdf(str(temporary), engine="h5netcdf")
+        _joined(groups).to_netcdf(str(temporary), engine="h5netcdf")
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)

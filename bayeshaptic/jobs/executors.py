@@ -7,12 +7,16 @@ process boundaries, so both must be picklable (a function of a module, frozen da
 
 from __future__ import annotations
 
+import concurrent.futures
 import multiprocessing
 import os
 import re
 import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +24,8 @@ from typing import Any
 from bayeshaptic.errors import InputError, describe
 
 Job = Callable[[Any], Any]
+
+_DIED = "a worker process died twice (out of memory, or killed)"
 
 
 @dataclass(frozen=True)
@@ -64,25 +70,83 @@ def processes(workers: int) -> Executor:
     """
 
     def run(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
-        context = multiprocessing.get_context("spawn")
-        others = set(multiprocessing.active_children())
-        pool = ProcessPoolExecutor(
-            min(workers, len(items)), mp_context=context, initializer=_leave_interrupts_to_parent
-        )
-        try:
-            futures = {pool.submit(_attempt, job, item): item for item in items}
-            for future in as_completed(futures):
+        waiting = deque(items)
+        while waiting:
+            # What ran when a worker died is done once more, each alone: one of them may be why.
+            suspects = yield from _until_a_worker_dies(job, waiting, workers)
+            for item in suspects:
+                if (yield from _until_a_worker_dies(job, deque([item]), 1)):
+                    yield Outcome(item, error=_DIED)
+
+    return run
+
+
+def _until_a_worker_dies(
+    job: Job, waiting: deque[Any], workers: int
+) -> Generator[Outcome, None, list[Any]]:
+    """Take jobs from `waiting` and yield outcomes; hand back what ran when a worker died."""
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(
+        min(workers, len(waiting)),
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_start_worker,
+        initargs=(os.getpid(),),
+    )
+    running: dict[Future[Outcome], Any] = {}
+    suspects: list[Any] = []
+    try:
+        while running or (waiting and not suspects):
+            while waiting and not suspects and len(running) < workers:
+                item = waiting.popleft()
+                try:
+                    running[pool.submit(_attempt, job, item)] = item
+                except BrokenProcessPool:
+                    suspects.append(item)
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                item = running.pop(future)
                 try:
                     yield future.result()
                 except BrokenProcessPool:
-                    message = "a worker process died (out of memory, or killed)"
-                    yield Outcome(futures[future], error=message)
-        except BaseException:
-            for worker in set(multiprocessing.active_children()) - others:
-                worker.terminate()
-            raise
+                    suspects.append(item)
+    except BaseException:
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return suspects
+
+
+def futures(pool: concurrent.futures.Executor) -> Executor:
+    """Run jobs in any pool of `concurrent.futures`, of this machine or others (mpi4py, dask).
+
+    Parameters
+    ----------
+    pool : concurrent.futures.Executor
+        It stays open.
+
+    Returns
+    -------
+    Executor
+    """
+
+    def run(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+        running = {pool.submit(_attempt, job, item): item for item in items}
+        try:
+            while running:
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    item = running.pop(future)
+                    problem = future.exception()
+                    yield (
+                        future.result()
+                        if problem is None
+                        else Outcome(item, error=describe(problem))
+                    )
         finally:
-            pool.shutdown(cancel_futures=True)
+            for future in running:
+                future.cancel()
 
     return run
 
@@ -123,15 +187,15 @@ def dask(address: str) -> Executor:
                 "'dask scheduler', or use --workers"
             ) from error
         with client, client.as_current():
-            futures = {
+            submitted = {
                 client.submit(_attempt, job, item, pure=False, retries=0): item for item in items
             }
-            for future in distributed.as_completed(futures):
+            for future in distributed.as_completed(submitted):
                 problem = future.exception()
                 if problem is None:
                     yield future.result()
                 else:
-                    yield Outcome(futures[future], error=describe(problem))
+                    yield Outcome(submitted[future], error=describe(problem))
 
     return run
 
@@ -151,5 +215,13 @@ def _attempt(job: Job, item: Any) -> Outcome:
         return Outcome(item, error=describe(error))
 
 
-def _leave_interrupts_to_parent() -> None:
+def _start_worker(parent: int) -> None:
+    """Leave interrupts to the parent, and end with it however it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

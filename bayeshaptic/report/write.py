@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import uuid
 from pathlib import Path
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import InputError
+from bayeshaptic.report.draft import draft_in, move_all
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
@@ -54,15 +52,9 @@ def write_report(result: Result, out_dir: str | Path) -> Path:
     out = Path(out_dir).resolve()
     if out.exists() and not out.is_dir():
         raise InputError(f"{out_dir}: is a file; name a folder for the report.")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    hidden = f".report-{uuid.uuid4().hex[:12]}"
-    draft = out / hidden if out.exists() else out.with_name(hidden)
-    draft.mkdir()
-    try:
+    with draft_in(out if out.exists() else out.parent) as draft:
         _write_all(result, draft)
         _move(draft, out)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return out / "report.html"
 
 
@@ -95,12 +87,7 @@ def _sections(result: Result, folder: Path) -> tuple[Section, ...]:
 
 
 def _move(draft: Path, out: Path) -> None:
-    if not out.exists():
-        draft.rename(out)
-        return
-    # One of an older report would contradict this one.
     for picture in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES):
         if not (draft / f"{picture.name}.png").exists():
             (out / f"{picture.name}.png").unlink(missing_ok=True)
-    for path in sorted(draft.iterdir(), key=lambda path: path.name == _LAST):
-        os.replace(path, out / path.name)
+    move_all(draft, out, _LAST)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import shutil
-import uuid
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.report.draft import draft_in, move_all
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.study.headline import study_headline
@@ -62,15 +61,10 @@ def write_study_report(
     out = Path(out_dir).resolve()
     if out.exists() and not out.is_dir():
         raise InputError(f"{out_dir}: is a file; name a folder for the report.")
-    out.mkdir(parents=True, exist_ok=True)
-    draft = out / f".report-{uuid.uuid4().hex[:12]}"
-    draft.mkdir()
     links = {name: _link(Path(page), out) for name, page in (pages or {}).items()}
-    try:
+    with draft_in(out) as draft:
         _write_all(study, draft, links, walls)
         _move(draft, out)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return out / "report.html"
 
 
@@ -122,5 +116,4 @@ def _move(draft: Path, out: Path) -> None:
     for name in older:  # one of an older report would contradict this one
         if not (draft / name).exists():
             (out / name).unlink(missing_ok=True)
-    for path in sorted(draft.iterdir(), key=lambda path: path.name == _LAST):
-        os.replace(path, out / path.name)
+    move_all(draft, out, _LAST)

@@ -1,0 +1,89 @@
+"""A folder's files appear whole or not at all: written beside, flushed, and moved when complete."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_NAME = re.compile(r"\.report-(?P<host>[\w-]*)-(?P<pid>\d+)-[0-9a-f]{12}")
+
+
+@contextmanager
+def draft_in(folder: Path) -> Iterator[Path]:
+    """A hidden folder in `folder` to write into, removed at the end; move what is complete.
+
+    Drafts that processes of this machine left when they died are removed first.
+    """
+    remove_dead_drafts(folder)
+    draft = folder / f".report-{_host()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
+    draft.mkdir(parents=True)
+    try:
+        yield draft
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def move_all(draft: Path, folder: Path, last: str) -> None:
+    """Move every file of a draft into `folder`, on the disk before it has its name.
+
+    A new folder appears at once; in an older one `last` is missing while the files change.
+
+    Parameters
+    ----------
+    draft, folder : Path
+    last : str
+        The file that others wait for.
+    """
+    files = sorted(draft.iterdir(), key=lambda path: path.name == last)
+    for path in files:
+        with path.open("rb+") as file:
+            os.fsync(file.fileno())
+    if not folder.exists():
+        draft.rename(folder)
+        return
+    (folder / last).unlink(missing_ok=True)
+    for path in files:
+        os.replace(path, folder / path.name)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file; it is complete, or what was there before."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with partial.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def remove_dead_drafts(folder: Path) -> None:
+    """Remove what processes of this machine were writing in `folder` when they died."""
+    if not folder.is_dir():
+        return
+    for path in folder.iterdir():
+        match = _NAME.fullmatch(path.name)
+        if match and match["host"] == _host() and not _is_alive(int(match["pid"])):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _host() -> str:
+    return re.sub(r"[^\w]", "_", socket.gethostname())
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # somebody else's; on Windows, where a signal 0 is none, do not ask
+        return True
+    return True

@@ -1,0 +1,102 @@
+"""Results appear whole or not at all, and what died is tidied up."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from bayeshaptic.report.draft import draft_in, move_all, write_whole
+
+
+def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    for text in ("old", "new"):
+        with draft_in(tmp_path) as draft:
+            for name in ("a", "z", "last"):
+                (draft / name).write_text(text)
+            move_all(draft, out, "last")
+        assert {path.name: path.read_text() for path in out.iterdir()} == dict.fromkeys(
+            ("a", "z", "last"), text
+        )
+    with pytest.raises(OSError, match="full"), draft_in(out) as draft:
+        (draft / "a").write_text("never")
+        raise OSError("full")
+    assert (out / "a").read_text() == "new"
+    write_whole(out / "b", "x")
+    assert sorted(os.listdir(out)) == ["a", "b", "last", "z"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be asked whether it lives")
+def test_drafts_of_the_dead_are_removed(tmp_path: Path) -> None:
+    code = "import os, sys; from pathlib import Path; from bayeshaptic.report.draft import draft_in"
+    kill = f"{code}\nwith draft_in(Path(sys.argv[1])): os.kill(os.getpid(), 9)"
+    subprocess.run([sys.executable, "-c", kill, str(tmp_path)], check=False)
+    assert len(os.listdir(tmp_path)) == 1
+    with draft_in(tmp_path) as mine, draft_in(tmp_path) as other:
+        assert {mine.name, other.name} == set(os.listdir(tmp_path))
+    assert not os.listdir(tmp_path)
+
+
+WORKING = """
+import sys, time
+from bayeshaptic import cli
+from bayeshaptic.jobs import executors
+from bayeshaptic.commands import batch
+
+def run(_):
+    print(list(executors.processes(2)(time.sleep, [60, 60])))
+
+batch.run = run
+if __name__ == "__main__":
+    sys.exit(cli.main(["batch", "a.csv"]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGKILL])
+def test_workers_end_with_their_parent(tmp_path: Path, sign: int) -> None:
+    script = tmp_path / "work.py"
+    script.write_text(WORKING)
+    with subprocess.Popen([sys.executable, str(script)], stderr=subprocess.PIPE) as process:
+        children = _wait_for(lambda: _children(process.pid, 2))
+        began = time.monotonic()
+        process.send_signal(sign)
+        process.wait(timeout=30)
+        assert _wait_for(lambda: not any(map(_working, children)))
+        assert time.monotonic() - began < 20  # 5 s on an idle machine
+    assert process.returncode == (143 if sign == signal.SIGTERM else -9)
+
+
+def _children(parent: int, least: int) -> list[int]:
+    """Workers that `parent` has started."""
+    found = []
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            text = status.read_text().rpartition(")")[2].split()
+            command = status.with_name("cmdline").read_bytes()
+        except OSError:
+            continue
+        if int(text[1]) == parent and b"spawn_main" in command:
+            found.append(int(status.parent.name))
+    return found if len(found) >= least else []
+
+
+def _working(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def _wait_for(found: object) -> object:
+    for _ in range(300):
+        if result := found():
+            return result
+        time.sleep(0.1)
+    raise AssertionError("never happened")
