@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics, inverse_dynamics
+from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
-from bayeshaptic.diagnosis.periodic.loop import FLOOR, PeriodicLoop, close_periodic
+from bayeshaptic.diagnosis.periodic.lines import FLOOR, BalancedState, LineTrials
 from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Period, one_period, with_floor
 from bayeshaptic.diagnosis.state import REPORT, share
+from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
@@ -46,7 +48,7 @@ class Bench:
 
     Attributes
     ----------
-    loop : PeriodicLoop
+    loop : Traced
     windows : Windows
         With the noise of a line at least `FLOOR` of its response; they weigh the fit.
     held_out : ndarray of bool
@@ -57,7 +59,7 @@ class Bench:
         The load's encoder, never fitted.
     """
 
-    loop: PeriodicLoop
+    loop: Traced
     windows: Windows
     held_out: NDArray[np.bool_]
     steps: tuple[Balanced, ...]
@@ -65,7 +67,7 @@ class Bench:
 
     @property
     def names(self) -> list[str]:
-        return ["base model", *(a.title for a in self.loop.chosen)]
+        return ["base model", *(state.accepted[-1].title for state in self.loop.path[1:])]
 
     @property
     def noise(self) -> Floats:
@@ -106,13 +108,10 @@ def bench(path: Path) -> dict[str, Bench]:
     assert isinstance(etfe.spectra, PeriodicSpectra)
     witness = bh.read_recording(path, columns=WITNESS_COLUMNS)
     fit = bh.least_squares(bh.free(), etfe)
-    loop = close_periodic(etfe, fit)
+    loop = trace(etfe, fit)
     windows, period = compress(with_floor(etfe, FLOOR)), one_period(etfe)
     held_out, load = share(windows, REPORT), one_period(etfe, witness.position)
-    stages = [
-        balance(fit.model, windows, period, (), fit.theta),
-        *(a.balanced for a in loop.chosen),
-    ]
+    stages = [state.whole for state in loop.path if isinstance(state, BalancedState)]
     # The recording ends with its last period.
     kept = recording.position[-etfe.spectra.periods * period.samples :].reshape(-1, period.samples)
     noises = {"beside the line": windows} | {
@@ -129,12 +128,13 @@ def bench(path: Path) -> dict[str, Bench]:
     return found
 
 
-def close_again(path: Path, windows: Windows) -> PeriodicLoop:
+def close_again(path: Path, windows: Windows) -> Traced:
     """The loop on the two-mass bench with another noise from the start, that of `windows`."""
     etfe = bh.estimate_etfe(bh.read_recording(path, columns=BENCH_COLUMNS))
     assert isinstance(etfe.spectra, PeriodicSpectra)
     own = replace(etfe, spectra=replace(etfe.spectra, scatter=windows.scatter))
-    return close_periodic(own, bh.least_squares(bh.free(), own), floor=0.0)
+    fit = bh.least_squares(bh.free(), own)
+    return trace(own, fit, trials=LineTrials(own, fit, floor=0.0))
 
 
 def between_periods(windows: Windows, period: Period, kept: Floats) -> Windows:
@@ -268,10 +268,10 @@ def main() -> None:
         left = np.abs(1 - result.ratio(step)[out]) / between.noise[out]
         print(f"{name}, as fitted first: {np.sqrt(np.mean(left**2)):.2f} of the second noise")
     again = close_again(given.folder / BENCH, between.windows)
-    print("accepted with the second noise from the start:", *(a.title for a in again.chosen))
-    for attempt in again.history[-1][:3]:
-        gains = f"{attempt.gain_fit:.1f} where fitted, {attempt.gain_choose:.1f} where judged"
-        print(f"{attempt.title}, not accepted: gain {gains}")
+    print("accepted with the second noise:", *(effect.title for effect in again.state.accepted))
+    last = [c for c in again.candidates if c.round == again.candidates[-1].round]
+    for candidate in last[:3]:
+        print(f"{candidate.title}, in the last round: score {candidate.score:.1f}")
     draw_bench(result, given.output)
     final = result.steps[-1]
     for basis, value, sd in zip(final.forces, final.strength, final.strength_sd, strict=True):

@@ -24,7 +24,7 @@ import argparse
 from pathlib import Path
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.loop import residual_tests
+from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.residuals.force_curve import VELOCITY, force_curve, motions
 
 RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "lhifam-user-b.csv.gz"

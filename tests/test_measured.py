@@ -10,12 +10,13 @@ import pytest
 from test_examples import EXAMPLES, load
 
 import bayeshaptic as bh
+from bayeshaptic.diagnosis.battery import is_periodic, periodic_tests
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
+from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Basis, balance
-from bayeshaptic.diagnosis.periodic.loop import close_periodic, is_periodic, periodic_tests
+from bayeshaptic.diagnosis.periodic.lines import BalancedState, LineTrials
 from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, one_period, places_of, with_floor
-from bayeshaptic.diagnosis.periodic.trace import traced
 from bayeshaptic.diagnosis.state import REPORT, share
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION
 from bayeshaptic.errors import InputError
@@ -100,13 +101,13 @@ def test_a_drag_is_sized_from_the_motion_that_it_makes(dragged: Recording) -> No
 def test_the_loop_names_the_drag_and_leaves_noise(dragged: Recording) -> None:
     etfe = bh.estimate_etfe(dragged)
     fit = bh.least_squares(bh.free(delay_s=0.0), etfe)
-    loop = close_periodic(etfe, fit, floor=0.0)
-    assert any(test.flagged for test in loop.before)
-    assert [attempt.name for attempt in loop.chosen] == ["drag"]
-    assert loop.chosen[0].addition.place == LOAD
-    assert not any(test.flagged for test in loop.after)
-    assert loop.state.fit.reduced_chi_square < 1.3
-    told = traced(loop)
+    told = trace(etfe, fit, trials=LineTrials(etfe, fit, floor=0.0))
+    assert any(test.flagged for test in told.before)
+    assert [effect.name for effect in told.state.accepted] == ["drag"]
+    state = told.state
+    assert isinstance(state, BalancedState) and state.whole.forces[0].place == LOAD
+    assert not any(test.flagged for test in told.after)
+    assert state.fit.reduced_chi_square < 1.3
     assert (told.verdict, told.residual_class) == ("explained", "nonlinear")
     assert [c.name for c in told.candidates if c.accepted] == ["drag"]
 
@@ -116,7 +117,7 @@ def test_a_linear_device_gets_nothing() -> None:
     assert is_periodic(etfe)
     fit = bh.least_squares(bh.free(delay_s=0.0), etfe)
     assert not any(test.flagged for test in periodic_tests(fit))
-    assert close_periodic(etfe, fit).chosen == ()
+    assert trace(etfe, fit).verdict == "consistent"
 
 
 def test_motion_needs_a_force_that_repeats() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
 from bayeshaptic.diagnosis.options import Options, measurement_of
 from bayeshaptic.errors import Notice
@@ -261,8 +262,6 @@ def _with_noise(fit: Fit, scale: float) -> Fit:
 
 def _residual_notice(begun: Begun) -> tuple[Notice, ...]:
     """What the tests of the residual find where nobody traces it."""
-    from bayeshaptic.diagnosis.loop import residual_tests
-
     found = [test for test in residual_tests(begun.fit, begun.etfe) if test.flagged]
     if not found:
         return ()

@@ -24,11 +24,9 @@ from bayeshaptic.diagnosis.feedback.explain import (
 )
 from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.options import Options, measurement_of
-from bayeshaptic.diagnosis.state import REPORT, Accepted, share
+from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.errors import Notice
-from bayeshaptic.inference.least_squares import Fit, polish
-from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -131,13 +129,13 @@ def close_loop(
         Where the measurement cannot be used.
     """
     chosen = (options or Options()).with_changes(changes)
-    begun = begin(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.3))
+    begun = begin(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
     began = time.perf_counter()
     force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None
     if force is not None:  # the response is biased: whatever is traced in it may be the controller
         traced = trace_force(begun.etfe, begun.fit, force)
     else:
-        traced = trace(begun.etfe, begun.fit, lambda word: chosen.report(0.15, f"trying {word}"))
+        traced = trace(begun.etfe, begun.fit, chosen.within(0.05, 0.4).report, chosen.budget_s)
     tracing = time.perf_counter() - began
     changed = force is None and bool(traced.state.accepted)
     state = traced.state
@@ -217,14 +215,6 @@ def _error(analysis: Analysis) -> dict[str, Any]:
         "critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)},
         "critical_stiffness_db": float(db) if db is not None and np.isfinite(db) else None,
     }
-
-
-def held_out_rms(fit: Fit) -> float:
-    """Weighted rms on a quarter of the windows, with the model fitted to the others; 1 is noise."""
-    out = share(fit.windows, REPORT)
-    theta = polish(fit.model, fit.windows.part(~out), fit.theta)
-    left = Likelihood(fit.model, fit.windows.part(out)).normalised(theta[None])[0]
-    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
 def _notices(traced: Traced) -> tuple[Notice, ...]:

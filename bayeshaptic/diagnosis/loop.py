@@ -1,203 +1,191 @@
-"""Closing the loop: find the residual, trace it, add what explains it, and look again."""
+"""Closing the loop: find the residual, trace it, add what explains it, and look again.
+
+One loop for every kind of excitation.  How candidates are fitted, and on what they are judged, is
+that of a `Trials`; what is accepted is in `bayeshaptic.diagnosis.acceptance`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
-import numpy as np
-
-from bayeshaptic.diagnosis.periodic.loop import is_periodic
-from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
-from bayeshaptic.diagnosis.residuals.drift import drift_tests
-from bayeshaptic.diagnosis.residuals.residual import Test, frequency_tests
-from bayeshaptic.diagnosis.samples.mend import measurement_tests, repair_measurement
-from bayeshaptic.diagnosis.state import State, Trial
-from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Candidate, Traced
-from bayeshaptic.diagnosis.trials.drift import drift_trials
-from bayeshaptic.diagnosis.trials.linear import linear_trials
-from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
+from bayeshaptic.diagnosis import acceptance
+from bayeshaptic.diagnosis.battery import is_periodic
+from bayeshaptic.diagnosis.periodic.lines import LineTrials
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.state import CHOOSE, State, Trial, held_out_rms
+from bayeshaptic.diagnosis.thresholds import BUDGET_S
+from bayeshaptic.diagnosis.traced import Candidate, Traced
+from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.numerics.spending import RATE, Meter, metered
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.stability.critical import critical_stiffness
-from bayeshaptic.types import Tick
-
-ROUNDS = 3
-_LAW_ERROR = 0.2  # of the statistic that raised a nonlinear force
-_LAW_REST = 3.0  # what one law may leave more than another, in thresholds
-_MENDED = 1.5  # factor on the thresholds of a recording that something was taken off
-_LINEAR_FIRST = 10.0  # reduced chi-square from which the linear misfit is mended first
-_RIVAL = 0.85  # share of the best score that a rival has at least
-_NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit
-_TIE = 6.0  # difference of scores that one recording does not decide
+from bayeshaptic.types import Progress, Tick
 
 
-def residual_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
-    """All tests of the residual of a fit."""
-    return (
-        *frequency_tests(fit),
-        *nonlinear_tests(fit, etfe),
-        *drift_tests(fit, etfe),
-        *measurement_tests(fit, etfe),
-    )
+class Trials(Protocol):
+    """How candidates are fitted to a kind of recording, and on what they are judged."""
+
+    @property
+    def first(self) -> State:
+        """The state that the loop begins with."""
+
+    def tests(self, state: State) -> tuple[Test, ...]:
+        """The tests of a state's residual."""
+
+    def mended(self, state: State) -> State:
+        """With what is wrong with the samples mended; the very same where nothing is."""
+
+    def trials(
+        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
+    ) -> list[Trial]:
+        """Trials of every class that a test raises."""
+
+    def without_needless(self, state: State) -> tuple[State, str | None]:
+        """Without the earlier effect that a later one made needless, and its name; or as it is."""
 
 
-def trace(etfe: Etfe, fit: Fit, tick: Tick | None = None) -> Traced:
+def trials_for(etfe: Etfe, fit: Fit) -> Trials:
+    """The trials of a base model fitted to a measurement of its kind."""
+    return LineTrials(etfe, fit) if is_periodic(etfe) else WindowTrials(State(etfe, fit))
+
+
+def trace(
+    etfe: Etfe,
+    fit: Fit,
+    progress: Progress | None = None,
+    budget_s: float = BUDGET_S,
+    trials: Trials | None = None,
+) -> Traced:
     """Run the loop on a fitted base model.
 
     Each round tests the residual, tries the candidates of every class that a test raises, each
-    fitted to half of the windows, and accepts the one that best predicts another quarter; until
-    nothing is raised, nothing convinces, or three rounds are over.
+    fitted to half of the windows, and accepts the one that best predicts another quarter, unless
+    it raises the held-out error; then takes out again what that made needless; until nothing is
+    raised, nothing convinces, or the budget is spent.
 
     Parameters
     ----------
     etfe : Etfe
     fit : Fit
         Of the base model.
-    tick : callable, optional
-        Called with what is being tried.
+    progress : callable, optional
+        Called with the share done and what is being tried.
+    budget_s : float
+        In nominal seconds; counted in evaluations, so that the verdict is the same on every
+        machine.
+    trials : Trials, optional
+        By default those of the measurement's kind.
 
     Returns
     -------
     Traced
     """
-    if is_periodic(etfe):  # its residual repeats: lines are held out, not windows of noise
-        from bayeshaptic.diagnosis.periodic.trace import trace_periodic
+    with metered(budget_s * RATE) as meter:
+        return _Loop(trials or trials_for(etfe, fit), meter, progress).run()
 
-        return trace_periodic(etfe, fit, tick)
-    before = tests = seen = residual_tests(fit, etfe)
-    state = repair_measurement(State(etfe, fit))
-    candidates = [
-        Candidate(e.name, e.title, _score_of(e.name, before), True, 0) for e in state.accepted
-    ]
-    if state.accepted:
-        tests = _remaining_tests(state, seen)
+
+@dataclass
+class _Loop:
+    """The loop's own memory."""
+
+    kind: Trials
+    meter: Meter
+    progress: Progress | None
+    seen: tuple[Test, ...] = ()
+    candidates: list[Candidate] = field(default_factory=list)
     rejected: tuple[Trial, ...] = ()
-    for number in range(1, ROUNDS + 1):
-        if not any(test.flagged for test in tests):
-            break
-        seen = (*seen, *tests)
-        trials = _trials(state, tests, tick)
-        chosen = _choose(trials, seen)
-        candidates += [
-            Candidate(t.name, t.accepted.title, t.score, t is chosen, number) for t in trials
+    path: list[State] = field(default_factory=list)
+    number: int = 0
+
+    def run(self) -> Traced:
+        state = self.kind.first
+        before = self.seen = self.kind.tests(state)
+        self.path = [state]
+        state, tests = self._mended(state, before)
+        while any(test.flagged for test in tests):
+            self.number += 1
+            found = self._round(state, tests)
+            if found is None:
+                break
+            state, tests = self._mended(*found)
+        verdict, residual_class = acceptance.verdict_of(state.accepted, tests)
+        return Traced(
+            verdict,
+            residual_class,
+            state,
+            before,
+            tests,
+            tuple(self.candidates),
+            self.rejected,
+            tuple(self.path),
+            tuple(self.meter.skipped),
+        )
+
+    def _mended(self, state: State, tests: tuple[Test, ...]) -> tuple[State, tuple[Test, ...]]:
+        """With the samples mended, where that does not raise the held-out error.
+
+        Tried again after every round: what the model lacked may have looked like a fault.
+        """
+        mended = self.kind.mended(state)
+        if mended is state or self._raises(held_out_rms(state.fit, CHOOSE), mended):
+            return state, tests
+        new = mended.accepted[len(state.accepted) :]
+        self.candidates += [
+            Candidate(e.name, e.title, _statistic(e.name, tests), True, self.number) for e in new
         ]
-        rejected = tuple(t for t in trials if t.convincing and t is not chosen)
+        return self._accepted(mended, self._remaining(mended))
+
+    def _round(
+        self, state: State, tests: tuple[Test, ...]
+    ) -> tuple[State, tuple[Test, ...]] | None:
+        """The state with one more effect, and what is left; None where nothing convinces."""
+        trials = self.kind.trials(state, tests, self.meter, self._tick)
+        left: dict[int, tuple[Test, ...]] = {}
+
+        def remaining(trial: Trial) -> tuple[Test, ...]:
+            if id(trial) not in left:
+                left[id(trial)] = self._remaining(trial.state)
+            return left[id(trial)]
+
+        error = held_out_rms(state.fit, CHOOSE)
+        open_ = [t for t in trials if t.convincing and not self._raises(error, t.state)]
+        chosen = acceptance.choose(open_, lambda trial: acceptance.excess(remaining(trial)))
+        self.candidates += [
+            Candidate(t.name, t.accepted.title, t.score, t is chosen, self.number)
+            for t in sorted(trials, key=lambda trial: -trial.score)
+        ]
+        self.rejected = tuple(trial for trial in open_ if trial is not chosen)
         if chosen is None:
-            break
-        state = _with_ties(chosen, trials)
-        tests = _remaining_tests(state, seen)
-    verdict, residual_class = verdict_of(state, tests)
-    return Traced(verdict, residual_class, state, before, tests, tuple(candidates), rejected)
+            return None
+        found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
+        lighter, gone = self.kind.without_needless(found)
+        if gone is not None:
+            found, tests = lighter, self._remaining(lighter)
+            self.candidates = [
+                replace(c, taken_out=c.taken_out or (c.accepted and c.name == gone))
+                for c in self.candidates
+            ]
+        return self._accepted(found, tests)
+
+    def _accepted(self, state: State, tests: tuple[Test, ...]) -> tuple[State, tuple[Test, ...]]:
+        self.seen = (*self.seen, *tests)
+        self.path.append(state)
+        return state, tests
+
+    def _remaining(self, state: State) -> tuple[Test, ...]:
+        return acceptance.remaining(self.kind.tests(state), state.accepted, self.seen)
+
+    def _raises(self, error: float, after: State) -> bool:
+        return acceptance.raises_error(error, held_out_rms(after.fit, CHOOSE))
+
+    def _tick(self, what: str) -> None:
+        if self.progress:
+            # Each round is half of what is left: nobody knows how many there will be.
+            share = 1 - 0.5 ** (self.number - 1)
+            self.progress(share, f"round {self.number}: trying {what}")
 
 
-def _score_of(name: str, tests: tuple[Test, ...]) -> float:
+def _statistic(name: str, tests: tuple[Test, ...]) -> float:
     """The statistic of a measurement effect's own test."""
     return max((test.statistic for test in tests if test.name == name), default=0.0)
-
-
-def _remaining_tests(state: State, seen: tuple[Test, ...]) -> tuple[Test, ...]:
-    """The tests of what is left, and how much of it counts, after those `seen` so far.
-
-    Where the response drifts the limit is that of the worst part; that the part drifts a little
-    too is no news.  A law of friction is an approximation: a fifth of what it explained may
-    remain; and a recording that was mended, or goes on in part, is not as good as a sound one.
-    """
-    known = {effect.name for effect in state.accepted if effect.family == "measurement"}
-    tests = tuple(t for t in residual_tests(state.fit, state.etfe) if t.name not in known)
-    if known:  # which is where the excess of noise comes from
-        tests = tuple(test for test in tests if test.family != "measurement")
-    families = {effect.family for effect in state.accepted}
-    if "time-varying" in families:
-        tests = tuple(test for test in tests if test.family != "time-varying")
-    explained = 0.0
-    if "nonlinear" in families:
-        explained = max((t.statistic for t in seen if t.family == "nonlinear"), default=0.0)
-    if families & {"nonlinear", "measurement", "time-varying"}:
-        tests = tuple(_allowing(test, explained) for test in tests)
-    return tests
-
-
-def _allowing(test: Test, explained: float) -> Test:
-    """`test` with the threshold that it has after something was taken off the recording."""
-    least = _LAW_ERROR * explained if test.family == "nonlinear" else 0.0
-    return replace(test, threshold=max(_MENDED * test.threshold, least))
-
-
-def _trials(state: State, tests: tuple[Test, ...], tick: Tick | None) -> list[Trial]:
-    """Trials of every class that a test raises, best score first."""
-    raised = {test.name for test in tests if test.flagged}
-    families = {test.family for test in tests if test.flagged}
-    trials: list[Trial] = []
-    if "linear" in families:
-        trials += linear_trials(state, tick)
-        # On a model that is far off, a nonlinear force cannot be sized: first things first.
-        far_off = state.fit.reduced_chi_square > _LINEAR_FIRST
-        if far_off and any(trial.convincing for trial in trials):
-            families = {"linear"}
-    if "time-varying" in families:
-        trials += drift_trials(state, tick)
-    if "nonlinear" in families:
-        trials += nonlinear_trials(state, raised, tick)
-    return sorted(trials, key=lambda trial: -trial.score)
-
-
-def _choose(trials: list[Trial], seen: tuple[Test, ...]) -> Trial | None:
-    """The convincing trial that leaves least; of those that leave nothing, the best.
-
-    A wrong effect can gain nearly as much as the right one and then need another to mend it: an
-    alternative is better than an addition.
-    """
-    good = [trial for trial in trials if trial.convincing]
-    if not good:
-        return None
-    rivals = [trial for trial in good if trial.score > _RIVAL * good[0].score]
-    left = [_left(_remaining_tests(trial.state, seen)) for trial in rivals]
-    least = min(left)
-    # Laws of one force differ in what they leave by chance; linear effects do not.
-    more = _LAW_REST if good[0].accepted.family == "nonlinear" else 0.0
-    best = [t for t, rest in zip(rivals, left, strict=True) if rest <= 1.2 * least + more]
-    close = [trial for trial in best if _ties(best[0], trial)]
-    return min(close, key=lambda trial: (trial.size, -trial.score))
-
-
-def _left(tests: tuple[Test, ...]) -> float:
-    """How far tests are over their thresholds, all together."""
-    return sum(test.excess for test in tests if test.flagged)
-
-
-def _ties(best: Trial, other: Trial) -> bool:
-    """Whether the recording hardly tells two effects of a class apart.
-
-    Two laws of friction differ by less than either differs from the truth: there a twentieth of
-    the score counts as nothing.
-    """
-    if other.accepted.family != best.accepted.family:
-        return False
-    law = 0.05 * best.score if best.accepted.family == "nonlinear" else 0.0
-    return abs(best.score - other.score) < max(_TIE, law)
-
-
-def _with_ties(chosen: Trial, trials: list[Trial]) -> State:
-    """The chosen trial's state, its effect naming those that do as well, and their spread."""
-    rivals = [t for t in trials if t is not chosen and t.convincing and _ties(chosen, t)]
-    *earlier, own = chosen.state.accepted
-    spread = own.limit_log_sd
-    if rivals:
-        here, *others = (
-            critical_stiffness(t.state.model, t.state.fit.theta).value for t in (chosen, *rivals)
-        )
-        apart = max(abs(np.log(max(other, 1e-9) / max(here, 1e-9))) for other in others)
-        spread = float(np.hypot(spread, apart / _NINETY))
-    names = tuple(dict.fromkeys((*own.ties, *(t.name for t in rivals))))
-    own = replace(own, ties=names, limit_log_sd=spread)
-    return replace(chosen.state, accepted=(*earlier, own))
-
-
-def verdict_of(state: State, tests: tuple[Test, ...]) -> tuple[str, str | None]:
-    """The verdict on what is left, and its class."""
-    left = [test for test in tests if test.flagged]
-    if left:
-        return UNEXPLAINED, max(left, key=lambda test: test.excess).family
-    if state.accepted:
-        return EXPLAINED, state.accepted[0].family
-    return CONSISTENT, None

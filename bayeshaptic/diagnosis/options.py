@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device, load_device
+from bayeshaptic.diagnosis.thresholds import BUDGET_S
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import Model, Prior
 from bayeshaptic.recordings.read import read_measurement
@@ -39,6 +40,9 @@ class Options:
         Effective draws of every parameter; by default what the limit wants
         (`bayeshaptic.diagnosis.limit_known`).
     seed : int
+    budget_s : float
+        What the search for effects may cost, in nominal seconds: evaluations are counted, so that
+        the verdict is the same on every machine (`bayeshaptic.numerics.spending`).
     progress : callable or None
         Called with the share done, 0 to 1, and a word about it.
     """
@@ -52,6 +56,7 @@ class Options:
     lever_m: float | None = None
     ess: float | None = None
     seed: int = 0
+    budget_s: float = BUDGET_S
     progress: Progress | None = field(default=None, compare=False)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Options:

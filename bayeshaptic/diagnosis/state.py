@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.inference.least_squares import Fit, polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
+from bayeshaptic.models.model import Extension
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Complexes, Floats
 
 # Windows are dealt out in turn: half of them to fit, a quarter to choose, a quarter to report on.
 FIT, CHOOSE, REPORT = (0, 2), (1,), (3,)
@@ -33,6 +36,27 @@ class Estimate:
     mean: float
     sd: float
     unit: str
+
+
+@dataclass(frozen=True)
+class Change:
+    """What an accepted effect changed, so that it can be taken out again.
+
+    Attributes
+    ----------
+    effect : Extension or None
+        What it added to the model.
+    force, position : complex ndarray, shape (L,)
+        What it took off the spectra.
+    command, motion : ndarray, shape (N,)
+        What it took off the recording.
+    """
+
+    effect: Extension | None = None
+    force: Complexes | float = 0.0
+    position: Complexes | float = 0.0
+    command: Floats | float = 0.0
+    motion: Floats | float = 0.0
 
 
 @dataclass(frozen=True)
@@ -57,6 +81,8 @@ class Accepted:
         What the uncertainty of the effect adds to log K_CR, as a standard deviation.
     limit_log_fall : float
         How much lower still log K_CR is if a drift goes on as it does between the parts.
+    change : Change or None
+        None where it cannot be taken out by itself.
     """
 
     name: str
@@ -69,6 +95,7 @@ class Accepted:
     told_apart_by: str = ""
     limit_log_sd: float = 0.0
     limit_log_fall: float = 0.0
+    change: Change | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -126,12 +153,8 @@ class Trial:
 
     @property
     def convincing(self) -> bool:
-        """Does it predict what it was not fitted to?
-
-        The windows to choose by are half as many as those to fit, so that half of the gain is
-        what a true effect brings; an overfit one brings next to nothing.
-        """
-        return self.gain_choose > 8.0 and self.gain_choose > 0.15 * self.gain_fit
+        """Does it predict what it was not fitted to?"""
+        return thresholds.convincing(self.gain_fit, self.gain_choose, self.size)
 
 
 def share(windows: Windows, parts: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -139,13 +162,44 @@ def share(windows: Windows, parts: tuple[int, ...]) -> NDArray[np.bool_]:
     return np.isin(np.arange(len(windows.scatter)) % 4, parts)
 
 
-def log_likelihoods(model: Model, windows: Windows, theta: Floats) -> tuple[float, float]:
-    """Log likelihood of one vector on the windows to fit and on those to choose by."""
-    pointwise = Likelihood(model, windows).pointwise(theta[None])[0]
-    return (
-        float(pointwise[share(windows, FIT)].sum()),
-        float(pointwise[share(windows, CHOOSE)].sum()),
-    )
+def log_likelihoods(model: Model, windows: Windows, theta: Floats) -> Floats:
+    r"""Log likelihood of one vector on the windows to fit and on those to choose by, shape (2,).
+
+    Where a model is far off, what is left acts as noise of that size, and a gain that is small
+    beside it says nothing.  With c >= 1 the factor on the noise variance that suits the windows to
+    fit best, those to choose by are judged with the same c:
+
+    .. math:: \log p = -\sum (n-1) \log(s_0 + |z - R g|^2 / c) + k \log c
+
+    in the terms of `Likelihood`, k the nodes of a window; at c = 1 that is `Likelihood` itself.
+    """
+    left = Likelihood(model, windows).deviations(theta[None])[0]
+    power = np.sum(np.abs(left) ** 2, axis=1)
+    nodes = left.shape[1]
+    fitted, freedom = share(windows, FIT), windows.lines - 1
+    c = _noise_factor(power[fitted], windows.scatter[fitted], freedom[fitted], nodes)
+    pointwise = -freedom * np.log(windows.scatter + power / c) - nodes * np.log(c)
+    return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
+
+
+def _noise_factor(power: Floats, scatter: Floats, freedom: Floats, nodes: int) -> float:
+    """The most likely factor, at least 1, on the noise variance of all windows."""
+
+    def surplus(log_c: float) -> float:  # the likelihood's slope, which falls
+        return float(np.sum(freedom * power / (np.exp(log_c) * scatter + power) - nodes))
+
+    if surplus(0.0) <= 0:
+        return 1.0
+    highest = float(np.log(np.max(freedom * power / scatter)))  # where every term is negative
+    return float(np.exp(brentq(surplus, 0.0, max(highest, 1.0))))
+
+
+def held_out_rms(fit: Fit, part: tuple[int, ...] = REPORT) -> float:
+    """Weighted rms on a quarter of the windows, with the model fitted to the others; 1 is noise."""
+    out = share(fit.windows, part)
+    theta = polish(fit.model, fit.windows.part(~out), fit.theta)
+    left = Likelihood(fit.model, fit.windows.part(out)).normalised(theta[None])[0]
+    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
 def describe_gain(gain: float, extra: Any = "") -> str:

@@ -23,6 +23,8 @@ class Candidate:
     accepted : bool
     round : int
         From 1; 0 for what was wrong with the measurement itself.
+    taken_out : bool
+        Whether it was accepted and a later one made it needless.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Candidate:
     score: float
     accepted: bool
     round: int
+    taken_out: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,10 @@ class Traced:
     candidates : tuple of Candidate
     rejected : tuple of Trial
         Trials of the last round that were good but not accepted: how else it could be.
+    path : tuple of State
+        From the base model on, one for each time that something was accepted.
+    skipped : tuple of str
+        What was not tried because the budget was spent.
     """
 
     verdict: str
@@ -57,3 +64,5 @@ class Traced:
     after: tuple[Test, ...]
     candidates: tuple[Candidate, ...] = ()
     rejected: tuple[Trial, ...] = ()
+    path: tuple[State, ...] = ()
+    skipped: tuple[str, ...] = ()

@@ -45,6 +45,8 @@ class LinearEffect(ABC):
     """Effects that one recording may not tell from this one."""
     told_apart_by: ClassVar[str] = ""
     """The measurement that would separate the ties, in words."""
+    several: ClassVar[bool] = False
+    """Whether a device may have more than one of it."""
 
     @classmethod
     @abstractmethod

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.models import Model
 from bayeshaptic.models.response.kernels.arrays import RationalArrays, WindowArrays
+from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
@@ -63,6 +64,7 @@ class Likelihood:
         return self._deviations(theta, 1 / np.sqrt(self.noise_variance))
 
     def _deviations(self, theta: Floats, weight: Floats) -> Complexes:
+        spend(len(theta) * self.windows.frequency_hz.size)
         form = self._rational_form(theta)
         if form is None:
             return self.plain_deviations(theta) * weight[:, None]

@@ -212,3 +212,12 @@ class Model:
         delay = tuple(p for p in self.parameters if p.name == "delay_s")
         parameters = own + tuple(effect.parameters) + delay
         return replace(self, parameters=parameters, effects=(*self.effects, effect))
+
+    def without_effect(self, effect: Extension) -> Model:
+        """Without `effect`, one of its linear effects, and the parameters that came with it."""
+        gone = {parameter.name for parameter in effect.parameters}
+        return replace(
+            self,
+            parameters=tuple(p for p in self.parameters if p.name not in gone),
+            effects=tuple(e for e in self.effects if e is not effect),
+        )

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from bayeshaptic.diagnosis.acceptance import verdict_of
+from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics, inverse_dynamics
-from bayeshaptic.diagnosis.loop import residual_tests, verdict_of
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.effects.library import effects
@@ -62,7 +63,7 @@ def trace_force(etfe: Etfe, fit: Fit, force: ForceExplained) -> Traced:
     """What the loop found in the force; the residual of the biased response stays as it is."""
     tests = residual_tests(fit, etfe)
     state = State(etfe, fit, _friction(force))
-    verdict, residual_class = verdict_of(state, tests)
+    verdict, residual_class = verdict_of(state.accepted, tests)
     return Traced(verdict, residual_class, state, tests, tests)
 
 

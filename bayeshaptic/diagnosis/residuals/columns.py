@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.models.response.motion import linear_motion
@@ -20,7 +21,6 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
-_THRESHOLD = 4.5
 _HAND_HZ = 20.0  # below it a hand moves the device, and the encoder sees it well
 
 
@@ -34,7 +34,7 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
         windows = etfe.spectra.windows(fit.response, column[None])
         coefficient, score = common_coefficient(windows)
         text = f"a force like {name} stands {abs(score):.1f} standard deviations out of the noise"
-        tests.append(Test(name, "nonlinear", abs(score), _THRESHOLD, None, text))
+        tests.append(Test(name, "nonlinear", abs(score), thresholds.two_sided(), None, text))
     return tuple(tests)
 
 

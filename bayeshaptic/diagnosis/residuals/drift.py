@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import line_transform
 from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 
-_THRESHOLD = 4.8
 _KNOTS = 6
 _SHAPES = {"a steady change": lambda t: t, "a change and back": lambda t: 1.5 * t**2 - 0.5}
 
@@ -34,7 +34,7 @@ def drift_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
         column = response * at_lines(force * shape(time))
         score, where = _smooth_score(etfe.spectra.windows(fit.response, column[None]))
         text = f"{name} of the response during the recording ({score:.1f} standard deviations)"
-        tests.append(Test(name, "time-varying", score, _THRESHOLD, where, text))
+        tests.append(Test(name, "time-varying", score, thresholds.normal(), where, text))
     return tuple(tests)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.recording import Recording
@@ -11,7 +12,6 @@ from bayeshaptic.recordings.response.etfe import Etfe, RandomSpectra
 from bayeshaptic.recordings.response.local_polynomial import leakage_terms
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 
-THRESHOLD = 6.0
 _HAND_HZ, _FREE_HZ = 45.0, 20.0  # below it a hand, or a draught, moves the device
 _QUIET = 3e-3  # power of the force, over that in the band, which moves nothing up there
 _LINES, _FEWEST = 60, 5
@@ -46,7 +46,9 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     worst = int(np.argmax(rise))
     where = float(centre[driven][worst + _TOGETHER // 2])
     text = f"the noise around {where:.3g} Hz is {rise[worst]:.1f} dB above that beyond the band"
-    return (Test("excess noise", "nonlinear", float(rise[worst]), THRESHOLD, where, text),)
+    return (
+        Test("excess noise", "nonlinear", float(rise[worst]), thresholds.EXCESS_DB, where, text),
+    )
 
 
 def _counts_a_sample(recording: Recording) -> float:

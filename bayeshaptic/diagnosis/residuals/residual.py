@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import ndtri_exp
 from scipy.stats import chi2, f, norm
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.least_squares import Fit, weighted_residuals
 from bayeshaptic.numerics.gauss_newton import jacobian
@@ -83,20 +84,21 @@ def _band_test(fit: Fit) -> Test:
     centre = np.log10(fit.windows.frequency_hz.mean(axis=1))
     band = np.floor((centre - centre[0]) / _BAND_DECADES).astype(int)
     worst, where = -np.inf, 0.0
-    for index in np.unique(band):
+    bands = np.unique(band)
+    for index in bands:
         inside = band == index
         z = scores[inside].sum() / np.sqrt(inside.sum())
         if z > worst:
             worst, where = float(z), float(10 ** centre[inside].mean())
     text = f"the residual around {where:.3g} Hz is {worst:.1f} standard deviations above noise"
-    return Test("bands", "linear", worst, 5.0, where, text)
+    return Test("bands", "linear", worst, thresholds.normal(len(bands)), where, text)
 
 
 def _total_test(fit: Fit) -> Test:
     scores = window_scores(fit)
     z = float(scores.sum() / np.sqrt(len(scores)))
     text = f"over all frequencies the residual is {z:.1f} standard deviations above noise"
-    return Test("total", "linear", z, 4.5, None, text)
+    return Test("total", "linear", z, thresholds.normal(), None, text)
 
 
 def _smooth_test(fit: Fit) -> Test:
@@ -111,7 +113,7 @@ def _smooth_test(fit: Fit) -> Test:
     strongest = int(np.argmax(np.abs(columns) @ np.abs(found)))
     where = float(centres[strongest])
     text = f"a smooth change of the response would explain it ({z:.1f} standard deviations)"
-    return Test("smooth change", "linear", z, 5.0, where, text)
+    return Test("smooth change", "linear", z, thresholds.SMOOTH, where, text)
 
 
 def smooth_columns(fit: Fit) -> tuple[Floats, Floats, Floats]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Bools, Samples
 
-THRESHOLD = 6.0
 _FEWEST = 4  # samples on an extreme that are worth a look
 _LEVELS = 4  # a position that takes fewer is none
 
@@ -43,6 +43,6 @@ def clipped(samples: Samples) -> tuple[Bools, float]:
             continue
         beyond = np.sort(beyond)
         statistic = max(statistic, float(beyond[-_FEWEST // 2]))
-        if beyond[-_FEWEST // 2] > THRESHOLD:
+        if beyond[-_FEWEST // 2] > thresholds.CLIPPED:
             wrong |= there
     return wrong, statistic

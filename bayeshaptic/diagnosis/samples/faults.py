@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Predictor, Samples
 
-LOST_THRESHOLD = 4.0
-WILD_THRESHOLD = 4.0
 _ERRORS = 5.0  # how badly a sample must be predicted to be looked at
 _WILD = 8.0  # how far off a wild one must be, in the same measure
 _MOST = 300  # more are no faults but noise
@@ -89,7 +88,7 @@ def faults(samples: Samples) -> Faults:
         if len(look.gaps) <= look.unexplained:
             break
         lost += sum(len(gap.force) for gap in look.gaps)
-        if lost <= LOST_THRESHOLD:
+        if lost <= thresholds.LOST:
             break
         mended = _restored(mended, look.gaps)
         look = _look(mended, look.predictor)

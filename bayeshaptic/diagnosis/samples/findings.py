@@ -7,15 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.samples.clipped import THRESHOLD as CLIPPED_THRESHOLD
-from bayeshaptic.diagnosis.samples.faults import LOST_THRESHOLD, WILD_THRESHOLD, Faults
+from bayeshaptic.diagnosis.samples.faults import Faults
 from bayeshaptic.diagnosis.samples.jitter import Jitter
 from bayeshaptic.diagnosis.samples.prediction import Bools
-from bayeshaptic.diagnosis.samples.repeated import THRESHOLD as HELD_THRESHOLD
-from bayeshaptic.diagnosis.samples.resolution import THRESHOLD as RESOLUTION_THRESHOLD
 from bayeshaptic.diagnosis.samples.resolution import Resolution
-from bayeshaptic.diagnosis.samples.tones import THRESHOLD as TONE_THRESHOLD
 from bayeshaptic.diagnosis.samples.tones import Tones
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.effects.measurement import (
@@ -91,7 +88,7 @@ def of_resolution(found: Resolution, unit: str) -> Finding:
         text += f" where {found.declared:.4g} {unit} were declared" if found.declared else ""
     estimates = {"resolution": Estimate(found.count, 0.0, unit)}
     return Finding(
-        Quantisation, found.statistic, RESOLUTION_THRESHOLD, text, estimates, mended=False
+        Quantisation, found.statistic, thresholds.RESOLUTION, text, estimates, mended=False
     )
 
 
@@ -113,7 +110,7 @@ def of_clipping(recording: Recording, wrong: Bools, statistic: float) -> Finding
     return Finding(
         PositionClipping,
         statistic,
-        CLIPPED_THRESHOLD,
+        thresholds.CLIPPED,
         text,
         estimates,
         known=bool(np.isfinite(statistic)),
@@ -128,7 +125,7 @@ def of_held(wrong: Bools, statistic: float) -> Finding:
             f"{wrong.sum()} positions ({100 * wrong.mean():.2g} %) repeat the one before although "
             "the device moved on; they were filled in"
         )
-    return Finding(HeldSamples, statistic, HELD_THRESHOLD, text, {"share": _share(wrong)})
+    return Finding(HeldSamples, statistic, thresholds.HELD, text, {"share": _share(wrong)})
 
 
 def of_missing(found: Faults) -> Finding:
@@ -138,14 +135,14 @@ def of_missing(found: Faults) -> Finding:
     if found.lost:
         text = f"{found.lost} rows are missing in places where the motion jumps; they were put back"
     share = Estimate(found.lost / count, np.sqrt(found.lost) / count, "")
-    return Finding(DroppedSamples, float(found.lost), LOST_THRESHOLD, text, {"share": share})
+    return Finding(DroppedSamples, float(found.lost), thresholds.LOST, text, {"share": share})
 
 
 def of_wild(found: Faults) -> Finding:
     """Samples that are far off."""
     text = f"{found.wild.sum()} single positions are far off; they were filled in"
     return Finding(
-        WildSamples, found.wild_score, WILD_THRESHOLD, text, {"share": _share(found.wild)}
+        WildSamples, found.wild_score, thresholds.WILD, text, {"share": _share(found.wild)}
     )
 
 
@@ -178,7 +175,9 @@ def of_tones(found: Tones, unit: str) -> Finding:
         )
         estimates[f"amplitude_{number}"] = Estimate(abs(tone.amplitude), tone.amplitude_sd, unit)
     where = tones[0].frequency_hz if tones else None
-    return Finding(MainsTone, found.score, TONE_THRESHOLD, text, estimates, frequency_hz=where)
+    return Finding(
+        MainsTone, found.score, thresholds.LOG_CHANCE, text, estimates, frequency_hz=where
+    )
 
 
 def _share(wrong: Bools) -> Estimate:

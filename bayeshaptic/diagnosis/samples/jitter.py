@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import savgol_filter
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
 from bayeshaptic.types import Floats
 
-THRESHOLD = 7.0
-THRESHOLD_STAMPED = 2.5  # where the time stamps show jitter already
 _ALIKE = 0.5
 _BLOCK = 100
 _FILTERS = (np.array([1.0]), np.array([1.0, 1.0]), np.array([1.0, -1.0]))
@@ -33,7 +32,7 @@ class Jitter:
     """
 
     score: float
-    threshold: float = THRESHOLD
+    threshold: float = thresholds.JITTER
     sd_s: float = 0.0
     sd_sd_s: float = 0.0
 
@@ -47,7 +46,7 @@ def jitter(samples: Samples) -> Jitter:
     """
     predictor, recording = samples.predictor, samples.recording
     stamped = recording.time_jitter is not None and recording.time_jitter > NOTABLE_JITTER
-    threshold = THRESHOLD_STAMPED if stamped else THRESHOLD
+    threshold = thresholds.JITTER_STAMPED if stamped else thresholds.JITTER
     nothing = Jitter(0.0, threshold)
     if predictor is None or recording.samples < 20 * _BLOCK:
         return nothing

@@ -7,11 +7,7 @@ and the force predict (`prediction`), lines of the spectrum with the lines besid
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 
-import numpy as np
-
-from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.samples import findings
 from bayeshaptic.diagnosis.samples.clipped import clipped
@@ -19,28 +15,35 @@ from bayeshaptic.diagnosis.samples.faults import faults
 from bayeshaptic.diagnosis.samples.filled import discounted
 from bayeshaptic.diagnosis.samples.findings import Finding
 from bayeshaptic.diagnosis.samples.jitter import jitter
-from bayeshaptic.diagnosis.samples.prediction import as_recorded
+from bayeshaptic.diagnosis.samples.prediction import Samples, as_recorded
 from bayeshaptic.diagnosis.samples.repeated import held
 from bayeshaptic.diagnosis.samples.resolution import resolution
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.inference.least_squares import Fit, polish, refine, summarise
+from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 
 
-def measurement_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
-    """A test for each measurement effect, by its name, and one of excess noise.
+def measurement_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tuple[Test, ...]:
+    """A test for each measurement effect, by its name.
 
     None without a recording. Jitter cannot be mended, and stays flagged when it is known.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+    look : SampleLook, optional
+        What the samples showed, where they were looked at before.
     """
     if etfe.recording is None:
         return ()
-    tests = (finding.test for finding in inspect(etfe.recording, fit, etfe).findings)
-    return (*tests, *excess_noise_test(fit, etfe))
+    return tuple(finding.test for finding in inspect(etfe.recording, fit, etfe, look).findings)
 
 
-def repair_measurement(state: State) -> State:
+def repair_measurement(state: State, look: SampleLook | None = None) -> State:
     """The state with the measurement effects that the samples show, the recording mended.
 
     Clipped, held, wild and missing samples are filled in from what all others and the force
@@ -54,38 +57,66 @@ def repair_measurement(state: State) -> State:
     recording = state.etfe.recording
     if recording is None:
         return state
-    look = inspect(recording, state.fit, state.etfe)
-    found = [finding for finding in look.findings if finding.flagged and finding.known]
+    found = inspect(recording, state.fit, state.etfe, look)
+    sure = [finding for finding in found.findings if finding.flagged and finding.known]
     known = {effect.name for effect in state.accepted}
-    new = tuple(finding.accepted for finding in found if finding.effect.name not in known)
+    new = tuple(finding.accepted for finding in sure if finding.effect.name not in known)
     if new:
         state = replace(state, accepted=(*state.accepted, *new))
-    if any(finding.mended for finding in found):
-        return _fitted_again(state, look)
+    if any(finding.mended for finding in sure):
+        return _fitted_again(state, found)
     # The recording has another resolution than was thought.
-    return replace(state, etfe=replace(state.etfe, recording=look.mended)) if new else state
+    return replace(state, etfe=replace(state.etfe, recording=found.mended)) if new else state
 
 
-def _fitted_again(state: State, look: Inspection) -> State:
+def _fitted_again(state: State, found: Inspection) -> State:
     """ETFE of the mended recording in the same band, and the fit to it from the current one.
 
     From the device's own values, too: clipping may have led the current fit far away.
     """
     model, theta = state.model, state.fit.theta
-    etfe = estimate_etfe(look.mended, state.etfe.band_hz)
-    etfe = discounted(replace(etfe, notices=state.etfe.notices), look.measured)
-    nominal = np.array([model.reference.get(name, np.nan) for name in model.names])
-    starts = np.stack([theta, np.where(np.isfinite(nominal), nominal, theta)])
-    theta, _ = refine(model, compress(etfe), starts)
-    for _ in range(2):
-        windows = compress(etfe, partial(model.response, theta))
-        theta = polish(model, windows, theta)
-    return replace(state, etfe=etfe, fit=summarise(model, windows, theta))
+    etfe = estimate_etfe(found.mended, state.etfe.band_hz)
+    etfe = discounted(replace(etfe, notices=state.etfe.notices), found.measured)
+    starts = starting_bases(model, theta)
+    return replace(state, etfe=etfe, fit=least_squares(model, etfe, start=starts))
+
+
+@dataclass(frozen=True)
+class SampleLook:
+    """What the samples show without any model; tones are looked for beside a model's resonances.
+
+    Attributes
+    ----------
+    recording : Recording
+        That was looked at.
+    findings : tuple of Finding
+    samples : Samples or None
+        With what is wrong among them marked; None where nothing can be looked at.
+    resolution : float or None
+        Counts of the position, as far as they are known.
+    """
+
+    recording: Recording
+    findings: tuple[Finding, ...]
+    samples: Samples | None
+    resolution: float | None
+
+    @property
+    def wrong(self) -> bool:
+        """Whether there are samples to mend."""
+        return any(finding.flagged and finding.mended for finding in self.findings)
+
+    def holds_for(self, recording: Recording) -> bool:
+        """Whether it says as much of this recording: the same one, less what a force adds.
+
+        What a force adds is smooth: it makes no sample wrong, and hides none that is.
+        """
+        return recording is self.recording or not self.wrong
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """What the samples show.
+    """What samples and lines show.
 
     Attributes
     ----------
@@ -101,19 +132,20 @@ class Inspection:
     measured: float
 
 
-def inspect(recording: Recording, fit: Fit, etfe: Etfe) -> Inspection:
-    """Look at every sample and every line, and mend what is wrong.
+def look_at_samples(recording: Recording, etfe: Etfe) -> SampleLook:
+    """Look at every sample, and mark what is wrong.
 
     In this order, because each hides the next: clipping, held samples, missing rows, jitter, wild
-    samples, tones.
+    samples.
     """
-    samples, unit = as_recorded(recording), recording.position_unit
+    samples = as_recorded(recording)
     counts = resolution(samples, etfe)
-    coarse = findings.of_resolution(counts, unit)
+    coarse = findings.of_resolution(counts, recording.position_unit)
+    count = counts.count if coarse.flagged else recording.encoder_resolution
     wrong, statistic = clipped(samples)
     cut = findings.of_clipping(recording, wrong, statistic)
     if not cut.known:  # there is nothing to look at
-        return Inspection([coarse, cut], recording, 1.0)
+        return SampleLook(recording, (coarse, cut), None, count)
     samples = samples.without(wrong)
     wrong, statistic = held(samples)
     repeated = findings.of_held(wrong, statistic)
@@ -128,11 +160,23 @@ def inspect(recording: Recording, fit: Fit, etfe: Etfe) -> Inspection:
     wild = findings.of_wild(faulty)
     if wild.flagged:
         samples = samples.without(faulty.wild)
-    mended = samples.mended
+    return SampleLook(recording, (coarse, cut, repeated, missing, late, wild), samples, count)
+
+
+def inspect(
+    recording: Recording, fit: Fit, etfe: Etfe, look: SampleLook | None = None
+) -> Inspection:
+    """Look at every sample and at every line, and mend what is wrong.
+
+    `look` is what the samples showed before: that does not depend on the model, and costs more than
+    all other tests together.
+    """
+    own = look if look and look.holds_for(recording) else look_at_samples(recording, etfe)
+    if own.samples is None:
+        return Inspection(list(own.findings), recording, 1.0)
+    mended = own.samples.mended if own.wrong else recording
     lines = find_tones(mended, etfe.band_hz, fit.response)
-    humming = findings.of_tones(lines, unit)
-    found = [coarse, cut, repeated, missing, late, wild, humming]
-    count = counts.count if coarse.flagged else recording.encoder_resolution
-    mended = replace(mended, position=lines.taken_off(mended), encoder_resolution=count)
-    measured = getattr(etfe.spectra, "measured", 1.0) * (1 - float(samples.missing.mean()))
-    return Inspection(found, mended, measured)
+    humming = findings.of_tones(lines, recording.position_unit)
+    mended = replace(mended, position=lines.taken_off(mended), encoder_resolution=own.resolution)
+    measured = getattr(etfe.spectra, "measured", 1.0) * (1 - float(own.samples.missing.mean()))
+    return Inspection([*own.findings, humming], mended, measured)

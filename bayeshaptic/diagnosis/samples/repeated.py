@@ -6,7 +6,6 @@ import numpy as np
 
 from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Samples
 
-THRESHOLD = 10.0
 _ERRORS = 5.0  # how far off a repeated sample must be, in errors of the prediction
 _UNITS = 1.5  # increments a sample that no rounding turns into zero
 _SPREADS = 4.0  # nor the noise

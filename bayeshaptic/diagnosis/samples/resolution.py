@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
 from bayeshaptic.recordings.response.etfe import Etfe
 
-THRESHOLD = 1.5
 _SLOW = 350.0  # counts a second, in the mean: usual encoders give twice that and more
 _POOR = 0.075  # median relative standard deviation of the response
 _ITS_OWN = 3.0  # squared prediction error over what rounding leaves
@@ -52,4 +52,4 @@ def resolution(samples: Samples, etfe: Etfe) -> Resolution:
         samples.predictor.spread**2 < _ITS_OWN * unit**2 / 6
     )
     coarse = min(_SLOW / speed, poor) if rounding else 0.0
-    return Resolution(unit, None, THRESHOLD * coarse)
+    return Resolution(unit, None, thresholds.RESOLUTION * coarse)

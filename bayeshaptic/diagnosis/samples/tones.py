@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 from scipy.stats import f
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.local_polynomial import leakage_terms
 from bayeshaptic.recordings.response.windows import Reference
@@ -22,7 +23,6 @@ from bayeshaptic.types import Complexes, Floats
 
 Indices = NDArray[np.intp]
 
-THRESHOLD = 5.0  # minus log10 of the chance of one line standing out so far, times all lines
 _HALF = 20  # lines to each side
 _OWN = 0.05  # of a tone, what response and leakage must leave
 _MOST = 24  # a tone that wanders takes several
@@ -180,7 +180,7 @@ def find_tones(recording: Recording, band_hz: tuple[float, float], reference: Re
         return Tones((), 0.0)
     windows = _windows(lines)
     strongest = score = _strongest(lines, windows)
-    while score[0] > THRESHOLD and len(found) < _MOST:
+    while score[0] > thresholds.LOG_CHANCE and len(found) < _MOST:
         tone = _fitted(lines, score[1])
         lines.position = lines.position - 0.5 * tone.amplitude * lines.of(
             tone.frequency_hz, slice(None)

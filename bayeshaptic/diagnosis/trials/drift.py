@@ -6,24 +6,30 @@ between the middle of that part and its end.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from bayeshaptic.diagnosis.state import CHOOSE, FIT, Accepted, Estimate, State, Trial, share
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.state import (
+    FIT,
+    Accepted,
+    Estimate,
+    State,
+    Trial,
+    log_likelihoods,
+    share,
+)
 from bayeshaptic.effects.linear.gain import Gain
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.least_squares import least_squares, polish, summarise
-from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
+from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
-from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.stability.critical import critical_stiffness
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Tick
 
 PARTS = 3
 _SHORTEST_S = 5.0
@@ -46,8 +52,11 @@ _DEVICE = _Kind(
 )
 
 
-def drift_trials(state: State, tick: Callable[[str], None] | None = None) -> list[Trial]:
-    """One trial for each group of parameters that may drift; none for short recordings."""
+def drift_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[Trial]:
+    """One trial for each group of parameters that may drift; none for short recordings.
+
+    `meter` says whether one more is affordable, `tick` is called with the title of each.
+    """
     recording = state.etfe.recording
     if recording is None or recording.duration_s < PARTS * _SHORTEST_S:
         return []
@@ -64,7 +73,8 @@ def drift_trials(state: State, tick: Callable[[str], None] | None = None) -> lis
         model = state.model
         if kind is _GAIN:
             model = model.with_effect(Gain.candidates(model, state.etfe)[0])
-        if any(name in model.names for name in kind.parameters):
+        own = any(name in model.names for name in kind.parameters)
+        if own and meter.affords(kind.title):
             if tick:
                 tick(kind.title)
             trials.append(_try(state, kind, model, parts))
@@ -81,9 +91,9 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
     for part in parts:
         windows = compress(part, state.fit.response)
         theta = np.array([start[name] for name in narrow.names])
-        before = _log_likelihoods(narrow, windows, theta)
+        before = log_likelihoods(narrow, windows, theta)
         theta = polish(narrow, windows.part(share(windows, FIT)), theta)
-        gains += _log_likelihoods(narrow, windows, theta) - before
+        gains += log_likelihoods(narrow, windows, theta) - before
         found.append(theta)
     limits = critical_stiffness(narrow, np.stack(found)).samples
     worst = int(np.argmin(limits))
@@ -99,11 +109,11 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         estimates,
         limit_log_fall=0.0 if kind is _GAIN else _fall(limits),
     )
-    changed = state
-    if gains[1] > 8 and kind is _GAIN:
+    changed, good = state, thresholds.convincing(gains[0], gains[1], size)
+    if good and kind is _GAIN:
         changed, spread = _with_steady_gain(state, narrow, start)
         accepted = replace(accepted, limit_log_sd=spread)
-    elif gains[1] > 8:
+    elif good:
         changed = _on_part(state, parts[worst], dict(zip(narrow.names, found[worst], strict=True)))
     changed = replace(changed, accepted=(*state.accepted, accepted))
     return Trial(accepted, changed, float(gains[0]), float(gains[1]), size)
@@ -160,15 +170,7 @@ def _on_part(state: State, part: Etfe, found: dict[str, float]) -> State:
     """The loop goes on with the worst part of the recording alone."""
     model = state.model
     theta = np.array([found.get(n, state.fit.theta[i]) for i, n in enumerate(model.names)])
-    for _ in range(2):
-        windows = compress(part, partial(model.response, theta))
-        theta = polish(model, windows, theta)
-    return replace(state, etfe=part, fit=summarise(model, windows, theta))
-
-
-def _log_likelihoods(model: Model, windows: Windows, theta: Floats) -> Floats:
-    pointwise = Likelihood(model, windows).pointwise(theta[None])[0]
-    return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
+    return replace(state, etfe=part, fit=least_squares(model, part, start=theta))
 
 
 def _estimates(model: Model, found: list[Floats]) -> dict[str, Estimate]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.diagnosis.residuals.columns import line_transform
-from bayeshaptic.diagnosis.state import CHOOSE, FIT, State, share
+from bayeshaptic.diagnosis.state import FIT, State, log_likelihoods, share
 from bayeshaptic.effects.nonlinear.internal_force import (
     CONNECTION,
     LOAD,
@@ -24,8 +24,8 @@ from bayeshaptic.effects.nonlinear.internal_force import (
 )
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.inference.least_squares import polish
-from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
+from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.windows import Windows
@@ -123,6 +123,7 @@ class ForceBench:
         system, period = self.model.system(theta), self.recording.period_s
         if isinstance(effect, CommandEffect):
             return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
+        spend(SUBSTEPS * self.recording.samples)
         motion = self.motions(theta, (effect.place,))[effect.place]
         return forced_motion(
             system.mechanism,
@@ -191,8 +192,7 @@ class ForceBench:
         return Point(effect, strength, theta, etfe, windows, float(gains[0]), float(gains[1]))
 
     def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
-        pointwise = Likelihood(self.model, windows).pointwise(theta[None])[0]
-        return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
+        return log_likelihoods(self.model, windows, theta)
 
 
 def _between(samples: Floats) -> Floats:

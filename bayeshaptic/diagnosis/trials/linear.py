@@ -1,17 +1,21 @@
-"""Trying linear effects: fit on half of the windows, judge on a quarter."""
+"""Trying linear effects: fit on half of the windows, judge on a quarter.
+
+All candidates are sieved by a few steps from where first order says that they help most; only those
+within reach of the best are fitted in full.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import (
     FIT,
     Accepted,
+    Change,
     State,
     Trial,
     describe_gain,
@@ -20,57 +24,124 @@ from bayeshaptic.diagnosis.state import (
 )
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
-from bayeshaptic.inference.least_squares import polish, refine, summarise
+from bayeshaptic.inference.least_squares import (
+    least_squares,
+    polish,
+    refine,
+    search_box,
+    weighted_residuals,
+)
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.screening import promising_starts, starting_bases
 from bayeshaptic.models import Model
+from bayeshaptic.numerics.gauss_newton import minimise
+from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.windows import Windows
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Tick
+
+_STARTS = 24  # kept by first order,
+_STEPS = 5  # and given so many steps of Gauss and Newton
+
+
+@dataclass(frozen=True)
+class Sieved:
+    """A candidate after a few steps.
+
+    Attributes
+    ----------
+    effect : LinearEffect
+    starts : ndarray, shape (S, P)
+        Where the steps have led to, best first.
+    gain : float
+        In log likelihood on the windows to fit, so far.
+    """
+
+    effect: LinearEffect
+    starts: Floats
+    gain: float
 
 
 def linear_candidates(model: Model, etfe: Etfe) -> list[LinearEffect]:
-    """Every variant of every linear effect that makes sense and is not in the model yet."""
+    """Every variant of every linear effect that makes sense on the model.
+
+    Those that a device can have several of (`LinearEffect.several`) also where it has one already.
+    """
     there = {effect.name for effect in model.effects}
     return [
         variant
         for kind in effects("linear")
-        if kind.name not in there
+        if kind.several or kind.name not in there
         for variant in kind.candidates(model, etfe)
     ]
 
 
-def linear_trials(state: State, tick: Callable[[str], None] | None = None) -> list[Trial]:
-    """One trial for each candidate effect; of an effect's variants the best."""
-    base = _base_log_likelihoods(state)
+def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[Trial]:
+    """One trial for each candidate effect that is worth it; of an effect's variants the best.
+
+    Parameters
+    ----------
+    state : State
+    meter : Meter
+        Says whether one more fit is affordable.
+    tick : callable, optional
+        Called with the title of each candidate that is fitted in full.
+    """
+    theta, windows = _fit_part(state.model, state.etfe, state.fit.windows, state.fit.theta[None])
+    base = log_likelihoods(state.model, windows, theta)
+    found = sieve(state.model, state.etfe, windows.part(share(windows, FIT)), state.fit.theta)
     best: dict[str, Trial] = {}
-    for effect in linear_candidates(state.model, state.etfe):
-        if tick:
+    for one in found:
+        effect = one.effect
+        near = one.gain >= thresholds.REACH * found[0].gain
+        followed = near and meter.affords(effect.title)
+        if followed and tick:
             tick(effect.title)
-        trial = _try(state, effect, base)
+        trial = _try(state, windows, one, base, followed)
         if effect.name not in best or trial.score > best[effect.name].score:
             best[effect.name] = trial
     return list(best.values())
 
 
-def full_fit(state: State, model: Model, theta: Floats) -> State:
-    """`model` fitted to all windows from `theta`, compressed around its own fit."""
-    for _ in range(2):
-        windows = compress(state.etfe, partial(model.response, theta))
-        theta = polish(model, windows, theta)
-    return replace(state, fit=summarise(model, windows, theta))
+def sieve(model: Model, etfe: Etfe, windows: Windows, theta: Floats) -> list[Sieved]:
+    """All candidates after a few steps on the windows, the most promising first.
+
+    Parameters
+    ----------
+    model : Model
+    etfe : Etfe
+    windows : Windows
+        To fit.
+    theta : ndarray, shape (P,)
+        The present fit.
+    """
+    bases = starting_bases(model, theta)
+    before = float(np.sum(np.abs(Likelihood(model, windows).normalised(theta[None])) ** 2))
+    size = windows.target.size
+    found = []
+    for effect in linear_candidates(model, etfe):
+        full = model.with_effect(effect)
+        own = effect.starting_values(model, etfe)
+        starts = promising_starts(model, effect, windows, bases, own, _STARTS)
+        here, low, high = search_box(full)
+        residuals = weighted_residuals(Likelihood(full, windows), here)
+        phi = np.clip(here.coordinate(starts), low, high)
+        phi, cost = minimise(residuals, phi, low, high, steps=_STEPS, tolerance=1e-2)
+        order = np.argsort(cost)
+        # What is left acts as noise of its size.
+        left = max(float(cost[order[0]]), float(size))
+        gain = size * float(np.log(max(before, size) / left))
+        found.append(Sieved(effect, here.natural(phi[order]), gain))
+    return sorted(found, key=lambda one: -one.gain)
 
 
-def _base_log_likelihoods(state: State) -> tuple[float, float]:
-    """Of the model as it is, fitted to its part of the windows alone."""
-    theta, windows = _fit_part(state.model, state.etfe, state.fit.windows, state.fit.theta[None])
-    return log_likelihoods(state.model, windows, theta)
-
-
-def _try(state: State, effect: LinearEffect, base: tuple[float, float]) -> Trial:
-    model = state.model.with_effect(effect)
-    starts, strata = _starts(state, model, effect)
-    theta, windows = _fit_part(model, state.etfe, state.fit.windows, starts, strata)
-    gains = np.subtract(log_likelihoods(model, windows, theta), base)
-    gain_fit, gain_choose = float(gains[0]), float(gains[1])
+def _try(state: State, windows: Windows, one: Sieved, base: Floats, followed: bool) -> Trial:
+    """The trial of a candidate, fitted in full or as the sieve left it."""
+    effect, model = one.effect, state.model.with_effect(one.effect)
+    theta = one.starts[0]
+    if followed:
+        theta, windows = _fit_part(model, state.etfe, windows, one.starts)
+    gain_fit, gain_choose = (log_likelihoods(model, windows, theta) - base).tolist()
     accepted = Accepted(
         effect.name,
         effect.title,
@@ -78,45 +149,17 @@ def _try(state: State, effect: LinearEffect, base: tuple[float, float]) -> Trial
         describe_gain(gain_choose),
         parameters=tuple(p.name for p in effect.parameters),
         told_apart_by=effect.told_apart_by,
+        change=Change(effect),
     )
-    changed = full_fit(state, model, theta) if gain_choose > 8 else state
+    size, changed = len(effect.parameters), state
+    if followed and thresholds.convincing(gain_fit, gain_choose, size):
+        changed = replace(state, fit=least_squares(model, state.etfe, start=theta))
     changed = replace(changed, accepted=(*state.accepted, accepted))
-    return Trial(accepted, changed, gain_fit, gain_choose, len(effect.parameters))
+    return Trial(accepted, changed, gain_fit, gain_choose if followed else 0.0, size)
 
 
-def _starts(state: State, model: Model, effect: LinearEffect) -> tuple[Floats, NDArray[np.int_]]:
-    """The effect's own starting values beside the current parameters and the nominal ones.
-
-    From the current ones alone a fit may stay stuck where the base model bent to the data.  Also
-    the stratum of each: alike are those with the same parameters and the same first value of the
-    effect, which is its frequency if it has one.
-    """
-    own = effect.starting_values(state.model, state.etfe)
-    bases = [state.fit.theta]
-    nominal = [state.model.reference.get(name, np.nan) for name in state.model.names]
-    if np.isfinite(nominal[: len(state.model.structure.names)]).all():
-        bases.append(np.where(np.isfinite(nominal), nominal, state.fit.theta))
-    index = [state.model.names.index(n) if n in state.model.names else -1 for n in model.names]
-    added = [p.name for p in effect.parameters]
-    starts = []
-    for base in bases:
-        rows = np.empty((len(own), model.size))
-        for column, (name, source) in enumerate(zip(model.names, index, strict=True)):
-            rows[:, column] = own[:, added.index(name)] if source < 0 else base[source]
-        starts.append(rows)
-    values, stratum = np.unique(own[:, 0], return_inverse=True)
-    strata = [stratum + number * len(values) for number in range(len(bases))]
-    return np.concatenate(starts), np.concatenate(strata)
-
-
-def _fit_part(
-    model: Model,
-    etfe: Etfe,
-    windows: Windows,
-    starts: Floats,
-    strata: NDArray[np.int_] | None = None,
-) -> tuple[Floats, Windows]:
+def _fit_part(model: Model, etfe: Etfe, windows: Windows, starts: Floats) -> tuple[Floats, Windows]:
     """Fit the windows to fit by, twice: the second time compressed around the first fit."""
-    theta, _ = refine(model, windows.part(share(windows, FIT)), starts, strata)
+    theta, _ = refine(model, windows.part(share(windows, FIT)), starts)
     windows = compress(etfe, partial(model.response, theta))
     return polish(model, windows.part(share(windows, FIT)), theta), windows

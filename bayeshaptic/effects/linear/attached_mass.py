@@ -37,6 +37,7 @@ class AttachedMass(LinearEffect):
 
     on: str = MOTOR
 
+    several = True
     places: ClassVar[tuple[str, ...]]
     prefix: ClassVar[str]
     part: ClassVar[str]

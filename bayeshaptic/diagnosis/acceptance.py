@@ -1,0 +1,142 @@
+"""What closing the loop accepts: which candidate, what it may leave, and what the verdict is.
+
+Pure functions of tests and trials, the same for every kind of excitation; the numbers are in
+`bayeshaptic.diagnosis.thresholds`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.state import Accepted, State, Trial
+from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
+from bayeshaptic.stability.critical import critical_stiffness
+
+_NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit
+_OF_THE_DATA = {"nonlinear", "measurement", "time-varying"}  # families that change the recording
+
+
+def choose(trials: Sequence[Trial], left: Callable[[Trial], float]) -> Trial | None:
+    """The convincing trial that leaves least; of those that leave nothing, the best.
+
+    A wrong effect can gain nearly as much as the right one and then need another to mend it: an
+    alternative is better than an addition.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    left : callable
+        How far the tests of a trial's state are over their thresholds, all together.
+
+    Returns
+    -------
+    Trial or None
+        None where none is convincing.
+    """
+    rivals = rivals_of(trials)
+    if len(rivals) < 2:
+        return rivals[0] if rivals else None
+    rests = [left(trial) for trial in rivals]
+    # Laws of one force differ in what they leave by chance; linear effects do not.
+    more = thresholds.LAW_REST if rivals[0].accepted.family == "nonlinear" else 0.0
+    most = thresholds.LEAST * min(rests) + more
+    best = [trial for trial, rest in zip(rivals, rests, strict=True) if rest <= most]
+    close = [trial for trial in best if ties(best[0], trial)]
+    return min(close, key=lambda trial: (trial.size, -trial.score))
+
+
+def rivals_of(trials: Sequence[Trial]) -> list[Trial]:
+    """The convincing trials that come near the best one in score, best first."""
+    good = sorted((t for t in trials if t.convincing), key=lambda trial: -trial.score)
+    return [trial for trial in good if trial.score >= thresholds.RIVAL * good[0].score]
+
+
+def ties(best: Trial, other: Trial) -> bool:
+    """Whether the recording hardly tells two effects of a class apart."""
+    if other.accepted.family != best.accepted.family:
+        return False
+    law = thresholds.LAW_TIE * best.score if best.accepted.family == "nonlinear" else 0.0
+    return abs(best.score - other.score) < max(thresholds.TIE, law)
+
+
+def with_ties(chosen: Trial, trials: Sequence[Trial]) -> State:
+    """The chosen trial's state, its effect naming those that do as well, and their spread."""
+    others = [t for t in trials if t is not chosen and t.convincing and ties(chosen, t)]
+    *earlier, own = chosen.state.accepted
+    spread = own.limit_log_sd
+    if others:
+        here, *there = (
+            critical_stiffness(t.state.model, t.state.fit.theta).value for t in (chosen, *others)
+        )
+        apart = max(abs(np.log(max(limit, 1e-9) / max(here, 1e-9))) for limit in there)
+        spread = float(np.hypot(spread, apart / _NINETY))
+    names = tuple(dict.fromkeys((*own.ties, *(t.name for t in others))))
+    own = replace(own, ties=names, limit_log_sd=spread)
+    return replace(chosen.state, accepted=(*earlier, own))
+
+
+def remaining(
+    tests: Iterable[Test], accepted: Sequence[Accepted], seen: Iterable[Test]
+) -> tuple[Test, ...]:
+    """The tests of what is left, and how much of it counts, after those `seen` so far.
+
+    Where the response drifts the limit is that of the worst part; that the part drifts a little
+    too is no news.  A law of friction is an approximation: a share of what it explained may
+    remain; and a recording that was mended, or goes on in part, is not as good as a sound one.
+    What was wrong with the measurement is where an excess of noise comes from.
+    """
+    families = {effect.family for effect in accepted}
+    no_news = families & {"measurement", "time-varying"}
+    tests = tuple(test for test in tests if test.family not in no_news)
+    if not families & _OF_THE_DATA:
+        return tests
+    explained = 0.0
+    if "nonlinear" in families:
+        explained = max((t.statistic for t in seen if t.family == "nonlinear"), default=0.0)
+    return tuple(_allowing(test, explained) for test in tests)
+
+
+def _allowing(test: Test, explained: float) -> Test:
+    """`test` with the threshold that it has after something was taken off the recording."""
+    least = thresholds.LAW_ERROR * explained if test.family == "nonlinear" else 0.0
+    return replace(test, threshold=max(thresholds.MENDED * test.threshold, least))
+
+
+def excess(tests: Iterable[Test]) -> float:
+    """How far tests are over their thresholds, all together."""
+    return sum(test.excess for test in tests if test.flagged)
+
+
+def needless(loss: float, size: int) -> bool:
+    """Whether an accepted effect of `size` parameters may go.
+
+    Parameters
+    ----------
+    loss : float
+        Of log likelihood without it, on windows that took no part in the fit.
+    size : int
+    """
+    return loss < thresholds.A_PARAMETER * size
+
+
+def raises_error(before: float, after: float) -> bool:
+    """Whether an explanation raises the held-out weighted rms: then it is none.
+
+    What is next to the noise may move within it.
+    """
+    return after > thresholds.WORSE * max(before, 1.0)
+
+
+def verdict_of(accepted: Sequence[Accepted], tests: Iterable[Test]) -> tuple[str, str | None]:
+    """The verdict on what is left, and its class."""
+    left = [test for test in tests if test.flagged]
+    if left:
+        return UNEXPLAINED, max(left, key=lambda test: test.excess).family
+    if accepted:
+        return EXPLAINED, accepted[0].family
+    return CONSISTENT, None

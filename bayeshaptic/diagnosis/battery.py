@@ -1,0 +1,65 @@
+"""All tests of the residual of a fit."""
+
+from __future__ import annotations
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
+from bayeshaptic.diagnosis.residuals.drift import drift_tests
+from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
+from bayeshaptic.diagnosis.residuals.residual import (
+    Test,
+    chi_square_score,
+    frequency_tests,
+    smooth_columns,
+)
+from bayeshaptic.diagnosis.samples.mend import SampleLook, measurement_tests
+from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.spectra import PeriodicSpectra
+
+
+def is_periodic(etfe: Etfe) -> bool:
+    """Whether the residual repeats from period to period, and there is the motion of one."""
+    return isinstance(etfe.spectra, PeriodicSpectra) and etfe.recording is not None
+
+
+def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tuple[Test, ...]:
+    """The tests that a measurement of its kind gets.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+    look : SampleLook, optional
+        What the samples showed, where they were looked at before.
+    """
+    if is_periodic(etfe):
+        return periodic_tests(fit)
+    return (*model_tests(fit, etfe), *measurement_tests(fit, etfe, look))
+
+
+def model_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """Those of a random recording that ask whether the model is right."""
+    return (
+        *frequency_tests(fit),
+        *nonlinear_tests(fit, etfe),
+        *drift_tests(fit, etfe),
+        *excess_noise_test(fit, etfe),
+    )
+
+
+def periodic_tests(fit: Fit) -> tuple[Test, ...]:
+    """The tests over frequency, and one of what changes from line to line.
+
+    No linear dynamics do that outside narrow resonances; harmonics that beat with each other do.
+    """
+    columns, residual, _ = smooth_columns(fit)
+    rest = float(residual @ residual - sum((columns.T @ residual) ** 2))
+    freedom = len(residual) - columns.shape[1] - fit.model.size
+    score = chi_square_score(rest, max(freedom, 1))
+    text = (
+        f"what changes from line to line, as no smooth response does, is {score:.1f} standard "
+        "deviations above noise, and repeats from period to period"
+    )
+    jagged = Test("line to line", "nonlinear", score, thresholds.normal(), None, text)
+    return (*frequency_tests(fit), jagged)

@@ -1,0 +1,229 @@
+"""Trials on a periodic recording: what repeats from period to period is not noise.
+
+The residual of a steady periodic motion repeats whatever causes it, so that other periods prove
+nothing.  Candidates, linear effects and internal forces alike, are fitted together with all that
+was accepted before to half of the excited lines, and judged on a quarter in between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.acceptance import needless
+from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.periodic.forces import force_candidates
+from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, Basis, balance, promise
+from bayeshaptic.diagnosis.periodic.steady_motion import one_period, with_floor
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.state import (
+    FIT,
+    Accepted,
+    Change,
+    Estimate,
+    State,
+    Trial,
+    describe_gain,
+    log_likelihoods,
+    share,
+)
+from bayeshaptic.diagnosis.trials.linear import sieve
+from bayeshaptic.effects.effect import LinearEffect
+from bayeshaptic.effects.nonlinear.internal_force import Place
+from bayeshaptic.inference.least_squares import Fit, least_squares, refine
+from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.spectra import PeriodicSpectra
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.types import Floats, Tick
+
+FLOOR = 0.002
+"""No line is trusted to better than this share of its response while candidates are weighed."""
+_PROMISE = 2.0  # to first order, on the lines to fit: forces that offer less are not tried,
+_NEAR = 0.25  # nor those that offer so much less than the best one
+
+
+@dataclass(frozen=True)
+class BalancedState(State):
+    """What the loop knows of a periodic recording.
+
+    Attributes
+    ----------
+    part, whole : Balanced
+        Model and internal forces fitted to the lines to fit, and to all lines.
+    """
+
+    part: Balanced = field(kw_only=True)
+    whole: Balanced = field(kw_only=True)
+
+
+class LineTrials:
+    """How candidates are fitted to a periodic recording.
+
+    Parameters
+    ----------
+    etfe : Etfe
+        Periodic, with its recording.
+    fit : Fit
+        Of the base model.
+    floor : float
+        Least noise of a line, as a share of its response.
+    """
+
+    def __init__(self, etfe: Etfe, fit: Fit, floor: float = FLOOR) -> None:
+        self.etfe = etfe
+        self.windows, self.period = compress(with_floor(etfe, floor)), one_period(etfe)
+        self.fitted = share(self.windows, FIT)
+        part = balance(fit.model, self.windows, self.period, (), fit.theta, fitted=self.fitted)
+        whole = balance(fit.model, self.windows, self.period, (), fit.theta)
+        self.first = BalancedState(etfe, fit, part=part, whole=whole)
+
+    def tests(self, state: State) -> tuple[Test, ...]:
+        """The tests of its residual."""
+        return residual_tests(state.fit, state.etfe)
+
+    def mended(self, state: State) -> State:
+        """As it is: samples are averaged over the periods."""
+        return state
+
+    def trials(
+        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
+    ) -> list[Trial]:
+        """All candidates, the best variant of each: a test does not tell their classes apart."""
+        assert isinstance(state, BalancedState)
+        found: dict[tuple[str, Place | None], Trial] = {}
+        for basis in self._promising(state.part):
+            if meter.affords(basis.title):
+                tick(basis.title)
+                self._keep(found, (basis.name, basis.place), self._with_force(state, basis))
+        rest = self._rest(state.part).part(self.fitted)
+        sieved = sieve(state.part.model, self.etfe, rest, state.part.theta)
+        for one in sieved:
+            near = one.gain >= thresholds.REACH * sieved[0].gain
+            if not (near and meter.affords(one.effect.title)):
+                continue
+            tick(one.effect.title)
+            trial = self._with_linear(state, one.effect, one.starts, rest)
+            self._keep(found, (one.effect.name, None), trial)
+        return list(found.values())
+
+    def without_needless(self, state: State) -> tuple[State, str | None]:
+        """Without the earlier effect that is worth least, if that is next to nothing."""
+        assert isinstance(state, BalancedState)
+        full = self._log_likelihoods(state.part)[1]
+        worst: tuple[State, str | None] = (state, None)
+        least = np.inf
+        for index, effect in enumerate(state.accepted[:-1]):
+            tried = self._without(state.part, effect)
+            loss = full - self._log_likelihoods(tried)[1]
+            if needless(loss, len(effect.parameters) or 1) and loss < least:
+                left = state.accepted[:index] + state.accepted[index + 1 :]
+                worst, least = (self._state(tried, left), effect.name), loss
+        return worst
+
+    @staticmethod
+    def _keep(found: dict[Any, Trial], key: Any, trial: Trial | None) -> None:
+        if trial and (key not in found or trial.score > found[key].score):
+            found[key] = trial
+
+    def _promising(self, part: Balanced) -> list[Basis]:
+        """Forces that are not there yet and are worth a balance, the most promising first."""
+        there = {(basis.name, basis.place) for basis in part.forces}
+        offers = [
+            (promise(part, self.windows, self.period, basis, self.fitted), basis)
+            for variants in force_candidates(part.model, part.motions).values()
+            for basis in variants
+            if (basis.name, basis.place) not in there
+        ]
+        least = max([_PROMISE, *(_NEAR * offer for offer, _ in offers)])
+        offers.sort(key=lambda offer: -offer[0])
+        return [basis for offer, basis in offers if offer >= least]
+
+    def _with_force(self, state: BalancedState, basis: Basis) -> Trial | None:
+        part = state.part
+        forces, strength = (*part.forces, basis), np.append(part.strength, 0.0)
+        tried = self._balance(part.model, forces, part.theta, strength)
+        if not tried.converged or (basis.positive and tried.strength[-1] < 0):
+            return None
+        return self._judged(state, tried, 1, Accepted(basis.name, basis.title, "nonlinear", ""))
+
+    def _with_linear(
+        self, state: BalancedState, effect: LinearEffect, starts: Floats, rest: Windows
+    ) -> Trial:
+        part = state.part
+        model = part.model.with_effect(effect)
+        theta, _ = refine(model, rest, starts)
+        tried = self._balance(model, part.forces, theta, part.strength)
+        names = tuple(p.name for p in effect.parameters)
+        accepted = Accepted(
+            effect.name,
+            effect.title,
+            effect.family,
+            "",
+            parameters=names,
+            told_apart_by=effect.told_apart_by,
+            change=Change(effect),
+        )
+        return self._judged(state, tried, len(names), accepted)
+
+    def _judged(
+        self, state: BalancedState, tried: Balanced, size: int, accepted: Accepted
+    ) -> Trial:
+        gains = self._log_likelihoods(tried) - self._log_likelihoods(state.part)
+        gain_fit, gain_choose = gains.tolist()
+        accepted = replace(accepted, evidence=describe_gain(gain_choose))
+        changed: State = replace(state, accepted=(*state.accepted, accepted))
+        if thresholds.convincing(gain_fit, gain_choose, size):
+            changed = self._state(tried, changed.accepted)
+            accepted = changed.accepted[-1]
+        return Trial(accepted, changed, gain_fit, gain_choose, size)
+
+    def _balance(
+        self, model: Any, forces: tuple[Basis, ...], theta: Floats, strength: Floats
+    ) -> Balanced:
+        return balance(model, self.windows, self.period, forces, theta, strength, self.fitted)
+
+    def _without(self, part: Balanced, effect: Accepted) -> Balanced:
+        """Everything else fitted anew to the lines to fit."""
+        if effect.change is not None and effect.change.effect is not None:
+            kept = [name not in effect.parameters for name in part.model.names]
+            model = part.model.without_effect(effect.change.effect)
+            return self._balance(model, part.forces, part.theta[kept], part.strength)
+        own = [basis.title != effect.title for basis in part.forces]
+        forces = tuple(basis for basis, stays in zip(part.forces, own, strict=True) if stays)
+        return self._balance(part.model, forces, part.theta, part.strength[own])
+
+    def _rest(self, balanced: Balanced) -> Windows:
+        """The lines without what internal forces add."""
+        return replace(self.windows, target=self.windows.target - balanced.added[:, None])
+
+    def _log_likelihoods(self, balanced: Balanced) -> Floats:
+        return log_likelihoods(balanced.model, self._rest(balanced), balanced.theta)
+
+    def _state(self, part: Balanced, accepted: tuple[Accepted, ...]) -> BalancedState:
+        """The recording's spectra less the forces' motion, and a fit to all lines."""
+        spectra = self.etfe.spectra
+        assert isinstance(spectra, PeriodicSpectra)
+        whole = balance(
+            part.model, self.windows, self.period, part.forces, part.theta, part.strength
+        )
+        own = replace(spectra, position=spectra.position - whole.added)
+        # What a person sees, without it too.
+        value = self.etfe.value - whole.added / spectra.force
+        corrected = replace(self.etfe, spectra=own, value=value)
+        fit = least_squares(whole.model, corrected, start=whole.theta)
+        sized = tuple(_sized(effect, whole) for effect in accepted)
+        return BalancedState(corrected, fit, sized, part=part, whole=whole)
+
+
+def _sized(effect: Accepted, whole: Balanced) -> Accepted:
+    """A force with the strength that all lines give it."""
+    for index, basis in enumerate(whole.forces):
+        if basis.title == effect.title:
+            sd = float(whole.strength_sd[index]) * max(whole.rms(), 1.0)
+            estimate = Estimate(float(whole.strength[index]), sd, basis.unit)
+            return replace(effect, estimates={"strength": estimate})
+    return effect

@@ -1,0 +1,104 @@
+"""Every number that decides what closing the loop finds, believes, and lets pass.
+
+Where a statistic has a known distribution under the model, its threshold follows from a rate of
+false alarms.  The others are in their own units.  Rates measured on clean recordings, and what each
+test finds, are in docs/statistics.md; ``benchmarks/thresholds.py`` makes that table.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import ndtri
+
+# ---------------------------------------------------------------- tests of the residual
+
+FALSE_ALARM = 1e-5
+"""Chance that one test of a statistic with a known distribution is flagged on a clean recording.
+
+A recording gets some fifteen tests, and no distribution is known that far out: hence so small."""
+
+SMOOTH = 5.0
+"""Score of a smooth change of the response.  Its distribution is known, too, for a response that is
+a parabola in every window; beside a sharp resonance it is not quite, and long recordings see it."""
+
+
+def normal(tries: float = 1.0) -> float:
+    """Threshold of the largest of so many standard normal scores, at `FALSE_ALARM` in all."""
+    return float(-ndtri(-np.expm1(np.log1p(-FALSE_ALARM) / tries)))
+
+
+def two_sided() -> float:
+    """Threshold of the magnitude of a standard normal score."""
+    return normal(2.0)
+
+
+LOG_CHANCE = 5.0
+"""Of a tone: -log10 of the chance that any line of noise stands out as far (tones)."""
+
+EXCESS_DB = 6.0
+"""Noise in the driven band over that beyond it, dB: three windows of noise scatter by some 1 dB."""
+CLIPPED = 6.0
+"""Distance that the motion led beyond an extreme, in errors of the prediction."""
+HELD = 10.0
+"""Samples that repeat the one before although the device moved on, less those off by chance."""
+LOST, WILD = 4.0, 4.0
+"""Missing rows, and wild samples: counts; each one is beyond doubt by itself (faults)."""
+JITTER, JITTER_STAMPED = 7.0, 2.5
+"""Rise of the noise with the speed, in standard deviations from blocks of samples; the second
+where the time stamps show jitter already."""
+RESOLUTION = 1.5
+"""Found count of the encoder over the declared one."""
+
+# ---------------------------------------------------------------- acceptance
+
+ENOUGH = 8.0
+"""Least gain in log likelihood on windows that took no part in the fit: e^8 to one."""
+SHARE = 0.15
+"""Least held-out gain over that on the windows fitted to.
+
+The windows to choose by are half as many, so that a true effect brings half of the gain; an effect
+that is overfitted brings next to nothing."""
+A_PARAMETER = 2.0
+"""Held-out gain that a parameter must bring (twice Akaike's, on half as many windows)."""
+RIVAL = 0.85
+"""Share of the best score from which on a candidate may be the better explanation."""
+TIE, LAW_TIE = 6.0, 0.05
+"""Difference of scores that one recording does not decide; of laws of one force, which differ by
+less than either does from the truth, this share of the score besides."""
+LAW_REST = 3.0
+"""What one law of a force may leave more than another by chance, in thresholds."""
+LEAST = 1.2
+"""Factor on the least that a candidate leaves up to which another leaves as little."""
+LINEAR_FIRST = 10.0
+"""Reduced chi-square from which a linear misfit is mended before forces are sized."""
+WORSE = 1.2
+"""Factor by which the held-out error may rise; an explanation that raises it further is none.
+
+A quarter of the windows of a third of a recording knows its error to some 10 %."""
+
+# ---------------------------------------------------------------- what an effect may leave
+
+LAW_ERROR = 0.2
+"""Of the statistic that raised a force: a law of friction is an approximation."""
+MENDED = 1.5
+"""Factor on the thresholds of a recording that something was taken off, or a part of one."""
+
+# ---------------------------------------------------------------- what is worth trying
+
+REACH = 0.3
+"""Share of the best candidate's gain after a cheap fit below which none is fitted in full."""
+BUDGET_S = 60.0
+"""What the search may cost by default, in nominal seconds (`bayeshaptic.numerics.spending`)."""
+
+
+def convincing(gain_fit: float, gain_choose: float, size: int) -> bool:
+    """Whether a candidate of `size` parameters predicts what it was not fitted to.
+
+    Parameters
+    ----------
+    gain_fit, gain_choose : float
+        Gain in log likelihood on the windows that it was fitted to, and on those it was not.
+    size : int
+    """
+    enough = max(ENOUGH, SHARE * gain_fit, A_PARAMETER * size)
+    return gain_choose > enough

@@ -1,0 +1,151 @@
+"""Trials on a random recording: windows of noise, some to fit and others to judge on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.acceptance import needless
+from bayeshaptic.diagnosis.battery import model_tests, residual_tests
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.samples.mend import SampleLook, look_at_samples, repair_measurement
+from bayeshaptic.diagnosis.state import FIT, Change, State, Trial, log_likelihoods, share
+from bayeshaptic.diagnosis.trials.drift import drift_trials
+from bayeshaptic.diagnosis.trials.linear import linear_trials
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
+from bayeshaptic.inference.least_squares import least_squares, polish
+from bayeshaptic.models import Model
+from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.spectra import RandomSpectra
+from bayeshaptic.types import Floats, Tick
+
+
+class WindowTrials:
+    """How candidates are fitted to a random recording, or to a table of a frequency response.
+
+    Parameters
+    ----------
+    state : State
+        As the loop begins.
+    """
+
+    def __init__(self, state: State) -> None:
+        recording = state.etfe.recording
+        self._look: SampleLook | None = None
+        if recording is not None:
+            self._look = look_at_samples(recording, state.etfe)
+        self.first = state
+
+    def tests(self, state: State) -> tuple[Test, ...]:
+        """The tests of its residual; samples that were mended are not looked at again."""
+        if _is_mended(state):
+            return model_tests(state.fit, state.etfe)
+        return residual_tests(state.fit, state.etfe, self._look)
+
+    def mended(self, state: State) -> State:
+        """With what is wrong with the samples mended; the very same where nothing is."""
+        return state if _is_mended(state) else repair_measurement(state, self._look)
+
+    def trials(
+        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
+    ) -> list[Trial]:
+        """Trials of every class that a test raises."""
+        raised = {test.name for test in tests if test.flagged}
+        families = {test.family for test in tests if test.flagged}
+        found: list[Trial] = []
+        if "linear" in families:
+            found += linear_trials(state, meter, tick)
+            # On a model that is far off, a nonlinear force cannot be sized: first things first.
+            far_off = state.fit.reduced_chi_square > thresholds.LINEAR_FIRST
+            if far_off and any(trial.convincing for trial in found):
+                return found
+        if "time-varying" in families:
+            found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
+        if "nonlinear" in families and meter.affords("forces inside the device"):
+            found += [_with_change(state, trial) for trial in nonlinear_trials(state, raised, tick)]
+        return found
+
+    def without_needless(self, state: State) -> tuple[State, str | None]:
+        """The state without the earlier effect that is worth least, if that is next to nothing.
+
+        Returns
+        -------
+        state : State
+            The very same where every effect is still needed.
+        name : str or None
+            Of the effect that was taken out.
+        """
+        full = _held_out(state.model, state.etfe, state.fit.theta)
+        worst, name, least = state, None, np.inf
+        for index, effect in enumerate(state.accepted[:-1]):
+            if effect.change is None:
+                continue
+            model, etfe, theta = _undone(state, effect.change)
+            size = len(effect.parameters) + len(effect.estimates)
+            loss = full - _held_out(model, etfe, theta)
+            if needless(loss, size) and loss < least:
+                left = state.accepted[:index] + state.accepted[index + 1 :]
+                worst = State(etfe, least_squares(model, etfe, start=theta), left)
+                name, least = effect.name, loss
+        return worst, name
+
+
+def _is_mended(state: State) -> bool:
+    return any(effect.family == "measurement" for effect in state.accepted)
+
+
+def _with_change(before: State, trial: Trial) -> Trial:
+    """The trial, with what its force took off the recording."""
+    old, new = before.etfe.spectra, trial.state.etfe.spectra
+    first, last = before.etfe.recording, trial.state.etfe.recording
+    if not (isinstance(old, RandomSpectra) and isinstance(new, RandomSpectra) and first and last):
+        return trial
+    change = Change(
+        None,
+        old.force - new.force,
+        old.position - new.position,
+        first.force - last.force,
+        first.position - last.position,
+    )
+    accepted = replace(trial.accepted, change=change)
+    state = replace(trial.state, accepted=(*trial.state.accepted[:-1], accepted))
+    return replace(trial, accepted=accepted, state=state)
+
+
+def _on_other_samples(trial: Trial) -> Trial:
+    """The trial's state, where what was taken off before can no longer be put back."""
+    linear = tuple(
+        effect if effect.change and effect.change.effect else replace(effect, change=None)
+        for effect in trial.state.accepted
+    )
+    return replace(trial, state=replace(trial.state, accepted=linear))
+
+
+def _undone(state: State, change: Change) -> tuple[Model, Etfe, Floats]:
+    """Model, measurement and parameters without an effect."""
+    model, etfe, theta = state.model, state.etfe, state.fit.theta
+    if change.effect is not None:
+        gone = {parameter.name for parameter in change.effect.parameters}
+        kept = [name not in gone for name in model.names]
+        return model.without_effect(change.effect), etfe, theta[kept]
+    spectra, recording = etfe.spectra, etfe.recording
+    assert isinstance(spectra, RandomSpectra) and recording is not None
+    spectra = replace(
+        spectra, force=spectra.force + change.force, position=spectra.position + change.position
+    )
+    recording = replace(
+        recording,
+        force=recording.force + change.command,
+        position=recording.position + change.motion,
+    )
+    return model, replace(etfe, spectra=spectra, recording=recording), theta
+
+
+def _held_out(model: Model, etfe: Etfe, theta: Floats) -> float:
+    """Log likelihood of windows to choose by, after a fit to those to fit."""
+    windows = compress(etfe, lambda frequency_hz: model.response(theta, frequency_hz))
+    theta = polish(model, windows.part(share(windows, FIT)), theta)
+    return float(log_likelihoods(model, windows, theta)[1])

@@ -1,0 +1,63 @@
+"""What a computation has cost so far, counted where it is made, the same on every machine.
+
+The unit is one value of a model at one frequency, or one step of a simulation.  What is spent
+inside `metered` counts towards its limit; nothing is ever stopped in the middle, but whoever runs a
+list of things may ask before each whether it is still affordable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+
+RATE = 1e7
+"""Evaluations that count as a second: what a core of 2020 does of either kind, about."""
+
+
+@dataclass
+class Meter:
+    """Evaluations spent, and what was left out for want of more.
+
+    Attributes
+    ----------
+    limit : float
+        Evaluations; infinite for no limit.
+    spent : float
+    skipped : list of str
+        What was asked for when the limit was reached.
+    """
+
+    limit: float = float("inf")
+    spent: float = 0.0
+    skipped: list[str] = field(default_factory=list)
+
+    def affords(self, what: str) -> bool:
+        """Whether the limit is not reached yet; if it is, `what` is put down as skipped."""
+        if self.spent < self.limit:
+            return True
+        if what not in self.skipped:
+            self.skipped.append(what)
+        return False
+
+
+_meter: ContextVar[Meter | None] = ContextVar("meter", default=None)
+
+
+def spend(evaluations: float) -> None:
+    """Count evaluations, where anybody does."""
+    meter = _meter.get()
+    if meter is not None:
+        meter.spent += evaluations
+
+
+@contextmanager
+def metered(limit: float = float("inf")) -> Iterator[Meter]:
+    """Count what is spent inside."""
+    meter = Meter(limit)
+    token = _meter.set(meter)
+    try:
+        yield meter
+    finally:
+        _meter.reset(token)
