@@ -1,4 +1,7 @@
-"""Which signal drives which, on simulated and on measured recordings."""
+"""Which signal drives which, on simulated and on measured recordings.
+
+Error rates over hundreds of recordings are in `benchmarks/door.py`.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,8 @@ import pytest
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
-from bayeshaptic.recordings.signals.causality import (
-    NOTABLE_SHARE,
-    Causality,
-    causality,
-)
+from bayeshaptic.recordings.signals.causality import NOTABLE_SHARE, Causality, causality
+from bayeshaptic.rig import Bench, run_loop
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -44,8 +44,9 @@ def test_no_false_alarm_in_open_loop(case: str) -> None:
         found = judge(force, position)
         assert not (found.has_feedback or found.swapped or found.early_position)
         # Half of the alarm's threshold: it is not by luck.
-        assert found.feedback < 0.01
-        assert found.answer > 0.04
+        assert not found.doubtful
+        assert found.feedback[1].value < 0.01
+        assert found.answer.value > 0.04
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -86,6 +87,51 @@ def test_virtual_walls_and_servos_are_feedback(case: str) -> None:
         assert not found.swapped
 
 
+def servo(where: str, ahead: int) -> tuple[np.ndarray, np.ndarray]:
+    """Steps under a PD controller of 5 Hz, with dry friction, and where the position is logged.
+
+    The command is made from the position of its own sample, or from the one before.
+    """
+    bench = Bench.from_device("lhifam", mechanism="rigid").with_effect("coulomb_friction")
+    mass, omega, before = bench.values["m"], 2 * np.pi * 5.0, [0.0, 0.0, 0.0]
+    wanted = 0.002 * np.repeat(np.random.default_rng(3).normal(size=20), 250)
+
+    def control(k: int, position: float) -> float:
+        before.append(position)
+        now, last = (before[-1], before[-2]) if where == "now" else (before[-2], before[-3])
+        return mass * omega * (omega * (wanted[k] - now) - 1.4 * (now - last) / bench.period_s)
+
+    made = run_loop(bench, control, 5.0, seed=1)
+    force, position = made.force, made.position
+    return force[max(-ahead, 0) : len(force) - max(ahead, 0)], position[
+        max(ahead, 0) : len(position) - max(-ahead, 0)
+    ]
+
+
+@pytest.mark.parametrize("ahead", [-1, 0, 1])
+@pytest.mark.parametrize("where", ["now", "before"])
+def test_steps_under_a_controller_are_feedback(where: str, ahead: int) -> None:
+    found = judge(*servo(where, ahead))
+    assert found.has_feedback
+    assert not (found.swapped or found.opposite or found.early_position)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_position_of_the_opposite_sign_is_seen(case: str) -> None:
+    for number, (force, position) in enumerate(zip(*open_loops(case), strict=True)):
+        assert not judge(force, position).opposite
+        # In a force of a fifth of the band is next to nothing new that could be answered to.
+        assert BANDS[number // 2] < 200 or judge(force, -position).opposite
+
+
+def test_a_command_that_is_mostly_at_its_limits_cannot_be_decided() -> None:
+    force, position = (signal[0] for signal in open_loops("lhifam free"))
+    limit = np.quantile(np.abs(force), 0.4)
+    found = judge(np.clip(force, -limit, limit), position)
+    assert found.doubtful
+    assert "at its limits in 60 %" in found.evidence
+
+
 def test_a_relay_is_feedback_and_a_binary_sequence_is_not() -> None:
     rng = np.random.default_rng(8)
     case = "lhifam free"
@@ -108,7 +154,7 @@ def test_a_force_that_repeats_exactly_is_no_feedback() -> None:
     force = np.tile(rng.normal(size=80), SAMPLES // 80)
     force, position = record("lhifam free", 3.0 * force[None], rng)
     found = judge(force[0], position[0])
-    assert found.feedback > NOTABLE_SHARE
+    assert found.removed > NOTABLE_SHARE
     assert found.repeats
     assert not found.has_feedback
     noisy = force[0] + 1e-3 * rng.normal(size=SAMPLES)
@@ -119,14 +165,14 @@ def test_signals_of_other_people_are_neither_feedback_nor_swapped() -> None:
     force, position = open_loops("lhifam grasped")
     found = judge(force[6], position[7])
     assert not (found.has_feedback or found.swapped)
-    assert abs(found.answer) < 0.02
+    assert abs(found.answer.value) < 0.02
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_units_do_not_matter(factor: float) -> None:
     force, position = (signal[0] for signal in open_loops("phantom free"))
     one, other = judge(force, position), judge(factor * force, position / factor + 5 / factor)
-    assert other.answer == pytest.approx(one.answer, rel=1e-3)
+    assert other.answer.value == pytest.approx(one.answer.value, rel=1e-3)
 
 
 @pytest.mark.parametrize("samples", [1000, 3000])
@@ -146,7 +192,7 @@ def measured(name: str, columns: str) -> Causality:
 def test_the_measured_servo_is_feedback() -> None:
     found = measured("emps/DATA_EMPS.mat", "time=t,force=vir*35.15[N],position=qm[m]")
     assert found.has_feedback
-    assert found.feedback > 0.1
+    assert found.same_sample.value < -0.3
 
 
 def test_the_measured_bench_is_open_loop() -> None:
@@ -154,6 +200,6 @@ def test_the_measured_bench_is_open_loop() -> None:
     columns = "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"
     found = measured(name, columns)
     assert not (found.has_feedback or found.swapped or found.early_position)
-    assert found.answer > 0.5
+    assert found.answer.value > 0.3
     swapped = "time=time*1e-6,force=theta_mx[N],position=iq_refx[m]"
     assert measured(name, swapped).swapped

@@ -160,11 +160,13 @@ def test_feedback_is_warned_of() -> None:
     def relay(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         return np.where(position[:, k] < 0, 3.0, -3.0)
 
-    for control, text in ((wall, "made in closed loop"), (relay, "a relay recording")):
-        force, position = record("lhifam grasped", noise, rng, control=control)
-        notices = check_recording(Recording(force[0], position[0], PERIOD))
-        assert topics(notices) == ["feedback"]
-        assert text in notices[0].text
+    force, position = record("lhifam grasped", noise, rng, control=wall)
+    (notice,) = check_recording(Recording(force[0], position[0], PERIOD))
+    assert (notice.level, notice.topic) == ("warning", "feedback")
+    assert "made in closed loop" in notice.text
+    force, position = record("lhifam grasped", noise, rng, control=relay)
+    with pytest.raises(InputError, match="between -3 and 3 N.*bayeshaptic relay held.csv"):
+        check_recording(Recording(force[0], position[0], PERIOD, source=Path("held.csv")))
 
 
 def test_the_measured_recordings() -> None:

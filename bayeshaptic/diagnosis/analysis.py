@@ -22,6 +22,7 @@ from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.sufficiency import refuse_too_little
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.threads import single_threaded
@@ -165,6 +166,8 @@ def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -
         with clock.stage("checks"):
             options.report(0.0, "checking the recording")
             notices = check_recording(measurement, device)
+            if not any(notice.topic == "feedback" for notice in notices):
+                refuse_too_little(measurement)
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
             etfe = estimate_etfe(measurement, options.band_hz)

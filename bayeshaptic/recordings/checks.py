@@ -12,7 +12,9 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality import causality
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
+from bayeshaptic.recordings.sufficiency import LEAST_COHERENCE
 
 # Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
 FEWEST_SAMPLES = 1000
@@ -174,19 +176,19 @@ def _slip(ratio: float, tolerance: float) -> float | None:
 
 def _response(recording: Recording, device: Device | None) -> list[Notice]:
     """Compare a rough frequency response with none at all, and with the device's own."""
-    frequency, response, coherence = _rough_response(recording)
-    if np.quantile(coherence, 0.9) < 0.3:
+    rough = rough_response(recording)
+    if rough.follows < LEAST_COHERENCE:
         text = (
             f"The position hardly answers to the force: their coherence is below "
-            f"{np.quantile(coherence, 0.9):.2f} on nine lines in ten. Are these the right columns?"
+            f"{rough.follows:.2f} on nine lines in ten. Are these the right columns?"
         )
         return [Notice("warning", "coherence", text)]
-    clear = coherence > 0.7
-    if device is None or recording.force_unit == "A" or np.count_nonzero(clear) < 5:
+    clear = rough.clear()
+    if device is None or recording.force_unit == "A" or len(clear.response) < 5:
         return []
-    s = 2j * np.pi * frequency[clear]
+    s = 2j * np.pi * clear.frequency_hz
     ratios = [
-        float(np.median(np.abs(response[clear] / compliance)))
+        float(np.median(np.abs(clear.response / compliance)))
         for compliance in _compliances(device, s)
     ]
     # Nobody knows here whether the device was held: the nearest of its models counts.
@@ -228,48 +230,40 @@ def _compliances(device: Device, s: NDArray[Any]) -> list[NDArray[Any]]:
     return found
 
 
-def _rough_response(
-    recording: Recording,
-) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64]]:
-    """Frequency, response and coherence by averaged segments, where the force has power."""
-    from scipy.signal import csd, welch
-
-    segment = int(min(4096, recording.samples // 12))
-    options = {"fs": 1 / recording.period_s, "nperseg": segment, "detrend": "linear"}
-    frequency, force_power = welch(recording.force, **options)
-    _, position_power = welch(recording.position, **options)
-    _, cross = csd(recording.force, recording.position, **options)
-    excited = force_power > 1e-4 * force_power.max()
-    excited[:3] = False  # the window smears drift over the first lines
-    if not np.any(excited):
-        excited[3:] = True
-    with np.errstate(divide="ignore", invalid="ignore"):
-        coherence = np.nan_to_num(np.abs(cross) ** 2 / (force_power * position_power))
-        response = cross / force_power
-    return frequency[excited], response[excited], coherence[excited]
-
-
 def _causality(recording: Recording, where: str) -> list[Notice]:
     found = causality(recording)
     if found.swapped:
         raise InputError(
             f"{where}: force and position look swapped: the past position predicts the force (it "
-            f"removes {100 * found.feedback:.0f} % of the error), the past force does not "
+            f"removes {100 * found.removed:.0f} % of the error), the past force does not "
             "predict the position; exchange them with --columns force=...,position=..."
         )
-    if found.relay:
-        text = (
-            "The force switches between two levels with the sign of the position: a relay "
-            "recording. 'bayeshaptic relay' reads the gain margin from it; the ETFE and the fit "
-            "are biased."
+    if found.opposite:
+        raise InputError(
+            f"{where}: the position moves against the force: one of them has the opposite sign, "
+            "and the device would have a negative mass; turn one round with --columns, as in "
+            "position=NAME*-1"
         )
-        return [Notice("warning", "feedback", text)]
+    if found.relay:
+        raise InputError(
+            f"{where}: a relay recording (the force switches between {recording.force.min():.3g} "
+            f"and {recording.force.max():.3g} {recording.force_unit} with the sign of the "
+            "position), of which no frequency response can be estimated; its gain margin is read "
+            f"by: bayeshaptic relay {where}"
+        )
     if found.has_feedback:
         text = (
-            "The force was computed from the motion (the past position removes "
-            f"{100 * found.feedback:.0f} % of the error of predicting it): the recording was "
-            "made in closed loop, so the ETFE, the fit and K_CR are biased. Excite the device "
-            "with a force that does not depend on the motion."
+            f"The force was computed from the motion ({found.evidence}): the recording was made in "
+            "closed loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force "
+            "that does not depend on the motion."
+        )
+        return [Notice("warning", "feedback", text)]
+    if found.doubtful:
+        text = (
+            f"It cannot be decided whether the force was computed from the motion "
+            f"({found.evidence}, more than chance but little). If the recording was made in closed "
+            "loop, the ETFE, the fit and K_CR are biased: record again with a force that does not "
+            "depend on the motion, and longer."
         )
         return [Notice("warning", "feedback", text)]
     if found.early_position:

@@ -1,0 +1,163 @@
+"""Recordings that say too little of a device for a stiffness to follow from them.
+
+Refused before anything is fitted, each with the reason and what to do: a posterior of such a
+recording is its prior, or worse, a confident answer to another question.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.excitation import find_repetition
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.rough_response import rough_response
+from bayeshaptic.types import Bools
+
+# The coherence of two unrelated signals, averaged over twelve segments, stays below 0.2.
+LEAST_COHERENCE = 0.3
+# Shortest recording of a force that does not repeat: a dozen lines below 5 Hz, where a device's
+# rigid-body crossing lies.
+SHORTEST_S = 2.5
+# A force that changes less often than this is a few steps.
+FEWEST_CHANGES = 20
+# Fewer tones than this leave more parameters than numbers.
+FEWEST_TONES = 5
+# Share of the recording that may pass without force, or without motion.
+MOST_IDLE = 1 / 3
+_IDLE_S = 0.1
+_FAINT = 1e-4  # of the strongest line's power
+_WIDEST_TONE = 9  # lines that a Hann window spreads a tone over, and its wander
+
+_USUAL = (
+    "record some 30 s of white noise or of a multisine (bayeshaptic simulate phantom -o noise.csv "
+    "shows such a recording)"
+)
+
+
+def refuse_too_little(recording: Recording) -> None:
+    """Refuse a recording that says too little of the device.
+
+    Parameters
+    ----------
+    recording : Recording
+        In open loop; of one with feedback no stiffness is recommended anyway.
+
+    Raises
+    ------
+    InputError
+        With the reason, and what to do.
+    """
+    for look in _LOOKS:
+        reason = look(recording)
+        if reason is not None:
+            where = recording.source or recording.name
+            raise InputError(f"{where}: too little to find a stiffness from: {reason}")
+
+
+def _short(recording: Recording) -> str | None:
+    seconds = recording.duration_s
+    if seconds >= SHORTEST_S or find_repetition(recording.force) is not None:
+        return None
+    return (
+        f"{seconds:.3g} s, and at least {SHORTEST_S:g} s are needed of a force that does not "
+        f"repeat; {_USUAL}"
+    )
+
+
+def _few_steps(recording: Recording) -> str | None:
+    changes = np.abs(np.diff(recording.force)) > 1e-9 * np.ptp(recording.force)
+    count = int(np.count_nonzero(changes))
+    if count >= FEWEST_CHANGES:
+        return None
+    times = "once" if count == 1 else f"{count} times"
+    return (
+        f"the force changes {times} in {recording.duration_s:.3g} s, and a step says next to "
+        f"nothing of the response above a few hertz; {_USUAL}"
+    )
+
+
+def _few_tones(recording: Recording) -> str | None:
+    force = recording.force - recording.force.mean()
+    power = np.abs(np.fft.rfft(force * np.hanning(len(force)))) ** 2
+    lines = np.flatnonzero(power > _FAINT * power.max())
+    tones = np.split(lines, np.flatnonzero(np.diff(lines) > 2) + 1)
+    if len(tones) >= FEWEST_TONES or max(np.ptp(tone) for tone in tones) >= _WIDEST_TONE:
+        return None
+    hertz = ", ".join(f"{tone.mean() / recording.duration_s:.3g}" for tone in tones)
+    what = "a single tone" if len(tones) == 1 else f"{len(tones)} tones"
+    return (
+        f"the force is {what} ({hertz} Hz), and a response at {FEWEST_TONES} frequencies is the "
+        f"least from which masses and springs can be told apart; {_USUAL}"
+    )
+
+
+def _no_force(recording: Recording) -> str | None:
+    force = recording.force
+    idle = _long(force == 0, round(_IDLE_S / recording.period_s))
+    if np.mean(idle) <= MOST_IDLE:
+        return None
+    first, stop = _longest(~idle)
+    return (
+        f"the force is zero for {100 * np.mean(idle):.0f} % of the recording; cut it to the rows "
+        f"with force ({first + 1} to {stop} is the longest such part), or record again"
+    )
+
+
+def _standstill(recording: Recording) -> str | None:
+    step = increment_unit(recording.position) or 0.0
+    length = max(round(_IDLE_S / recording.period_s), 20)
+    parts = recording.samples // length
+    position = recording.position[: parts * length].reshape(parts, length)
+    still = np.mean(np.ptp(position, axis=1) <= 1.01 * step)
+    if still <= MOST_IDLE:
+        return None
+    return (
+        f"the position stands still for {100 * still:.0f} % of the recording: dry friction holds "
+        "the device, or the motion is smaller than a count of the encoder; excite it two or three "
+        "times as strongly, so that it keeps moving, and record again"
+    )
+
+
+def _unanswered(recording: Recording) -> str | None:
+    if find_repetition(recording.force) is not None:
+        return None  # its lines are few, and their scatter between the periods says more
+    follows = rough_response(recording).follows
+    if follows >= LEAST_COHERENCE:
+        return None
+    return (
+        f"the position hardly answers to the force: their coherence is below {follows:.2f} on nine "
+        f"lines in ten (1 is all, {LEAST_COHERENCE:g} the least to go on); check the columns, "
+        "excite the device two or three times as strongly, and record longer"
+    )
+
+
+_LOOKS: tuple[Callable[[Recording], str | None], ...] = (
+    _short,
+    _few_steps,
+    _few_tones,
+    _no_force,
+    _standstill,
+    _unanswered,
+)
+
+
+def _long(flags: Bools, least: int) -> Bools:
+    """Only the runs of at least so many samples."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    kept = np.zeros(len(flags), dtype=bool)
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        kept[start:stop] = stop - start >= least
+    return kept
+
+
+def _longest(flags: Bools) -> tuple[int, int]:
+    """The longest run: its first index, and the one behind its last; (0, 0) where there is none."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
+    if len(edges) == 0:
+        return 0, 0
+    longest = int(np.argmax(edges[1::2] - edges[::2]))
+    return int(edges[2 * longest]), int(edges[2 * longest + 1])

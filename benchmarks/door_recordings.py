@@ -1,0 +1,232 @@
+"""What the benchmark of the door records: open loops of every usual kind, and closed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
+from bayeshaptic.types import Floats
+
+CONTROLLERS = ("P", "PD", "PI", "PID", "PD filtered", "PID saturated")
+REFERENCES = ("steps", "ramps", "noise", "wall with dither")
+EXCITATIONS = ("white", "coloured", "multisine", "sweep", "binary", "steps")
+LOGGED = ("at the sample", "a sample early", "a sample late", "a late command")
+# A loop that shakes at its limit is another experiment; so is one that does not move.
+_FARTHEST = 20.0  # times the reference's size
+_FEWEST_COUNTS = 20.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """One simulated recording, and what it is.
+
+    Attributes
+    ----------
+    closed : bool
+    kind : str
+        Excitation in open loop, controller in closed loop.
+    reference : str
+    logged : str
+        When the position was written down beside the command.
+    device : str
+    friction : bool
+    answer : float
+        Of a closed loop: share of the force's power that answers to what the reference does not
+        cause (friction, the hand, counts of the encoder). It is this share that biases.
+    recording : Recording
+    """
+
+    closed: bool
+    kind: str
+    reference: str
+    logged: str
+    device: str
+    friction: bool
+    answer: float
+    recording: Recording
+
+
+def open_case(seed: int) -> Case:
+    """An open-loop recording of a random device."""
+    rng = np.random.default_rng((1, seed))
+    while True:
+        bench, device, friction = _bench(rng)
+        kind = EXCITATIONS[seed % len(EXCITATIONS)]
+        seconds = float(np.exp(rng.uniform(np.log(2.0), np.log(30.0))))
+        made = simulate(bench, _excitation(kind, bench, seconds, rng), seed=int(rng.integers(1e9)))
+        logged = LOGGED[rng.choice(3, p=(0.5, 0.25, 0.25))]
+        if np.ptp(made.position) > _FEWEST_COUNTS * bench.encoder_resolution:
+            break
+    recording = _logged(made.force, made.position, bench, logged)
+    return Case(False, kind, "", logged, device, friction, 0.0, recording)
+
+
+def closed_case(seed: int) -> Case:
+    """A closed-loop recording of a random device under a random controller."""
+    rng = np.random.default_rng((2, seed))
+    kind = CONTROLLERS[seed % len(CONTROLLERS)]
+    reference = REFERENCES[seed // len(CONTROLLERS) % len(REFERENCES)]
+    while True:
+        bench, device, friction = _bench(rng)
+        seconds = float(np.exp(rng.uniform(np.log(2.0), np.log(30.0))))
+        logged = LOGGED[rng.choice(4, p=(0.4, 0.15, 0.15, 0.3))]
+        controller, size = _controller(kind, reference, bench, seconds, rng, logged)
+        noise = int(rng.integers(1e9))
+        made = run_loop(bench, controller(), seconds, noise, give_up=_FARTHEST * size)
+        whole = len(made.force) >= round(seconds / bench.period_s) - 1
+        if whole and np.ptp(made.position) > _FEWEST_COUNTS * bench.encoder_resolution:
+            break
+    ideal = run_loop(replace(bench.quiet(), effects=()), controller(), seconds, noise)
+    answer = _answer(made.force, ideal.force)
+    recording = _logged(made.force, made.position, bench, logged)
+    return Case(True, kind, reference, logged, device, friction, answer, recording)
+
+
+def _bench(rng: np.random.Generator) -> tuple[Bench, str, bool]:
+    """A device with parameters, delay, encoder and friction of its own, held or not."""
+    name = str(rng.choice(["lhifam", "phantom"]))
+    mechanism = str(rng.choice(["rigid", "free", "grasped"]))
+    bench = Bench.from_device(name, mechanism == "grasped", mechanism)
+    values = {key: v * float(np.exp(rng.normal(0, 0.3))) for key, v in bench.values.items()}
+    period = float(rng.choice([5e-4, 1e-3, 1e-3, 2e-3]))
+    bench = replace(
+        bench,
+        values=values,
+        period_s=period,
+        delay_s=float(rng.uniform(0, 3)) * period,
+        encoder_resolution=bench.encoder_resolution * float(10 ** rng.uniform(-1.5, 0.5)),
+    )
+    friction = bool(rng.random() < 0.5)
+    if friction:
+        force = bench.force_rms * float(10 ** rng.uniform(-2, -0.5))
+        bench = bench.with_effect("coulomb_friction", force=force)
+    return bench, f"{name} {mechanism}", friction
+
+
+def _excitation(
+    kind: str, bench: Bench, seconds: float, rng: np.random.Generator
+) -> WhiteNoise | Multisine | Floats:
+    period = bench.period_s
+    nyquist = 0.5 / period
+    samples = round(seconds / period)
+    time = np.arange(samples) * period
+    rms = bench.force_rms
+    if kind == "white":
+        return WhiteNoise(rms, nyquist * float(rng.uniform(0.1, 1.0)), 0.5, seconds)
+    if kind == "multisine":
+        spacing = float(rng.choice([1.0, 2.0, 5.0]))
+        phase = str(rng.choice(["schroeder", "random"]))
+        last = nyquist * float(rng.uniform(0.2, 0.9))
+        periods = max(2, int(seconds * spacing))
+        return Multisine(rms, spacing, last, spacing, periods, phase)
+    if kind == "sweep":
+        low, high = 0.5, nyquist * rng.uniform(0.1, 0.8)
+        rate = np.log(high / low) / seconds
+        return np.sqrt(2) * rms * np.sin(2 * np.pi * low * np.expm1(rate * time) / rate)
+    if kind == "binary":
+        clock = int(rng.integers(1, 20))
+        bits = rng.choice([-1.0, 1.0], samples // clock + 1)
+        return rms * np.repeat(bits, clock)[:samples]
+    if kind == "steps":
+        return rms * _steps(samples, period, rng)
+    pole = float(np.exp(-2 * np.pi * rng.uniform(5, 100) * period))
+    noise = _low_passed(rng.normal(size=samples), pole)
+    return rms * noise / noise.std()
+
+
+def _steps(samples: int, period: float, rng: np.random.Generator) -> Floats:
+    """Levels that are held for some 0.2 to 2 s."""
+    hold = rng.uniform(0.2, 2.0)
+    edges = np.cumsum(rng.uniform(0.5, 1.5, samples) * hold / period).astype(int)
+    levels = rng.normal(size=samples)
+    return np.asarray(levels[np.searchsorted(edges, np.arange(samples), side="right")])
+
+
+def _low_passed(signal: Floats, pole: float) -> Floats:
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([1 - pole], [1, -pole], signal))
+
+
+def _reference(
+    kind: str, samples: int, period: float, bandwidth: float, rng: np.random.Generator
+) -> Floats:
+    """A position to follow, of size one."""
+    if kind == "steps":
+        return _steps(samples, period, rng)
+    if kind == "ramps":
+        corners = _steps(samples, period, rng)
+        changes = np.flatnonzero(np.diff(corners))
+        at = np.concatenate([[0], changes, [samples]])
+        return np.interp(np.arange(samples), at, rng.normal(size=len(at)))
+    if kind == "noise":
+        pole = float(np.exp(-2 * np.pi * bandwidth * rng.uniform(0.5, 5.0) * period))
+        noise = _low_passed(_low_passed(rng.normal(size=samples), pole), pole)
+        return noise / noise.std()
+    return np.zeros(samples)
+
+
+def _controller(
+    kind: str,
+    reference: str,
+    bench: Bench,
+    seconds: float,
+    rng: np.random.Generator,
+    logged: str,
+) -> tuple[Callable[[], Callable[[int, float], float]], float]:
+    """How to begin with a controller of some hertz of bandwidth, and its reference's size."""
+    period = bench.period_s
+    samples = round(seconds / period)
+    mass = sum(v for key, v in bench.values.items() if key.startswith("m"))
+    bandwidth = float(np.exp(rng.uniform(np.log(0.8), np.log(12.0))))
+    omega = 2 * np.pi * bandwidth
+    stiffness = min(mass * omega**2, 0.3 * bench.true_critical_stiffness())
+    omega = float(np.sqrt(stiffness / mass))
+    damping = 2 * rng.uniform(0.3, 1.0) * mass * omega if "D" in kind else 0.0
+    integral = stiffness * omega * rng.uniform(0.02, 0.1) if "I" in kind else 0.0
+    size = rng.uniform(0.5, 3.0) * bench.force_rms / stiffness
+    most = stiffness * size * rng.uniform(0.5, 1.0) if "saturated" in kind else np.inf
+    filtered = "filtered" in kind or rng.random() < 0.3
+    pole = float(np.exp(-2 * np.pi * rng.uniform(20, 150) * period)) if filtered else 0.0
+    wanted = size * _reference(reference, samples, period, bandwidth, rng)
+    added = np.zeros(samples)
+    if reference == "wall with dither":
+        noise = _low_passed(rng.normal(size=samples), float(rng.uniform(0, 0.9)))
+        added = bench.force_rms * rng.uniform(0.3, 1.0) * noise / noise.std()
+
+    def begin() -> Callable[[int, float], float]:
+        smooth = last = total = read = 0.0
+
+        def control(k: int, position: float) -> float:
+            nonlocal smooth, last, total, read
+            now, read = (read if logged == "a late command" else position), position
+            smooth = pole * smooth + (1 - pole) * now
+            error = wanted[k] - smooth
+            rate, last = (smooth - last) / period, smooth
+            total += integral * period * error
+            force = stiffness * error + total - damping * rate + added[k]
+            return float(np.clip(force, -most, most))
+
+        return control
+
+    return begin, size
+
+
+def _answer(force: Floats, ideal: Floats) -> float:
+    """Share of a force's power that an ideal device would not have caused."""
+    return float(np.var(force - ideal) / np.var(force))
+
+
+def _logged(force: Floats, position: Floats, bench: Bench, logged: str) -> Recording:
+    if logged == "a sample early":
+        force, position = force[:-1], position[1:]
+    elif logged == "a sample late":
+        force, position = force[1:], position[:-1]
+    return recording_from_arrays(
+        force, position, period_s=bench.period_s, force_unit=bench.force_unit
+    )

@@ -1,0 +1,72 @@
+"""Recordings that say too little are refused with the reason, the others are not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.read import read_recording, recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.sufficiency import refuse_too_little
+from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
+
+RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
+BENCH = Bench.from_device("phantom")
+
+
+def recorded(excitation: object, bench: Bench = BENCH) -> Recording:
+    made = simulate(bench, excitation, seed=1)
+    return recording_from_arrays(
+        made.force, made.position, period_s=made.period_s, force_unit="Nm", position_unit="rad"
+    )
+
+
+def noise(seconds: float = 8.0, rms: float = 0.1) -> np.ndarray:
+    return simulate(BENCH, WhiteNoise(rms, 200.0, 0.7, seconds), seed=2).force
+
+
+def idle() -> np.ndarray:
+    force = noise()
+    force[1000:5000] = 0
+    return force
+
+
+def backwards() -> Recording:
+    made = recorded(noise())
+    return replace(made, position=made.position[::-1])
+
+
+TIME = np.arange(8000) * 1e-3
+SAYS_TOO_LITTLE = {
+    "2 s, and at least 2.5 s": lambda: recorded(noise(2.0)),
+    "the force changes 3 times in 8 s": lambda: recorded(np.repeat([0.0, 0.1, -0.1, 0.0], 2000)),
+    r"the force is a single tone \(3 Hz\)": lambda: recorded(0.1 * np.sin(6 * np.pi * TIME)),
+    r"the force is 2 tones \(3, 11 Hz\)": lambda: recorded(
+        0.1 * np.sin(6 * np.pi * TIME) + 0.05 * np.sin(22 * np.pi * TIME)
+    ),
+    "zero for 50 % .*rows with force .5001 to 8000": lambda: recorded(idle()),
+    "stands still for": lambda: recorded(
+        noise(rms=0.03), BENCH.with_effect("coulomb_friction", force=0.07)
+    ),
+    "hardly answers": lambda: backwards(),
+}
+
+
+@pytest.mark.parametrize("reason", SAYS_TOO_LITTLE)
+def test_what_says_too_little_is_refused(reason: str) -> None:
+    with pytest.raises(InputError, match=reason) as caught:
+        refuse_too_little(SAYS_TOO_LITTLE[reason]())
+    assert "\n" not in str(caught.value)
+
+
+def test_what_says_enough_is_not() -> None:
+    multisine = Multisine(0.1, 1.0, 100.0, 1.0, 2)
+    for excitation in (noise(3.0), multisine, np.sign(noise())):
+        refuse_too_little(recorded(excitation))
+    for path in RECORDINGS.glob("*.csv.gz"):
+        if "relay" not in path.name:
+            refuse_too_little(read_recording(path))
