@@ -42,7 +42,7 @@ def open_loops(case: str) -> tuple[np.ndarray, np.ndarray]:
 def test_no_false_alarm_in_open_loop(case: str) -> None:
     for force, position in zip(*open_loops(case), strict=True):
         found = judge(force, position)
-        assert not (found.has_feedback or found.swapped or found.early_position)
+        assert not (found.has_feedback or found.swapped or found.early_position or found.opposite)
         # Half of the alarm's threshold: it is not by luck.
         assert not found.doubtful
         assert found.feedback[1].value < 0.01
@@ -118,10 +118,9 @@ def test_steps_under_a_controller_are_feedback(where: str, ahead: int) -> None:
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_position_of_the_opposite_sign_is_seen(case: str) -> None:
-    for number, (force, position) in enumerate(zip(*open_loops(case), strict=True)):
-        assert not judge(force, position).opposite
-        # In a force of a fifth of the band is next to nothing new that could be answered to.
-        assert BANDS[number // 2] < 200 or judge(force, -position).opposite
+    # In a force of a fifth of the band is next to nothing new that could be answered to.
+    for force, position in zip(*(signals[4:] for signals in open_loops(case)), strict=True):
+        assert judge(force, -position).opposite
 
 
 def test_a_command_that_is_mostly_at_its_limits_cannot_be_decided() -> None:
