@@ -116,6 +116,8 @@ class Drawn:
 
 def drawn(figure: Figure, name: str) -> Drawn:
     """The figure as PNG, and as SVG where that is small; `name` tells its parts from others'."""
+    figure.draw_without_rendering()  # lays it out, once for both formats
+    figure.set_layout_engine("none")
     vector = svg(figure, name)
     return Drawn(png(figure), vector if len(vector) <= MOST_SVG else None)
 
