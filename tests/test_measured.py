@@ -103,13 +103,13 @@ def test_the_loop_names_the_drag_and_leaves_noise(dragged: Recording) -> None:
     fit = bh.least_squares(bh.free(delay_s=0.0), etfe)
     told = trace(etfe, fit, trials=LineTrials(etfe, fit, floor=0.0))
     assert any(test.flagged for test in told.before)
-    assert [effect.name for effect in told.state.accepted] == ["drag"]
+    assert [effect.name for effect in told.state.accepted] == ["cubic_damping"]
     state = told.state
     assert isinstance(state, BalancedState) and state.whole.forces[0].place == LOAD
     assert not any(test.flagged for test in told.after)
     assert state.fit.reduced_chi_square < 1.3
     assert (told.verdict, told.residual_class) == ("explained", "nonlinear")
-    assert [c.name for c in told.candidates if c.accepted] == ["drag"]
+    assert [c.name for c in told.candidates if c.accepted] == ["cubic_damping"]
 
 
 def test_a_linear_device_gets_nothing() -> None:

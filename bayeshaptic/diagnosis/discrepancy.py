@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
+from bayeshaptic.effects.laws import variables
+from bayeshaptic.effects.nonlinear.shapes import VELOCITY
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models.structures import GROUND_DAMPERS
@@ -25,7 +27,6 @@ _DRAWS = 2000
 _GRID = 1500
 _SIZES = np.geomspace(3e-4, 1.0, 12)
 _LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
-_BY_VELOCITY = {"sign(v)", "v|v|", "v^3"}
 _DAMPING_LEFT = 0.2  # of the damping, if most of it is friction that was fitted as damping
 _BEYOND = 1.25  # times a steady ramp
 _UP = 0.25  # of the least way down, and up as well: a remainder biases either way
@@ -106,7 +107,7 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
         if trial.accepted.family == family
     ]
     raised = {test.name for test in traced.after if test.flagged}
-    if raised & _BY_VELOCITY:
+    if VELOCITY in variables(raised):
         damped = np.array([n in GROUND_DAMPERS for n in fit.model.names])
         less = np.where(damped, _DAMPING_LEFT * fit.theta, fit.theta)
         others.append(critical_stiffness(fit.model, less).value)

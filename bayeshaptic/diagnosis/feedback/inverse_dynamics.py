@@ -19,6 +19,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.signal import butter, decimate, sosfiltfilt
 
+from bayeshaptic.effects.laws import corrections, fitted
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.recording import Recording
@@ -200,7 +203,6 @@ def _path(recording: Recording, cutoff_hz: float) -> Path:
 
 def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
     """Those of the linear model, and those that may join it."""
-    fast = float(np.sqrt(np.mean(path.velocity**2)))
     middle = float(np.mean(path.position))
 
     def unit(dimension: str) -> str:
@@ -212,25 +214,16 @@ def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Te
         Term("damping", "viscous damping", unit("damping"), lambda p: p.velocity),
         Term("offset", "constant force", force, lambda p: np.ones_like(p.velocity)),
     )
-    stribeck = tuple(
-        Term(
-            f"stribeck_{part:g}",
-            f"friction that differs below {part * fast:.3g} {x}/s",
-            force,
-            _slow_friction(part * fast),
-        )
-        for part in (0.03, 0.1, 0.3, 1.0)
-    )
+    usual = Usual.of(path.velocity, path.position, x)
+    laws = [*(shape for _, shape in fitted(MOTOR, usual)), *corrections(usual)]
     return start, (
-        Term("coulomb", "dry (Coulomb) friction", force, lambda p: np.sign(p.velocity)),
-        *stribeck,
+        *(_term(shape, force, x, middle) for shape in laws),
         Term(
             "asymmetric_damping",
             "damping that differs between the directions",
             unit("damping"),
             lambda p: np.abs(p.velocity),
         ),
-        Term("drag", "drag", unit("drag"), lambda p: p.velocity * np.abs(p.velocity)),
         Term(
             "friction_root",
             "friction that grows with the root of the velocity",
@@ -248,9 +241,14 @@ def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Te
     )
 
 
-def _slow_friction(velocity: float) -> Callable[[Path], Floats]:
-    """Friction that fades out around a velocity (Stribeck's law, less the Coulomb part)."""
-    return lambda p: np.sign(p.velocity) * np.exp(-((p.velocity / velocity) ** 2))
+def _term(shape: Shape, force: str, x: str, middle: float) -> Term:
+    """A law's force, as the command must make up for it."""
+
+    def column(path: Path) -> Floats:
+        return -shape.force(path.velocity if shape.over == VELOCITY else path.position - middle)
+
+    title = shape.title.replace(" {where}", "")
+    return Term(shape.name, title, shape.unit(force, x), column)
 
 
 def _grow(

@@ -13,8 +13,10 @@ from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.effects.laws import tested
+from bayeshaptic.effects.nonlinear.shapes import COMMAND, POSITION, STRETCH, VELOCITY
 from bayeshaptic.inference.least_squares import Fit
-from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -58,32 +60,40 @@ def common_coefficient(windows: Windows) -> tuple[float, float]:
 
 def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, Complexes]:
     """Motions that nonlinear forces would add, at the lines of the spectra; by name."""
-    system = fit.model.system(fit.theta)
-    force = recording.force - recording.force.mean()
-    x, v = driven_motion(fit, recording)
     s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    mechanism = system.continuous_response(s)[0]
-    through_loop = fit.response(s.imag / (2 * np.pi))
-    measured = recording.position - recording.position.mean()
     at_lines = line_transform(etfe, recording)
-    unit_u, unit_v, unit_x = force.std(), v.std(), measured.std()
-    forces = {
-        "sign(v)": -np.sign(v),
-        "v|v|": -v * np.abs(v) / unit_v**2,
-        "v^3": -((v / unit_v) ** 3),
-        "x^3": -((measured / unit_x) ** 3),
-        "x^2": -((measured / unit_x) ** 2),
-    }
-    found = {name: mechanism * at_lines(value) for name, value in forces.items()}
-    found["u^3"] = through_loop * at_lines((force / unit_u) ** 3)
-    if len(system.mechanism.masses) > 1:
-        other, _ = linear_motion(system, force, recording.period_s, mass=1)
-        stretch = x - other
-        stretch = stretch / stretch.std()
-        pair = pair_response(fit, s)
-        found["stretch^3"] = pair * at_lines(-(stretch**3))
-        found["clipped stretch"] = pair * at_lines(-np.clip(stretch, -0.5, 0.5))
+    found = {}
+    for over, motion in motions(fit, recording).items():
+        response = response_to(fit, over, s)
+        for shape in tested().values():
+            if shape.over == over:
+                found[shape.name] = response * at_lines(shape.force(motion / motion.std()))
     return found
+
+
+def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
+    """What a force may be a function of, shape (N,) each: by name.
+
+    The motion is that of the model: signs taken from an encoder are those of its noise.
+    """
+    _, velocity = driven_motion(fit, recording)
+    found = {VELOCITY: velocity, POSITION: recording.position - recording.position.mean()}
+    force = recording.force - recording.force.mean()
+    system = fit.model.system(fit.theta)
+    if len(system.mechanism.masses) > 1:
+        ends = linear_motions(system, force, recording.period_s, (0, 1))[:, 0]
+        found[STRETCH] = ends[0] - ends[1]
+    found[COMMAND] = force
+    return found
+
+
+def response_to(fit: Fit, over: str, s: Complexes) -> Complexes:
+    """Position of the motor over a force that is a function of `over`, at points s."""
+    if over == STRETCH:
+        return pair_response(fit, s)
+    if over == COMMAND:
+        return np.asarray(fit.response(s.imag / (2 * np.pi)))
+    return fit.model.system(fit.theta).continuous_response(s)[0]
 
 
 def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:

@@ -12,17 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.columns import driven_motion, line_transform, pair_response
+from bayeshaptic.diagnosis.residuals.columns import line_transform, response_to
 from bayeshaptic.inference.least_squares import Fit
-from bayeshaptic.models.response.motion import linear_motions
-from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Complexes, Floats
 
 # Dense about zero, where friction turns round; no wider than the motion often is.
 _KNOTS = np.array([-2.2, -1.3, -0.7, -0.3, -0.08, 0.08, 0.3, 0.7, 1.3, 2.2])
 _EDGES = (0.003, 0.997)  # share of the time outside of which no knot stands
-VELOCITY, POSITION, STRETCH, COMMAND = "velocity", "position", "stretch", "command"
 
 
 @dataclass(frozen=True)
@@ -45,22 +42,6 @@ class ForceCurve:
     sd: Floats
 
 
-def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
-    """What a force may be drawn over, shape (N,) each: by name.
-
-    The motion is that of the model: signs taken from an encoder are those of its noise.
-    """
-    _, velocity = driven_motion(fit, recording)
-    found = {VELOCITY: velocity, POSITION: recording.position - recording.position.mean()}
-    force = recording.force - recording.force.mean()
-    system = fit.model.system(fit.theta)
-    if len(system.mechanism.masses) > 1:
-        ends = linear_motions(system, force, recording.period_s, (0, 1))[:, 0]
-        found[STRETCH] = ends[0] - ends[1]
-    found[COMMAND] = force
-    return found
-
-
 def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
     """The force that `fit` leaves over in `etfe`, as a curve over a motion.
 
@@ -79,12 +60,7 @@ def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
     knots = knots[(knots > low) & (knots < high)]
     hats = [np.interp(motion, knots, row) for row in np.eye(len(knots))]
     s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    if over == STRETCH:
-        response = pair_response(fit, s)
-    elif over == COMMAND:
-        response = fit.response(s.imag / (2 * np.pi))
-    else:
-        response = fit.model.system(fit.theta).continuous_response(s)[0]
+    response = response_to(fit, over, s)
     at_lines = line_transform(etfe, etfe.recording)
     columns = np.stack([response * at_lines(hat) for hat in hats])
     force, covariance = _weighted(fit, etfe, columns)

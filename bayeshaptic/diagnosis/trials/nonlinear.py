@@ -14,6 +14,7 @@ import numpy as np
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.force_fit import fit_force
+from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
@@ -51,12 +52,13 @@ def nonlinear_trials(
         return []
     bench = ForceBench(state, recording)
     motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    over = variables(raised)
     firsts: dict[str, _Called] = {}  # by the name of the strength: laws of friction share one
     others: list[_Called] = []
     for kind in effects("nonlinear"):
         if _there(kind, state):
             continue
-        called = [e for e in kind.candidates(state.model, motion) if e.called_for(raised)]
+        called = [e for e in kind.candidates(state.model, motion) if e.called_for(over)]
         if called and kind.strength[0] in firsts:
             others.append(called)
         elif called:

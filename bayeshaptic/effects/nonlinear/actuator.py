@@ -8,8 +8,16 @@ import numpy as np
 
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Floats, Motion, NonlinearEffect
+from bayeshaptic.effects.nonlinear.shapes import COMMAND, Shape
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
+
+_CUBE = Shape(
+    "u^3",
+    "a command that acts like u\N{SUPERSCRIPT THREE}, as saturation",
+    COMMAND,
+    lambda u: -(u**3),
+)
 
 
 @register
@@ -18,7 +26,8 @@ class ActuatorSaturation(CommandEffect):
 
     name = "actuator_saturation"
     title = "saturation of the actuator"
-    columns = ("u^3",)
+    tests = (_CUBE,)
+    over = (COMMAND,)
     strength = ("force_limit", "force")
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
@@ -38,7 +47,8 @@ class SoftSaturation(CommandEffect):
 
     name = "soft_saturation"
     title = "gradual saturation of the actuator"
-    columns = ("u^3",)
+    tests = (_CUBE,)
+    over = (COMMAND,)
     strength = ("force_limit", "force")
     dimensions = {"sharpness": "number"}
     tuned = ("sharpness",)
@@ -66,7 +76,8 @@ class DeadZone(CommandEffect):
 
     name = "dead_zone"
     title = "dead zone of the actuator"
-    columns = ("u^3",)
+    tests = (_CUBE,)
+    over = (COMMAND,)
     strength = ("half_zone", "force")
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
 
-from bayeshaptic.effects.nonlinear.internal_force import LOAD, MOTOR, Law, Place
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
+from bayeshaptic.effects.nonlinear.shapes import POSITION, STRETCH, VELOCITY, Shape, Usual
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
 
 _FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
-_BY_VELOCITY = ("sign(v)", "v|v|", "v^3")
 
 
 def _force_scale(model: Model, theta: Floats, motion: Motion) -> float:
@@ -30,7 +30,10 @@ class CoulombFriction(NonlinearEffect):
 
     name = "coulomb_friction"
     title = "dry (Coulomb) friction"
-    columns = _BY_VELOCITY
+    tests = (
+        Shape("sign(v)", "a force like sign(v), as dry friction", VELOCITY, lambda v: -np.sign(v)),
+    )
+    over = (VELOCITY,)
     strength = ("friction_force", "force")
 
     @classmethod
@@ -38,6 +41,14 @@ class CoulombFriction(NonlinearEffect):
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
         return tuple(cls(place) for place in (MOTOR, LOAD) if place in motion)
+
+    @classmethod
+    def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
+        if place == CONNECTION:
+            return ()
+        force = cls.tests[0].force
+        title = f"{cls.title} {{where}}"
+        return (Shape("coulomb", title, VELOCITY, force, positive=True, jumps=True),)
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
@@ -61,7 +72,7 @@ class StribeckFriction(NonlinearEffect):
 
     name = "stribeck_friction"
     title = "dry friction that falls with velocity (Stribeck)"
-    columns = _BY_VELOCITY
+    over = (VELOCITY,)
     strength = ("friction_force", "force")
     dimensions = {"static_excess": "number", "stribeck_velocity": "velocity"}
     tuned = ("static_excess", "stribeck_velocity")
@@ -77,12 +88,27 @@ class StribeckFriction(NonlinearEffect):
             for share in (0.05, 0.25)
         )
 
+    @classmethod
+    def corrections(cls, usual: Usual) -> tuple[Shape, ...]:
+        return tuple(_slow_friction(part, usual) for part in (0.03, 0.1, 0.3, 1.0))
+
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         shape = self.shape["static_excess"], self.shape["stribeck_velocity"]
         return Law(_stribeck, (strength, *shape))
+
+
+def _slow_friction(part: float, usual: Usual) -> Shape:
+    """Friction that fades out around a velocity: the law less its Coulomb part."""
+    slow = part * usual.velocity
+
+    def force(v: Floats) -> Floats:
+        return -np.sign(v) * np.exp(-((v / slow) ** 2))
+
+    title = f"friction that differs below {slow:.3g} {usual.x}/s"
+    return Shape(f"stribeck_{part:g}", title, VELOCITY, force, jumps=True)
 
 
 def _stribeck(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
@@ -101,7 +127,7 @@ class DahlFriction(NonlinearEffect):
     name = "dahl_friction"
     title = "dry friction that begins as a spring (Dahl)"
     # It may look like a spring, or like nothing but noise.
-    columns = (*_BY_VELOCITY, "x^3", "stretch^3", "clipped stretch", "excess noise")
+    over = (VELOCITY, POSITION, STRETCH, "excess noise")
     strength = ("friction_force", "force")
     dimensions = {"presliding_distance": "position"}
     tuned = ("presliding_distance",)
@@ -133,8 +159,15 @@ def _dahl(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyp
 class _PowerOfVelocity(NonlinearEffect):
     """A force against the motion that grows with a power of the velocity."""
 
-    columns = _BY_VELOCITY
+    over = (VELOCITY,)
     power: ClassVar[int]
+
+    also: ClassVar[tuple[int, ...]] = ()
+    """Powers that have no law of their own."""
+
+    @classmethod
+    def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
+        return tuple(_resistance(power) for power in (cls.power, *cls.also))
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         scale = _force_scale(model, theta, motion) / motion.velocity.std() ** self.power
@@ -152,14 +185,25 @@ def _power_of_velocity(x, v, last, gain, before, step_s, constants):  # type: ig
     return -resistance * v / (1 + 0.5 * resistance * gain)
 
 
+def _power(power: int) -> Callable[[Floats], Floats]:
+    return lambda v: -v * np.abs(v) ** (power - 1)
+
+
+def _resistance(power: int) -> Shape:
+    title = f"drag {{where}} with power {power} of the velocity"
+    return Shape(f"drag_{power}", title, VELOCITY, _power(power), f"{{force}} ({{x}}/s)^-{power}")
+
+
 @register
 class Drag(_PowerOfVelocity):
     """A force -c v |v|, as of a turbulent fluid."""
 
     name = "drag"
     title = "drag that grows with the square of the velocity"
+    tests = (Shape("v|v|", "a force like v|v|, as drag", VELOCITY, _power(2)),)
     strength = ("drag_coefficient", "drag")
     power = 2
+    also = (5,)
 
 
 @register
@@ -168,5 +212,8 @@ class CubicDamping(_PowerOfVelocity):
 
     name = "cubic_damping"
     title = "damping that grows with the cube of the velocity"
+    tests = (
+        Shape("v^3", "a force like v\N{SUPERSCRIPT THREE}", VELOCITY, _power(3), "cubic_damping"),
+    )
     strength = ("cubic_damping", "cubic_damping")
     power = 3

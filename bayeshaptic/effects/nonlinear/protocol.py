@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place
+from bayeshaptic.effects.nonlinear.shapes import Shape, Usual
 from bayeshaptic.models import Model
 from bayeshaptic.types import Floats
 
@@ -45,8 +46,10 @@ class NonlinearEffect(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     family: ClassVar[str] = "nonlinear"
-    columns: ClassVar[tuple[str, ...]]
-    """The residual tests that raise it."""
+    tests: ClassVar[tuple[Shape, ...]] = ()
+    """Forces that the residual is tested for, of the variable over its rms."""
+    over: ClassVar[tuple[str, ...]]
+    """Variables of the tests that call for it, and names of tests that are of no shape."""
     strength: ClassVar[tuple[str, str]]
     """Name and dimension of the strength."""
     dimensions: ClassVar[Mapping[str, str]] = {}
@@ -67,9 +70,19 @@ class NonlinearEffect(ABC):
         """Its variants: places, and a grid of shapes sized by the motion."""
         return (cls(),)
 
+    @classmethod
+    def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
+        """Its force where it is a function of the motion alone, to fit linearly; none if not."""
+        return ()
+
+    @classmethod
+    def corrections(cls, usual: Usual) -> tuple[Shape, ...]:
+        """What it adds to a simpler law of the same thing, at the motor."""
+        return ()
+
     def called_for(self, raised: set[str]) -> bool:
-        """Whether one of the residual tests that found something is this effect's."""
-        return bool(raised & set(self.columns))
+        """Whether one of the raised variables or tests is this effect's."""
+        return bool(raised & set(self.over))
 
     @abstractmethod
     def law(self, strength: float, model: Model, theta: Floats) -> Law:

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
+from bayeshaptic.effects.nonlinear.shapes import POSITION, STRETCH, Shape, Usual
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
+
+_THREE = "\N{SUPERSCRIPT THREE}"
+
+
+def _square(x: Floats) -> Floats:
+    return -x * np.abs(x)
+
+
+def _cube(x: Floats) -> Floats:
+    return -(x**3)
 
 
 @register
@@ -19,7 +31,12 @@ class HardeningSpring(NonlinearEffect):
 
     name = "hardening_spring"
     title = "hardening (or softening) spring"
-    columns = ("x^3", "stretch^3")
+    tests = (
+        Shape("x^3", f"a force like x{_THREE}, as a hardening spring", POSITION, _cube),
+        Shape("x^2", "a force like x\N{SUPERSCRIPT TWO}", POSITION, lambda x: -(x**2)),
+        Shape("stretch^3", "a cubic force in the connection", STRETCH, _cube),
+    )
+    over = (POSITION, STRETCH)
     strength = ("cubic_stiffness", "cubic_stiffness")
     signed = True
 
@@ -30,7 +47,15 @@ class HardeningSpring(NonlinearEffect):
         return tuple(cls(place) for place in (MOTOR, CONNECTION) if place in motion)
 
     def called_for(self, raised: set[str]) -> bool:
-        return ("stretch^3" if self.place == CONNECTION else "x^3") in raised
+        return (STRETCH if self.place == CONNECTION else POSITION) in raised
+
+    @classmethod
+    def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
+        title = "spring {where} that hardens or softens with the"
+        return (
+            Shape("spring_cube", f"{title} cube", POSITION, _cube, "cubic_stiffness"),
+            Shape("spring_square", f"{title} square", POSITION, _square, "{force}/{x}^2"),
+        )
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         values = dict(zip(model.names, theta, strict=True))
@@ -60,7 +85,12 @@ class Backlash(NonlinearEffect):
 
     name = "backlash"
     title = "backlash in the connection"
-    columns = ("clipped stretch", "stretch^3")
+    tests = (
+        Shape(
+            "clipped stretch", "a gap in the connection", STRETCH, lambda x: np.clip(x, -0.5, 0.5)
+        ),
+    )
+    over = (STRETCH,)
     strength = ("half_gap", "position")
     dimensions = {"damping_in_gap": "number"}
     tuned = ("damping_in_gap",)
@@ -74,6 +104,12 @@ class Backlash(NonlinearEffect):
             return ()
         return (cls(CONNECTION, {"damping_in_gap": 0.9}),)
 
+    @classmethod
+    def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
+        if place != CONNECTION:
+            return ()
+        return tuple(_gap_of(part * usual.position, usual.x) for part in (0.1, 0.3, 1.0))
+
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return float(motion.position.std()) * np.array([0.05, 0.1, 0.2, 0.3])
 
@@ -81,6 +117,12 @@ class Backlash(NonlinearEffect):
         values = dict(zip(model.names, theta, strict=True))
         damping = (1 - self.shape["damping_in_gap"]) * values["bc"]
         return Law(_gap, (strength, values["kc"], damping))
+
+
+def _gap_of(half: float, unit: str) -> Shape:
+    title = f"gap of +-{half:.3g} {unit} {{where}}"
+    force = partial(np.clip, a_min=-half, a_max=half)
+    return Shape("gap", title, POSITION, force, "stiffness", positive=True)
 
 
 def _gap(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]

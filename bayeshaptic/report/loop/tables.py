@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.library import effects
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.quantities import estimate, quantity, scale
@@ -23,14 +24,6 @@ _TESTS = {
     "bands": "residual, band by band",
     "total": "residual over all frequencies",
     "smooth change": "a smooth change of the response",
-    "sign(v)": "a force like sign(v), as dry friction",
-    "v|v|": "a force like v|v|, as drag",
-    "v^3": "a force like v\N{SUPERSCRIPT THREE}",
-    "x^3": "a force like x\N{SUPERSCRIPT THREE}, as a hardening spring",
-    "x^2": "a force like x\N{SUPERSCRIPT TWO}",
-    "u^3": "a command that acts like u\N{SUPERSCRIPT THREE}, as saturation",
-    "stretch^3": "a cubic force in the connection",
-    "clipped stretch": "a gap in the connection",
     "a steady change": "a steady change during the recording",
     "a change and back": "a change during the recording, and back",
 }
@@ -119,7 +112,8 @@ def outcomes(closed: Closed) -> Rows:
 
 def question(test: Test) -> str:
     """What a test asks."""
-    return _TESTS.get(test.name) or title_of(test.name)
+    shape = tested().get(test.name)
+    return shape.title if shape else _TESTS.get(test.name) or title_of(test.name)
 
 
 def title_of(name: str) -> str:

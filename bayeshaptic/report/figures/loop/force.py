@@ -73,7 +73,9 @@ def draw(closed: Closed) -> Figure:
 
 
 def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]]:
-    from bayeshaptic.diagnosis.residuals.force_curve import COMMAND, force_curve, motions
+    from bayeshaptic.diagnosis.residuals.columns import motions
+    from bayeshaptic.diagnosis.residuals.force_curve import force_curve
+    from bayeshaptic.effects.nonlinear.shapes import COMMAND
 
     base, analysis = closed.base, closed.analysis
     assert base.recording is not None
@@ -96,7 +98,10 @@ def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]
 
 def _saturates(closed: Closed) -> bool:
     """Where something in the command, not in the motion, is still in question."""
-    return any(test.flagged and test.name == "u^3" for test in closed.traced.after)
+    from bayeshaptic.effects.laws import variables
+    from bayeshaptic.effects.nonlinear.shapes import COMMAND
+
+    return COMMAND in variables(test.name for test in closed.traced.after if test.flagged)
 
 
 def _panel(
