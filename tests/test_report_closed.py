@@ -15,7 +15,8 @@ from browser import needs_browser, probe
 from fake_analysis import fake_analysis, fake_closed
 
 from bayeshaptic import read_recording, write_report
-from bayeshaptic.diagnosis.residuals.force_curve import force_curve, motions
+from bayeshaptic.diagnosis.residuals.columns import motions
+from bayeshaptic.diagnosis.residuals.force_curve import force_curve
 from bayeshaptic.inference.least_squares import summarise
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
