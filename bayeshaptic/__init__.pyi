@@ -1,5 +1,6 @@
 """The public names, and where each of them lives: read by type checkers, and on first use."""
 
+from . import plot as plot
 from .devices import (
     Device as Device,
 )

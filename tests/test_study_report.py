@@ -124,7 +124,8 @@ def test_what_a_study_lacks_is_null_and_not_absent() -> None:
 
 def test_the_worst_case_decides_and_is_named() -> None:
     head = study_headline(study("whole"))
-    safe = study("whole").limit.safe(0.05)
+    assert head.risk is not None
+    safe = study("whole").limit.safe(head.risk)
     number = float(re.search(r"at most ([\d.]+) N m/rad", head.sentence)[1])  # type: ignore[index]
     # Rounded down, by less than one part in a hundred.
     assert 0.99 * safe < number <= safe

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,16 @@ LINEAR_DEG = 10.0
 
 def draw(result: Result) -> Figure:
     """Stiffness above, phase from -180 degrees below, up to the Nyquist frequency."""
+    figure = style.new_figure(4.4)
+    panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    draw_on(panels, result)
+    figure.align_ylabels(panels)
+    return figure
+
+
+def draw_on(panels: Sequence[Axes], result: Result) -> None:
+    """The same on two axes that are there."""
+    top, bottom = panels
     analysis = result.analysis
     etfe, limit = analysis.etfe, analysis.limit
     low_hz, half = float(etfe.frequency_hz[0]), 0.5 / etfe.period_s
@@ -36,8 +47,6 @@ def draw(result: Result) -> Figure:
     frequency = np.unique(np.r_[np.geomspace(start, half, POINTS), etfe.frequency_hz])
     response = analysis.model.response(thinned(analysis.posterior.draws, CURVES), frequency)
     row = scale(limit.quantile(0.5), limit.unit)
-    figure = style.new_figure(4.4)
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     style.panel(top, y=f"1/|G|, {row.unit}")
     style.panel(bottom, y="phase + 180°, degrees")
     _curves(top, frequency, row.factor / np.abs(response))
@@ -65,8 +74,6 @@ def draw(result: Result) -> Figure:
     _phase_ticks(bottom)
     bottom.set_xlabel("frequency, Hz (grey: not measured)", fontsize=style.FONT)
     style.legend(top, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    figure.align_ylabels([top, bottom])
-    return figure
 
 
 def _at_median(analysis: Analysis) -> list[tuple[float, float]]:

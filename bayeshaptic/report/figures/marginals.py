@@ -46,6 +46,11 @@ def draw(result: Result) -> Figure:
     return figure
 
 
+def draw_on(axes: Axes, result: Result, name: str) -> None:
+    """One parameter on axes that are there."""
+    _marginal(axes, result.analysis, result.analysis.model.names.index(name))
+
+
 def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
     model, fit = analysis.model, analysis.fit
     name = model.names[index]

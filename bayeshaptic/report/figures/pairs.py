@@ -74,6 +74,20 @@ def draw(result: Result) -> Figure:
     return figure
 
 
+def draw_on(axes: Axes, result: Result, x: str, y: str) -> None:
+    """Two parameters on axes that are there."""
+    model, draws = result.analysis.model, result.analysis.posterior.draws
+    chosen = draws[:: max(len(draws) // 20_000, 1)][:, [model.names.index(n) for n in (x, y)]]
+    rows = [
+        scale(float(middle), model.unit(name))
+        for middle, name in zip(np.median(chosen, axis=0), (x, y), strict=True)
+    ]
+    across, up = (chosen * [row.factor for row in rows]).T
+    _pair(axes, across, up, correlation(chosen)[0, 1])
+    axes.set_xlabel(f"{style.short(x)} [{rows[0].unit}]", fontsize=style.FONT)
+    axes.set_ylabel(f"{style.short(y)} [{rows[1].unit}]", fontsize=style.FONT)
+
+
 def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float) -> None:
     style.panel(axes, grid=False, size=style.FONT - 1)
     few = slice(None, None, max(len(x) // POINTS, 1))

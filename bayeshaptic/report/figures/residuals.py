@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -48,11 +49,19 @@ def third_octaves(frequency_hz: NDArray[Any], residual: NDArray[Any]) -> BandRes
 
 def draw(result: Result) -> Figure:
     """Real and imaginary part over frequency above, the rms in third octaves below."""
+    figure = style.new_figure(4.2)
+    panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    draw_on(panels, result)
+    figure.align_ylabels(panels)
+    return figure
+
+
+def draw_on(panels: Sequence[Axes], result: Result) -> None:
+    """The same on two axes that are there."""
+    top, bottom = panels
     analysis = result.analysis
     order = np.argsort(analysis.fit.frequency_hz)
     frequency, residual = analysis.fit.frequency_hz[order], analysis.fit.residual[order]
-    figure = style.new_figure(4.2)
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     style.panel(top, y="residual / sd of the noise")
     top.axhspan(-2, 2, color="#bdbdbd", alpha=0.45, linewidth=0, label="95 % of pure noise")
     parts = np.sqrt(2) * np.stack([residual.real, residual.imag])
@@ -98,8 +107,6 @@ def draw(result: Result) -> Figure:
     _legend_above(bottom)
     style.frequency_axis(top, frequency[0] / 1.05, frequency[-1] * 1.05)
     style.frequency_axis(bottom, frequency[0] / 1.05, frequency[-1] * 1.05, "frequency, Hz")
-    figure.align_ylabels([top, bottom])
-    return figure
 
 
 def _legend_above(axes: Axes) -> None:

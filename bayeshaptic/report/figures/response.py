@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,12 +23,24 @@ if TYPE_CHECKING:
 
 def draw(result: Result) -> Figure:
     """Gain, phase, measured over model, and the coherence where there is one."""
-    analysis = result.analysis
-    etfe, band = analysis.etfe, response_band(analysis)
-    known = bool(np.isfinite(etfe.coherence).any())
-    heights = (2.8, 2.0, 1.7, 1.0) if known else (2.8, 2.0, 1.7)
+    heights = heights_of(result)
     figure = style.new_figure(0.95 * sum(heights))
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    draw_on(panels, result)
+    figure.align_ylabels(panels)
+    return figure
+
+
+def heights_of(result: Result) -> tuple[float, ...]:
+    """Heights of the panels in inches: the coherence has one where it is known."""
+    known = bool(np.isfinite(result.analysis.etfe.coherence).any())
+    return (2.8, 2.0, 1.7, 1.0) if known else (2.8, 2.0, 1.7)
+
+
+def draw_on(panels: Sequence[Axes], result: Result) -> None:
+    """The same on axes that are there: gain and phase, and on further ones the rest."""
+    analysis = result.analysis
+    etfe, band = analysis.etfe, response_band(analysis)
     force = pretty_unit(etfe.force_unit)
     unit = f"{etfe.position_unit}/({force})" if " " in force else f"{etfe.position_unit}/{force}"
     gain = style.panel(panels[0], y=f"gain, dB re 1 {unit}")
@@ -61,8 +74,9 @@ def draw(result: Result) -> Figure:
         )
     _before(gain, phase, result, modelled)
     style.legend(gain, loc="lower left")
-    _difference(panels[2], etfe, band, 20 / np.log(10) * error)
-    if known:
+    if len(panels) > 2:
+        _difference(panels[2], etfe, band, 20 / np.log(10) * error)
+    if len(panels) > 3:
         coherence = style.panel(panels[3], y="coherence")
         coherence.plot(etfe.frequency_hz, etfe.coherence, ".", color=style.DATA, markersize=2.5)
         coherence.set_ylim(-0.03, 1.05)
@@ -70,8 +84,6 @@ def draw(result: Result) -> Figure:
     for axes in panels:
         style.frequency_axis(axes, low_hz / 1.05, high_hz * 1.05)
     panels[-1].set_xlabel("frequency, Hz", fontsize=style.FONT)
-    figure.align_ylabels(panels)
-    return figure
 
 
 def _before(gain: Axes, phase: Axes, result: Result, modelled: NDArray[Any]) -> None:

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.headline import headline
 from bayeshaptic.report.quantities import estimate, percent, quantity
 from bayeshaptic.report.result import tip_limit
 
@@ -39,7 +40,7 @@ def facts(result: Result) -> Rows:
 def fared(result: Result) -> str:
     """How such intervals did where the truth is known; empty where the loop was left open."""
     closed = result.closed
-    if closed is None or closed.force is not None:
+    if closed is None or closed.force is not None or headline(result).status == "untrusted":
         return ""
     held, count, which = FARED[closed.verdict]
     return (
@@ -94,8 +95,10 @@ def caption(result: Result) -> str:
     """Under the bar of all estimates."""
     analysis = result.analysis
     level = analysis.limit.quantile(0.5)
+    line = ", the vertical line is the stiffness of the sentence above"
+    line = line if headline(result).stiffness is not None else ""
     said = f" (median {quantity(level, analysis.limit.unit)})" if math.isfinite(level) else ""
     return (
-        f"Every estimate of the limit on one axis{said}: bars are 90 % intervals, the vertical "
-        "line is the stiffness of the sentence above. The rules hold for rigid devices only."
+        f"Every estimate of the limit on one axis{said}: bars are 90 % intervals{line}. The rules "
+        "hold for rigid devices only."
     )

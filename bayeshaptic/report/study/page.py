@@ -10,7 +10,7 @@ from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
 from bayeshaptic.report.html import LABELS, embedded, frame, template, unique, with_contents
 from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
-from bayeshaptic.report.study.headline import study_headline, what_binds
+from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.words import configurations, hands, missing, people
 
 if TYPE_CHECKING:
@@ -64,7 +64,6 @@ def render_study(
         trials=any(
             o.entry.trial is not None or o.entry.level is not None for o in study.recordings
         ),
-        binds=what_binds(study) if study.limit is not None else "",
         hands=hands(study),
         people=people(study),
         people_caption=_people_caption(study),

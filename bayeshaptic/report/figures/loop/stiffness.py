@@ -58,10 +58,15 @@ def _own_label(closed: Closed, analysis: Analysis) -> str:
 
 def draw(closed: Closed) -> Figure:
     """One axis in dB; the numbers stand at the right."""
-    shown = rows(closed)
-    unit = closed.analysis.limit.unit
-    figure = style.new_figure(0.75 + 0.3 * len(shown))
-    axes = style.panel(figure.subplots(), f"critical stiffness, dB re 1 {unit}")
+    figure = style.new_figure(0.75 + 0.3 * len(rows(closed)))
+    draw_on(figure.subplots(), closed)
+    return figure
+
+
+def draw_on(axes: Axes, closed: Closed) -> None:
+    """The same on axes that are there."""
+    shown, unit = rows(closed), closed.analysis.limit.unit
+    style.panel(axes, f"critical stiffness, dB re 1 {unit}")
     axes.grid(False, axis="y")
     for place, row in enumerate(shown):
         middle = decibel(row.middle)
@@ -84,7 +89,6 @@ def draw(closed: Closed) -> Figure:
         centre = 0.5 * (low + high)
         axes.set_xlim(centre - _NARROWEST_DB / 2, centre + _NARROWEST_DB / 2)
     axes.ticklabel_format(axis="x", useOffset=False)
-    return figure
 
 
 def _number_axis(axes: Axes, shown: tuple[Row, ...], unit: str) -> None:

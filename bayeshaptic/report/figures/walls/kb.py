@@ -28,7 +28,7 @@ def draw(table: LimitTable, rules: Rules | None) -> Figure:
     figure = style.new_figure(3.5)
     panels = np.atleast_1d(figure.subplots(1, count, sharey=False))
     for axes, part in zip(panels, table.filters, strict=True):
-        _panel(axes, part, table, rules)
+        draw_on(axes, part, table, rules)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
         handles,
@@ -41,7 +41,8 @@ def draw(table: LimitTable, rules: Rules | None) -> Figure:
     return figure
 
 
-def _panel(axes: Axes, part: FilterLimits, table: LimitTable, rules: Rules | None) -> None:
+def draw_on(axes: Axes, part: FilterLimits, table: LimitTable, rules: Rules | None = None) -> None:
+    """One way to get the velocity, on axes that are there."""
     top = float(part.quantile(0.999)[np.isfinite(part.quantile(0.999))].max(initial=0.0))
     k, b = scale(top or 1.0, table.unit), scale(float(part.damping[-1]), table.damping_unit)
     damping = part.damping * b.factor

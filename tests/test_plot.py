@@ -1,0 +1,66 @@
+"""The report's figures on axes of one's own."""
+
+from __future__ import annotations
+
+import inspect
+from functools import cache
+from typing import Any
+
+import pytest
+from fake_analysis import fake_analysis, fake_closed
+from matplotlib.figure import Figure
+
+import bayeshaptic as bh
+from bayeshaptic.report.walls.section import case_of, table_of
+
+
+@cache
+def result() -> Any:
+    return fake_closed()
+
+
+@pytest.mark.parametrize("name", ["limit", "estimates", "before_after"])
+def test_one_panel_is_drawn_where_it_is_wanted(name: str) -> None:
+    axes = Figure().subplots()
+    assert getattr(bh.plot, name)(result(), ax=axes) is axes
+    assert axes.get_xlabel().startswith("critical stiffness") and axes.has_data()
+
+
+@pytest.mark.parametrize("name", ["response", "crossings", "residual"])
+def test_two_panels_are_drawn_where_they_are_wanted(name: str) -> None:
+    axes = list(Figure().subplots(2, 1))
+    assert getattr(bh.plot, name)(result(), ax=axes) is axes
+    assert all(one.has_data() for one in axes)
+    with pytest.raises(bh.InputError, match="ax has 1 axes; this figure takes 2"):
+        getattr(bh.plot, name)(result(), ax=axes[:1])
+
+
+def test_parameters_are_drawn_by_name() -> None:
+    left, right = Figure().subplots(1, 2)
+    assert bh.plot.marginals(result(), "kc", ax=left) is left and left.has_data()
+    assert bh.plot.pairs(result(), "m1", "kc", ax=right) is right
+    assert right.get_xlabel().startswith("m1 [") and right.get_ylabel().startswith("kc [")
+    with pytest.raises(bh.InputError, match="no parameter 'mass'; the model has m1"):
+        bh.plot.marginals(result(), "mass", ax=left)
+
+
+def test_walls_take_a_table_that_is_there() -> None:
+    analysis = fake_analysis("rigid")
+    axes = Figure().subplots()
+    table = table_of([case_of(analysis)], draws=60)
+    assert bh.plot.walls(analysis, ax=axes, table=table) is axes and axes.has_data()
+
+
+def test_without_axes_there_is_a_new_figure() -> None:
+    import matplotlib.pyplot as plt
+
+    axes = bh.plot.limit(fake_analysis("rigid"))
+    assert axes.figure.get_size_inches()[0] == pytest.approx(7.4)
+    plt.close(axes.figure)
+
+
+def test_every_argument_is_documented() -> None:
+    for name in bh.plot.__all__:
+        function = getattr(bh.plot, name)
+        for argument in inspect.signature(function).parameters:
+            assert argument in (function.__doc__ or ""), (name, argument)
