@@ -25,7 +25,9 @@ from pathlib import Path
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.battery import residual_tests
-from bayeshaptic.diagnosis.residuals.force_curve import VELOCITY, force_curve, motions
+from bayeshaptic.diagnosis.residuals.columns import motions
+from bayeshaptic.diagnosis.residuals.force_curve import force_curve
+from bayeshaptic.effects.nonlinear.shapes import VELOCITY
 
 RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "lhifam-user-b.csv.gz"
 
