@@ -104,6 +104,14 @@ WARNED = {
     ),
     "stiffness is then in N/rad": (changed(position_unit="rad"), "units"),
     "time steps vary by 3 % of the period": (changed(time_jitter=0.03), "time stamps"),
+    r"answers as 0.00017 kg would.*positions 1000 times as small \(are they in mm": (
+        changed(position=1e3 * held().position),
+        "units",
+    ),
+    "positions are whole numbers, from -?[0-9]+ to": (
+        changed(position=np.round(held().position / 3.14e-6)),
+        "units",
+    ),
     "hardly answers to the force": (changed(force=held().force[::-1]), "coherence"),
     "recorded one sample early": (
         changed(force=held().force[:-1], position=held().position[1:]),

@@ -48,7 +48,7 @@ SAYS_TOO_LITTLE = {
     r"the force is 2 tones \(3, 11 Hz\)": lambda: recorded(
         0.1 * np.sin(6 * np.pi * TIME) + 0.05 * np.sin(22 * np.pi * TIME)
     ),
-    "zero for 50 % .*rows with force .5001 to 8000": lambda: recorded(idle()),
+    "zero for 50 % .*with --rows 5001:8000": lambda: recorded(idle()),
     "stands still for": lambda: recorded(
         noise(rms=0.03), BENCH.with_effect("coulomb_friction", force=0.07)
     ),

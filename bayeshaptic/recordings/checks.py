@@ -15,6 +15,7 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
 from bayeshaptic.recordings.sufficiency import LEAST_COHERENCE
+from bayeshaptic.recordings.units_in_doubt import implausible_mass, mixed_units, whole_numbers
 
 # Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
 FEWEST_SAMPLES = 1000
@@ -59,12 +60,18 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
             f"the device {device.name} is {device.kind}; give the position's unit with "
             f"--columns, as in position=NAME[{device.position_unit}]"
         )
+    scales = (
+        *_period(recording, device),
+        *mixed_units(recording),
+        *whole_numbers(recording),
+        *_resolution(recording, device),
+    )
+    # A slip of units need not be found twice.
+    slipped = any((n.level, n.topic) == ("warning", "units") for n in scales)
     return (
         *recording.notices,
-        *_period(recording, device),
-        *_mixed_units(recording),
-        *_resolution(recording, device),
-        *_response(recording, device),
+        *scales,
+        *_response(recording, device, slipped),
         *_causality(recording, where),
     )
 
@@ -125,17 +132,6 @@ def _period(recording: Recording, device: Device | None) -> list[Notice]:
     return notices
 
 
-def _mixed_units(recording: Recording) -> list[Notice]:
-    if (recording.force_unit, recording.position_unit) not in (("N", "rad"), ("Nm", "m")):
-        return []
-    text = (
-        f"The force is in {recording.force_unit} and the position in {recording.position_unit}: "
-        f"stiffness is then in {recording.stiffness_unit}, and masses are not in kg or kg m^2. "
-        "Give the units with --columns, as in force=NAME[Nm]."
-    )
-    return [Notice("warning", "units", text)]
-
-
 def _resolution(recording: Recording, device: Device | None) -> list[Notice]:
     """Compare the steps in which the position moves with the encoder's count."""
     unit = recording.position_unit
@@ -174,7 +170,7 @@ def _slip(ratio: float, tolerance: float) -> float | None:
     return nearest if 1 / tolerance < ratio / nearest < tolerance else None
 
 
-def _response(recording: Recording, device: Device | None) -> list[Notice]:
+def _response(recording: Recording, device: Device | None, slipped: bool) -> list[Notice]:
     """Compare a rough frequency response with none at all, and with the device's own."""
     rough = rough_response(recording)
     if rough.follows < LEAST_COHERENCE:
@@ -184,8 +180,10 @@ def _response(recording: Recording, device: Device | None) -> list[Notice]:
         )
         return [Notice("warning", "coherence", text)]
     clear = rough.clear()
-    if device is None or recording.force_unit == "A" or len(clear.response) < 5:
+    if recording.force_unit == "A" or len(clear.response) < 5:
         return []
+    if device is None:
+        return [] if slipped else implausible_mass(recording, clear)
     s = 2j * np.pi * clear.frequency_hz
     ratios = [
         float(np.median(np.abs(clear.response / compliance)))

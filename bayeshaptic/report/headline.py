@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import decibel, own_limit
@@ -22,6 +24,8 @@ HEADLINE_RISKS = (0.01, 0.05)
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001
+# A crossing may lie a decade below the band, where a mass is a hundred times as soft.
+_DECADES = 1000.0
 # Residual over noise from which a limit widened by what is unexplained is no advice either.
 _TOO_FAR = 3.0
 
@@ -94,10 +98,14 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
         )
     if has_feedback(analysis.notices):
+        undecided = any("cannot be decided" in notice.text for notice in analysis.notices)
+        how = "may have been" if undecided else "was"
         found.append(
-            "the force was computed from the motion (feedback), which biases the response that "
+            f"the force {how} computed from the motion (feedback), which biases the response that "
             "everything here is read from"
         )
+    if _far_from_measured(analysis):
+        found.append("the model's limit lies decades from any stiffness that was measured")
     if not analysis.posterior.converged:
         found.append("the sampler has not converged, so the interval may be too narrow")
     if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
@@ -110,16 +118,28 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
+def _far_from_measured(analysis: Analysis) -> bool:
+    """Whether the limit is another world than the measured dynamic stiffness, 1/|G|."""
+    limit = analysis.limit.quantile(0.5)
+    size = np.abs(analysis.etfe.value)
+    stiffness = 1 / size[size > 0]
+    if not math.isfinite(limit) or len(stiffness) == 0:
+        return False
+    return not stiffness.min() / _DECADES < limit < stiffness.max() * _DECADES
+
+
 def _untrusted(
     analysis: Analysis, objections: tuple[str, ...], closed: Closed | None = None
 ) -> Headline:
     limit = analysis.limit
     sentence = f"Do not ship a stiffness from this report: {_joined(objections)}."
     middle, low, high = (limit.quantile(p) for p in (0.5, 0.05, 0.95))
-    details = [
-        f"The model's limit and its interval, {estimate(middle, low, high, limit.unit)}, are not "
-        "to be trusted; they stand below for comparison only."
-    ]
+    details = []
+    if not _far_from_measured(analysis):
+        details.append(
+            f"The model's limit and its interval, {estimate(middle, low, high, limit.unit)}, are "
+            "not to be trusted; they stand below for comparison only."
+        )
     own = own_limit(analysis)
     if own is not None and not has_feedback(analysis.notices):
         low, middle, high = own

@@ -140,7 +140,9 @@ def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None
     steps = np.diff(time_s)
     pairs = np.append(time_s[2:] - time_s[:-2], np.inf)
     gaps = np.flatnonzero((steps > 1.5 * period) & (pairs > 2.5 * period))
-    # Many long steps are uneven sampling, not gaps.
+    # Where the usual step varies, or many are long, it is uneven sampling and no gap.
+    if np.median(np.abs(steps - period)) > 0.67 * MOST_JITTER * period:
+        return
     if 0 < len(gaps) <= max(3, len(steps) // 100):
         first = gaps[0]
         edges = np.concatenate([[0], gaps + 1, [len(time_s)]])

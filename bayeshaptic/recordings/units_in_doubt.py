@@ -1,0 +1,62 @@
+"""Units that a recording itself makes doubtful."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.errors import Notice
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.rough_response import RoughResponse
+
+# Mass of a device as its motor feels it: the lightest, a usual and the heaviest one.
+_MASSES = {
+    ("N", "m"): (3e-3, 0.5, 500.0, "kg"),
+    ("Nm", "rad"): (1e-7, 1e-3, 10.0, "kg m^2"),
+}
+
+
+def mixed_units(recording: Recording) -> list[Notice]:
+    """A force and a position that are not of one kind of motion."""
+    if (recording.force_unit, recording.position_unit) not in (("N", "rad"), ("Nm", "m")):
+        return []
+    text = (
+        f"The force is in {recording.force_unit} and the position in {recording.position_unit}: "
+        f"stiffness is then in {recording.stiffness_unit}, and masses are not in kg or kg m^2. "
+        "Give the units with --columns, as in force=NAME[Nm]."
+    )
+    return [Notice("warning", "units", text)]
+
+
+def whole_numbers(recording: Recording) -> list[Notice]:
+    """Counts of an encoder, or thousandths: no device moves by whole metres or radians."""
+    if not np.array_equal(recording.position, np.round(recording.position)):
+        return []
+    unit = recording.position_unit
+    text = (
+        f"The positions are whole numbers, from {recording.position.min():g} to "
+        f"{recording.position.max():g} {unit}: are they counts of the encoder? Write "
+        f"position=NAME*C with one count C in {unit}, or name their unit, as in position=NAME[mm]."
+    )
+    return [Notice("warning", "units", text)]
+
+
+def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]:
+    """A device of milligrams or tons: a slip of units, with the factor that makes sense of it."""
+    kind = (recording.force_unit, recording.position_unit)
+    if kind not in _MASSES:
+        return []
+    lightest, usual, heaviest, unit = _MASSES[kind]
+    s = 2j * np.pi * clear.frequency_hz
+    mass = float(np.median(np.abs(1 / (s**2 * clear.response))))
+    if lightest < mass < heaviest:
+        return []
+    factor = min((1e-6, 1e-3, 1e3, 1e6), key=lambda f: abs(np.log(mass * f / usual)))
+    smaller, larger = ("small", "large") if factor > 1 else ("large", "small")
+    named = {1e3: " (are they in mm?)", 1e6: " (are they in um?)"}.get(factor, "")
+    times = max(factor, 1 / factor)
+    text = (
+        f"The device answers as {mass:.2g} {unit} would: a slip of units? With positions {times:g} "
+        f"times as {smaller}{named}, or forces {times:g} times as {larger}, it would be "
+        f"{mass * factor:.2g} {unit}. Give the units with --columns, as in position=NAME[mm]."
+    )
+    return [Notice("warning", "units", text)]
