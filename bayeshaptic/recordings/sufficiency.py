@@ -102,8 +102,8 @@ def _no_force(recording: Recording) -> str | None:
         return None
     first, stop = _longest(~idle)
     return (
-        f"the force is zero for {100 * np.mean(idle):.0f} % of the recording; read the longest part "
-        f"with force alone, with --rows {first + 1}:{stop}, or record again"
+        f"the force is zero for {100 * np.mean(idle):.0f} % of the recording; read the longest "
+        f"part with force alone, with --rows {first + 1}:{stop}, or record again"
     )
 
 
