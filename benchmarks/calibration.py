@@ -40,9 +40,9 @@ class Outcome:
         Standard deviation by Cramer and Rao, in the coordinate of sampling, the noise known and
         the prior counted; `width` is the posterior's in that coordinate.
     dominated : ndarray of bool, shape (P,)
-        Parameters with more prior than data.
+        Parameters with more prior than data, and a damper of zero: no central interval holds that.
     limit : tuple
-        K_CR: truth, low, high, rank.
+        K_CR: truth, low, high, rank, pull.
     chi_square, effective, seconds, rhat : float
         Effective draws of the parameter that has the fewest; CPU seconds of fit and sampling.
     """
@@ -59,7 +59,7 @@ class Outcome:
     bound: np.ndarray
     width: np.ndarray
     dominated: np.ndarray
-    limit: tuple[float, float, float, float]
+    limit: tuple[float, float, float, float, float]
     chi_square: float
     effective: float
     seconds: float
@@ -73,7 +73,7 @@ class Outcome:
 
     @property
     def limit_covered(self) -> bool:
-        truth, low, high, _ = self.limit
+        truth, low, high, *_ = self.limit
         return low <= truth <= high
 
     @property
@@ -81,14 +81,45 @@ class Outcome:
         return (self.mean - self.truth) / self.sd
 
 
-def truth_and_bench(case: str, seed: int) -> tuple[Model, np.ndarray, Bench]:
-    """A model, a parameter vector drawn from its priors, and a bench that has it."""
+@dataclass(frozen=True)
+class Setting:
+    """Where truths come from, and what the analysis is told.
+
+    Attributes
+    ----------
+    device_file : bool
+        Whether the analysis has the device's file; else it knows the delay alone.
+    scatter : float or None
+        Truths are the tables' times a log-normal factor of this standard deviation; by default
+        they are draws from the priors of the file.
+    damper : float or None
+        The damper b2 as a share of the tables' b1 + b2 (0: none); by default as the rest.
+    """
+
+    device_file: bool = True
+    scatter: float | None = None
+    damper: float | None = None
+
+
+def truth_and_bench(
+    case: str, seed: int, setting: Setting = Setting()
+) -> tuple[Model, np.ndarray, Bench]:
+    """A model to fit, a parameter vector, and a bench that has it."""
     device, structure = case.split()
     model = build_model(structure, device)
     rng = np.random.default_rng([CASES.index(case), seed])
-    truth = np.array([draw(model.prior(name), rng, 1)[0] for name in model.names])
+    if setting.scatter is None:
+        truth = np.array([draw(model.prior(name), rng, 1)[0] for name in model.names])
+    else:
+        truth = model.values * np.exp(setting.scatter * rng.standard_normal(model.size))
     values = dict(zip(model.names, truth.tolist(), strict=True))
-    return model, truth, Bench.from_device(device, held=structure == "grasped", values=values)
+    if setting.damper is not None:
+        total = model.reference["b1"] + model.reference["b2"]
+        truth[model.names.index("b2")] = values["b2"] = setting.damper * total
+    bench = Bench.from_device(device, held=structure == "grasped", values=values)
+    if not setting.device_file:
+        model = build_model(structure, delay_s=bench.delay_s, period_s=bench.period_s)
+    return model, truth, bench
 
 
 def as_recording(simulated: SimulatedRecording) -> Recording:
@@ -97,15 +128,22 @@ def as_recording(simulated: SimulatedRecording) -> Recording:
     return Recording(simulated.force, simulated.position, simulated.period_s, **units)
 
 
-def one_recording(case: str, seed: int, ess: float = 2000, seconds: float = 30.0) -> Outcome:
+def one_recording(
+    case: str,
+    seed: int,
+    ess: float = 2000,
+    seconds: float = 30.0,
+    setting: Setting = Setting(),
+) -> Outcome:
     """Draw a truth, record, fit, sample, and compare."""
-    model, truth, bench = truth_and_bench(case, seed)
+    model, truth, bench = truth_and_bench(case, seed, setting)
     low_hz, high_hz = bench.band_hz
     excitation = WhiteNoise(bench.force_rms, high_hz, low_hz, seconds)
     recording = as_recording(simulate(bench, excitation, seed=1000 + seed))
     etfe = estimate_etfe(recording)
     began = time.process_time()
     fit = least_squares(model, etfe)
+    model = fit.model  # with priors from the data, where there is no file
     fitted = time.process_time()
     posterior = sample(model, etfe, start=fit, ess=ess, seed=seed, most_evaluations=_MOST)
     sampled = time.process_time()
@@ -126,11 +164,12 @@ def one_recording(case: str, seed: int, ess: float = 2000, seconds: float = 30.0
         rank=np.mean(draws < truth, axis=0),
         bound=cramer_rao(model, truth, bench, recording, etfe.band_hz),
         width=np.where(log, np.log(np.where(log, draws, 1.0)).std(axis=0), draws.std(axis=0)),
-        dominated=np.array([posterior.prior_dominated[name] for name in model.names]),
+        dominated=(truth == 0) | [posterior.prior_dominated[name] for name in model.names],
         limit=(
             true_limit,
             *limit.quantile([0.05, 0.95]).tolist(),
             float(np.mean(limit.samples < true_limit)),
+            float((limit.samples.mean() - true_limit) / limit.samples.std()),
         ),
         chi_square=fit.reduced_chi_square,
         effective=posterior.effective,
@@ -213,10 +252,11 @@ def calibrate(
     first: int = 0,
     progress: bool = False,
     keep: str | None = None,
+    setting: Setting = Setting(),
 ) -> list[Outcome]:
     """`recordings` of each case, from seed `first` on; written to the file `keep` as they come."""
     jobs = [(case, first + i) for i in range(recordings) for case in CASES]
-    run = partial(_job, ess=ess)
+    run = partial(_job, ess=ess, setting=setting)
     outcomes = []
     if processes == 1:
         results = map(run, jobs)
@@ -239,8 +279,8 @@ def calibrate(
     return outcomes
 
 
-def _job(job: tuple[str, int], ess: float) -> Outcome:
-    return one_recording(*job, ess=ess)
+def _job(job: tuple[str, int], ess: float, setting: Setting) -> Outcome:
+    return one_recording(*job, ess=ess, setting=setting)
 
 
 def uniform(ranks: np.ndarray) -> float:

@@ -1,10 +1,10 @@
 """Do 90 % intervals cover the truth in 90 % of recordings, and are they as narrow as they can be?
 
     python benchmarks/posterior_coverage.py [--recordings 25] [--ess 2000] [--processes 2]
-        [--first 0]
+        [--first 0] [--without-device] [--scatter 0.15] [--damper 0]
 
-Truths are drawn from the priors of both devices, free and grasped; the recordings (30 s each) come
-from the virtual bench. README.md explains the columns.
+Truths are drawn from the priors of both devices, or scattered around their tables, free and
+grasped; the recordings (30 s each) come from the virtual bench. README.md explains the columns.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 import numpy as np  # noqa: E402
-from calibration import CASES, Outcome, calibrate, combined, uniform  # noqa: E402
+from calibration import CASES, Outcome, Setting, calibrate, combined, uniform  # noqa: E402
 
 
 def pooled(outcomes: list[Outcome], field: str) -> np.ndarray:
@@ -73,9 +73,21 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--keep", help="file for the outcomes (pickle), to look at them closer")
+    parser.add_argument("--without-device", action="store_true", help="the analysis has no file")
+    parser.add_argument("--scatter", type=float, help="truths: the tables', with this log sd")
+    parser.add_argument("--damper", type=float, help="b2 as a share of the tables' b1 + b2")
     asked = parser.parse_args()
+    if asked.without_device and asked.scatter is None:
+        parser.error("--without-device wants --scatter: there is no prior to draw truths from")
+    setting = Setting(not asked.without_device, asked.scatter, asked.damper)
     outcomes = calibrate(
-        asked.recordings, asked.ess, asked.processes, asked.first, progress=True, keep=asked.keep
+        asked.recordings,
+        asked.ess,
+        asked.processes,
+        asked.first,
+        progress=True,
+        keep=asked.keep,
+        setting=setting,
     )
     print(
         "\ncase              rec  par.  covered    K_CR  ranks p  K_CR p   pull  width/bound"
@@ -84,6 +96,8 @@ def main() -> None:
     for case in CASES:
         print(row(case, [o for o in outcomes if o.case == case]))
     print(row("all", outcomes))
+    pull = np.array([o.limit[4] for o in outcomes])
+    print(f"mean pull of K_CR, in its standard deviations: {pull.mean():+.2f}")
     print()
     print("\n".join(by_parameter(outcomes)))
     dominated = np.mean(np.concatenate([o.dominated for o in outcomes]))
