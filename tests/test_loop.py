@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -9,10 +10,18 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.diagnosis.residuals.residual import smooth_columns
 from bayeshaptic.diagnosis.state import held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.coordinates import coordinates
+from bayeshaptic.inference.least_squares import (
+    Fit,
+    least_squares,
+    summarise,
+    weighted_residuals,
+)
 from bayeshaptic.models import build_model
+from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -105,3 +114,26 @@ def test_what_a_budget_does_not_allow_is_said() -> None:
     found = trace(etfe, fit, budget_s=0.0)
     assert found.verdict == "unexplained" and found.state.accepted == ()
     assert "second vibration mode" in found.skipped
+
+
+def test_a_smooth_change_of_the_response_is_seen_whole() -> None:
+    """A phase that turns with the frequency, far above the noise: nothing else is in the residual.
+
+    The model's own parameters explain a part of it, which is projected out.
+    """
+    _, _, fit = fitted(False, 8.0, ())
+    windows, hertz = fit.windows, fit.windows.frequency_hz
+    change = 1j * np.sin(6 * np.log10(hertz)) * fit.response(hertz.ravel()).reshape(hertz.shape)
+    target = windows.target + np.einsum("wij,wj->wi", windows.design, change)
+    moved = summarise(fit.model, replace(windows, target=target), fit.theta)
+    columns, residual, _ = smooth_columns(moved)
+    found = columns.T @ residual
+    own = np.linalg.qr(slope_of(moved))[0].T @ residual
+    assert found @ found + own @ own > 0.95 * residual @ residual
+
+
+def slope_of(fit: Fit) -> np.ndarray:
+    """Slopes of the residuals over the parameters."""
+    here = coordinates(fit.model)
+    phi = here.coordinate(fit.theta[None])
+    return np.asarray(jacobian(weighted_residuals(fit.likelihood, here), phi)[0])

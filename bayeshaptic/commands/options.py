@@ -6,6 +6,8 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
+from bayeshaptic.numerics.spending import BUDGET_S
+
 if TYPE_CHECKING:
     from bayeshaptic.jobs.job import Settings
 
@@ -145,6 +147,14 @@ def add_analysis_options(parser: argparse.ArgumentParser) -> None:
         "may be far off where something is missing",
     )
     analysis.add_argument(
+        "--budget",
+        type=positive,
+        default=BUDGET_S,
+        metavar="SECONDS",
+        help="what looking for what the model lacks may cost, in nominal seconds: evaluations are "
+        "counted, so that the verdict is the same on every machine (default: %(default)g)",
+    )
+    analysis.add_argument(
         "--seed",
         type=seed,
         default=0,
@@ -184,6 +194,7 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         delay_sd_s=arguments.delay_sd_s,
         band_hz=arguments.band,
         seed=arguments.seed,
+        budget_s=arguments.budget,
         close_loop=not arguments.no_loop,
         allow_outside=arguments.allow_outside,
         rows=arguments.rows,

@@ -14,11 +14,10 @@ from bayeshaptic.diagnosis.battery import is_periodic
 from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import CHOOSE, State, Trial, held_out_rms
-from bayeshaptic.diagnosis.thresholds import BUDGET_S
 from bayeshaptic.diagnosis.traced import Candidate, Traced
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.inference.least_squares import Fit
-from bayeshaptic.numerics.spending import RATE, Meter, metered
+from bayeshaptic.numerics.spending import BUDGET_S, RATE, Meter, metered
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Progress, Tick
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device, load_device
-from bayeshaptic.diagnosis.thresholds import BUDGET_S
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import Model, Prior
+from bayeshaptic.numerics.spending import BUDGET_S
 from bayeshaptic.recordings.read import read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe

@@ -87,8 +87,6 @@ MENDED = 1.5
 
 REACH = 0.3
 """Share of the best candidate's gain after a cheap fit below which none is fitted in full."""
-BUDGET_S = 60.0
-"""What the search may cost by default, in nominal seconds (`bayeshaptic.numerics.spending`)."""
 
 
 def convincing(gain_fit: float, gain_choose: float, size: int) -> bool:

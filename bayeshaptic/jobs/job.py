@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.numerics.spending import BUDGET_S
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Settings:
     delay_s, delay_sd_s : float or None
     band_hz : (float, float) or None
     seed : int
+    budget_s : float
+        What looking for it may cost, in nominal seconds.
     close_loop : bool
         Whether to look for what the model lacks.
     allow_outside : bool
@@ -42,6 +45,7 @@ class Settings:
     delay_sd_s: float | None = None
     band_hz: tuple[float, float] | None = None
     seed: int = 0
+    budget_s: float = BUDGET_S
     close_loop: bool = True
     allow_outside: bool = False
     rows: tuple[float | None, float | None] | None = None

@@ -58,6 +58,7 @@ def _report(
         delay_sd_s=settings.delay_sd_s,
         band_hz=settings.band_hz,
         seed=settings.seed,
+        budget_s=settings.budget_s,
         progress=progress,
     )
     run = close_loop if settings.close_loop else analyse

@@ -169,6 +169,7 @@ def _analysed(
             delay_sd_s=settings.delay_sd_s,
             band_hz=settings.band_hz,
             seed=settings.seed,
+            budget_s=settings.budget_s,
             progress=None if progress is None else _scaled(progress, _WRITING),
         ),
         executor,

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 
 RATE = 1e7
 """Evaluations that count as a second: what a core of 2020 does of either kind, about."""
+BUDGET_S = 60.0
+"""What a search for what a model lacks may cost by default, in these nominal seconds."""
 
 
 @dataclass

@@ -140,12 +140,13 @@ def smooth_columns(fit: Fit) -> tuple[Floats, Floats, Floats]:
     effect = scale * (windows.design @ (g[..., None] * hats))  # (W, k, knots)
     effect = effect.reshape(-1, _KNOTS)
     both = np.concatenate([effect, 1j * effect], axis=1)
-    stacked = np.concatenate([both.real, both.imag])
+    # Real and imaginary parts in turn, as `weighted_residuals` has them.
+    stacked = np.stack([both.real, both.imag], axis=1).reshape(2 * len(both), -1)
     own = np.linalg.qr(slope)[0]
     stacked = stacked - own @ (own.T @ stacked)
     basis, sizes, _ = np.linalg.svd(stacked, full_matrices=False)
     basis = basis[:, sizes > 1e-6 * sizes[0]]
-    rows = np.tile(windows.frequency_hz.ravel(), 2)
+    rows = np.repeat(windows.frequency_hz.ravel(), 2)
     return basis, residual[0], rows
 
 

@@ -41,7 +41,7 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats, Tick
 
 _STARTS = 24  # kept by first order,
-_STEPS = 5  # and given so many steps of Gauss and Newton
+_STEPS = 15  # and given at most so many steps of Gauss and Newton
 
 
 @dataclass(frozen=True)

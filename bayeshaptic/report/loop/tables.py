@@ -78,7 +78,9 @@ def candidates(closed: Closed) -> Rows:
         ranked = sorted((c for c in tried if c.round == number), key=lambda c: -c.score)
         others = {t.name for t in closed.traced.rejected} if number == tried[-1].round else set()
         for candidate in ranked[:_SHOWN]:
-            if candidate.accepted:
+            if candidate.taken_out:
+                fate = "accepted, and taken out when another made it needless"
+            elif candidate.accepted:
                 fate = "accepted"
             elif candidate.name in others:
                 fate = "predicts too, but less or with more parameters"
