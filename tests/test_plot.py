@@ -64,3 +64,13 @@ def test_every_argument_is_documented() -> None:
         function = getattr(bh.plot, name)
         for argument in inspect.signature(function).parameters:
             assert argument in (function.__doc__ or ""), (name, argument)
+
+
+def test_a_large_group_has_a_label_that_fits() -> None:
+    from bayeshaptic.report.figures.guidance.shares import labels
+    from bayeshaptic.stability.guidance.shares import Share, VarianceShares
+
+    many = Share(("m1", "b1", "bc", "kc", "m2", "b2", "bs", "ks"), 0.8, 0.9)
+    few = Share(("m1", "b1", "bc", "kc", "m2"), 0.2, 0.9)
+    found = labels(VarianceShares((many, few), 0.1, 0.0, 100))
+    assert [name for name, _ in found] == ["m1, b1, bc, kc and 4 more", "m1, b1, bc, kc, m2"]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.guidance.shares import VarianceShares
 
 SHOWN = 8
+NAMED = 4  # parameters of a group that its label names
 LEAST = 0.05  # probability of a crossing that is shown
 
 
@@ -42,13 +43,17 @@ def draw(guidance: Guidance) -> Figure:
 
 def labels(shares: VarianceShares) -> list[tuple[str, float]]:
     """Every bar: its name and share, what is beyond the parameters last."""
-    rows = [
-        (", ".join(style.short(name) for name in share.names), share.share)
-        for share in shares.shares[:SHOWN]
-    ]
+    rows = [(_together(share.names), share.share) for share in shares.shares[:SHOWN]]
     if shares.beyond > 0.005:
         rows.append(("effects, unexplained", shares.beyond))
     return rows
+
+
+def _together(names: tuple[str, ...]) -> str:
+    """The names of a group, as many as a label holds; the sentence has them all."""
+    shown = [style.short(name) for name in names[: NAMED if len(names) > NAMED + 1 else None]]
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
 def _shares(axes: Axes, shares: VarianceShares) -> None:
