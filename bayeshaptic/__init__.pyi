@@ -64,6 +64,12 @@ from .inference.posterior import (
 from .inference.sampler import (
     sample as sample,
 )
+from .jobs.batch import (
+    run_batch as run_batch,
+)
+from .jobs.job import (
+    Settings as Settings,
+)
 from .models import (
     HalfNormal as HalfNormal,
 )

@@ -70,9 +70,9 @@ def phantom(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few draws and no figures: for tests that are about other things."""
 
-    def write(result: Any, folder: Path) -> Path:
+    def write(result: Any, folder: Path, origin: Any = None) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "summary.json").write_text(summary_json(result))
+        (folder / "summary.json").write_text(summary_json(result, origin))
         (folder / "report.html").write_text("<!DOCTYPE html>")
         return folder / "report.html"
 
@@ -541,7 +541,8 @@ class TestReport:
         status, out, err = run("batch", "bad.csv", phantom, "--workers", "1", *RIGID)
         assert status == 1 and "bad.csv" in only_line(err)
         assert "phantom: " in out and f"reports: {tmp_path / 'reports'}" in out
-        assert os.listdir(tmp_path / "reports") == ["phantom"]
+        files = {"failed.csv", "index.csv", "index.html", "manifest.json"}
+        assert set(os.listdir(tmp_path / "reports")) == {"phantom", *files}
 
     def test_measured_multisine(self, run: Run, measured: Callable[[str], Path]) -> None:
         """20 periods of a multisine on 11 to 250 Hz, motor current in, motor angle out."""
@@ -674,7 +675,8 @@ def test_batch_in_processes_reports_failures_of_each(run: Run, tmp_path: Path) -
         "one.csv",
         "two.csv",
     ]
-    assert not (tmp_path / "reports").exists()
+    failed = (tmp_path / "reports" / "failed.csv").read_text()
+    assert "one.csv" in failed and "two.csv" in failed
 
 
 # --- simulate -----------------------------------------------------------------------------------

@@ -35,6 +35,7 @@ KEYS: dict[str, set[str]] = {
         "recommendation",
         "diagnosis",
         "error",
+        "provenance",
     },
     "recommendation": {"status", "stiffness", "risk", "sentence"},
     "recording": {
@@ -68,6 +69,7 @@ KEYS: dict[str, set[str]] = {
     "critical_stiffness.safe": {"0.05", "0.01", "0.001"},
     "diagnosis": {"verdict", "residual_class", "effects", "candidates"},
     "error": {"before", "after"},
+    "provenance": {"command", "options", "versions", "seed", "sha256", "seconds"},
     "error.before": ERROR,
     "error.after": ERROR,
     "error.before.critical_stiffness": QUANTILES,

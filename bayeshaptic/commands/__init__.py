@@ -7,6 +7,6 @@ module and name it in COMMANDS. Modules import what they run inside `run`, so th
 
 from __future__ import annotations
 
-from bayeshaptic.commands import batch, inspect, population, relay, report, simulate
+from bayeshaptic.commands import batch, inspect, population, relay, report, simulate, status
 
-COMMANDS = (report, inspect, relay, simulate, population, batch)
+COMMANDS = (report, inspect, relay, simulate, population, batch, status)

@@ -4,18 +4,31 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from bayeshaptic.commands.options import add_analysis_options, add_quiet, count, settings_from
+from bayeshaptic.commands.options import (
+    add_analysis_options,
+    add_quiet,
+    command_line,
+    count,
+    settings_from,
+)
+
+if TYPE_CHECKING:
+    from bayeshaptic.jobs.manifest import Entry
+    from bayeshaptic.report.reported import Reported
 
 NAME = "batch"
 SUMMARY = "report on many studies or recordings, side by side"
 DESCRIPTION = """\
 Make the report of every study or recording named, several at a time: on the cores of this machine,
-or on a dask cluster. One that fails is named with its error and does not stop the others; the exit
-status is then 1."""
+or on a dask cluster. The folder gets index.html and index.csv (every recording, its critical
+stiffness and verdict) and manifest.json; run again, the same command goes on where it stopped: what
+is done and unchanged is left alone. One that fails is named with its error, in failed.csv too, and
+does not stop the others; the exit status is then 1."""
 EXAMPLES = """\
   bayeshaptic batch studies/*.toml -o reports/
-  bayeshaptic batch studies/*.toml --workers 8
+  bayeshaptic batch recordings/ -o reports/ --workers 8
   bayeshaptic batch studies/*.toml --dask tcp://scheduler:8786"""
 
 
@@ -25,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "sources",
         type=Path,
         nargs="+",
-        metavar="STUDY",
-        help="a study (.toml), or a recording",
+        metavar="STUDY_OR_FOLDER",
+        help="a study (.toml), a recording, or a folder of studies and recordings",
     )
     parser.add_argument(
         "-o",
@@ -46,9 +59,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--dask",
         metavar="ADDRESS",
-        help="address of a dask scheduler, for example tcp://scheduler:8786; it and its workers "
-        "need bayeshaptic and the same files under the same paths "
+        help="'local', or the address of a dask scheduler, as in tcp://scheduler:8786; it and its "
+        "workers need bayeshaptic and the same files under the same paths "
         "(pip install 'bayeshaptic[dask]')",
+    )
+    parser.add_argument(
+        "--again", action="store_true", help="do again what an earlier run has done, unchanged"
+    )
+    parser.add_argument(
+        "--log",
+        choices=("text", "json"),
+        default="text",
+        help="lines for people, or one JSON object for each source that ends (default: text)",
     )
     add_analysis_options(parser)
     add_quiet(parser)
@@ -56,32 +78,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the reports; 0 where all came out, else 1."""
+    import json
+
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.jobs import executors
-    from bayeshaptic.jobs.batch import jobs, report_source
-    from bayeshaptic.jobs.job import refuse_file
+    from bayeshaptic.jobs.batch import run_batch
 
-    folder = arguments.output.absolute()
-    refuse_file(folder)
-    sources = [source.absolute() for source in arguments.sources]
-    work = jobs(sources, folder, settings_from(arguments))
     if arguments.dask is not None:
         execute = executors.dask(arguments.dask)
     elif arguments.workers == 1:
         execute = executors.serial
     else:
         execute = executors.processes(arguments.workers or executors.usable_cores())
-    failed = 0
-    with Talk(arguments.quiet) as talk:
-        talk.progress(0.0, f"0 of {len(work)}")
-        for number, outcome in enumerate(execute(report_source, work), start=1):
-            if outcome.error is not None:
-                source = str(outcome.item.source)
-                named = outcome.error.startswith(source)
-                talk.complain(outcome.error if named else f"{source}: {outcome.error}")
-                failed += 1
+    as_json = arguments.log == "json"
+    with Talk(arguments.quiet or as_json) as talk:
+
+        def tell(entry: Entry, reports: tuple[Reported, ...], done: int, count: int) -> None:
+            if as_json:
+                facts = {"source": entry.source, "state": entry.state, "error": entry.error}
+                more = {"seconds": entry.seconds, "done": done, "of": count}
+                print(json.dumps(facts | more), flush=True)
+            elif reports:
+                talk.tell(reports)
+            elif entry.error is not None:
+                named = entry.error.startswith(entry.source)
+                talk.complain(entry.error if named else f"{entry.source}: {entry.error}")
             else:
-                failed += talk.tell(outcome.result)
-            talk.progress(number / len(work), f"{number} of {len(work)}")
-        talk.say(f"reports: {folder}")
-    return 1 if failed else 0
+                talk.say(f"{entry.source}: done before, unchanged")
+            talk.progress(done / count, f"{done} of {count}")
+
+        entries = run_batch(
+            arguments.sources,
+            arguments.output,
+            settings_from(arguments),
+            execute,
+            resume=not arguments.again,
+            command=command_line(),
+            tell=tell,
+        )
+        talk.say(f"reports: {arguments.output.absolute() / 'index.html'}")
+    return 1 if any(entry.state != "done" for entry in entries) else 0

@@ -202,6 +202,14 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
     )
 
 
+def command_line() -> str:
+    """The command that runs, for a report's provenance."""
+    import shlex
+    import sys
+
+    return shlex.join(["bayeshaptic", *sys.argv[1:]])
+
+
 def add_quiet(parser: argparse.ArgumentParser) -> None:
     """--quiet."""
     parser.add_argument(

@@ -9,6 +9,7 @@ from bayeshaptic.commands.options import (
     add_analysis_options,
     add_quiet,
     add_workers,
+    command_line,
     settings_from,
     workers_from,
 )
@@ -63,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.recordings.read import recording_name
 
     folder = arguments.output or Path(f"{recording_name(arguments.source)}-report")
-    job = Job(arguments.source, folder, settings_from(arguments))
+    job = Job(arguments.source, folder, settings_from(arguments), command_line())
     with Talk(arguments.quiet) as talk:
         failed = talk.tell(report_source(job, talk.progress, workers_from(arguments)))
     return 1 if failed else 0

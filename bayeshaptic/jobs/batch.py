@@ -6,16 +6,27 @@ carry to another process: it is called with plain picklable things, and hands ba
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import concurrent.futures
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.jobs import executors
+from bayeshaptic.jobs.executors import Executor, Outcome
+from bayeshaptic.jobs.index import row_of, write_index
 from bayeshaptic.jobs.job import Job, Settings, refuse_file
+from bayeshaptic.jobs.manifest import Entry, entry_of, read_manifest, write_manifest
 from bayeshaptic.jobs.recording import report_recording
+from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.jobs.study import report_study
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.types import Progress
+
+SECONDS_BETWEEN_WRITES = 2.0
 
 
 def report_source(
@@ -50,27 +61,178 @@ def report_source(
     return (report_recording(job, progress),)
 
 
-def jobs(sources: Iterable[Path], parent: Path, settings: Settings) -> tuple[Job, ...]:
+def jobs(
+    sources: Iterable[Path], parent: Path, settings: Settings, command: str | None = None
+) -> tuple[Job, ...]:
     """A job for each source, each with a folder of its own in `parent`.
 
     Parameters
     ----------
     sources : iterable of Path
+        Studies, recordings, and folders with such.
     parent : Path
     settings : Settings
+    command : str or None
 
     Raises
     ------
     InputError
-        Where two sources have the same name.
+        Where two sources have the same name, or a folder has none.
     """
     by_name: dict[str, Job] = {}
-    for source in sources:
+    for source in find_sources(sources):
         name = recording_name(source)
         if name in by_name:
             raise InputError(
                 f"{by_name[name].source} and {source} would both be reported in {parent / name}; "
                 "rename one, or run them apart"
             )
-        by_name[name] = Job(source, parent / name, settings)
+        by_name[name] = Job(source, parent / name, settings, command)
     return tuple(by_name.values())
+
+
+def run_batch(
+    sources: Iterable[str | Path],
+    out_dir: str | Path,
+    settings: Settings | None = None,
+    executor: concurrent.futures.Executor | Executor | None = None,
+    resume: bool = True,
+    command: str | None = None,
+    tell: Callable[[Entry, tuple[Reported, ...], int, int], None] | None = None,
+) -> tuple[Entry, ...]:
+    """Report on many sources, and write an index of them.
+
+    Every source has a folder in `out_dir`; beside them are ``index.html``, ``index.csv``,
+    ``failed.csv`` where something failed, and ``manifest.json``. One that fails does not stop the
+    others, and is tried once more at the end, alone, unless its input was refused.
+
+    Parameters
+    ----------
+    sources : iterable of path
+        Studies, recordings, and folders with such.
+    out_dir : path
+    settings : Settings or None
+        How to read and analyse.
+    executor : concurrent.futures.Executor, callable or None
+        Where the work is done: any pool (processes, dask, mpi4py), or one of
+        `bayeshaptic.jobs.executors`; None takes a process for each usable core.
+    resume : bool
+        Whether to leave alone what an earlier run has done from the same files, with the same
+        options and versions.
+    command : str or None
+        For the manifest.
+    tell : callable or None
+        Called with the entry, its reports (none where it was done before), the number that are
+        done, and how many there are.
+
+    Returns
+    -------
+    tuple of Entry
+        In the order of the sources.
+
+    Raises
+    ------
+    InputError
+        Where there is nothing to do, or no place to write.
+    """
+    folder = Path(out_dir).absolute()
+    refuse_file(folder)
+    settings = settings or Settings()
+    work = jobs([Path(source).absolute() for source in sources], folder, settings, command)
+    folder.mkdir(parents=True, exist_ok=True)
+    batch = _Batch(folder, settings, command, tell, {str(job.source): job for job in work})
+    old = read_manifest(folder) if resume else {}
+    todo = [job for job in work if not batch.is_done(old.get(str(job.source)), job)]
+    execute = _executor(executor)
+    again: list[Job] = []
+    try:
+        for outcome in execute(report_timed, todo) if todo else ():
+            if outcome.error is None or outcome.refused:
+                batch.end(outcome)
+            else:
+                again.append(outcome.item)
+        for job in again:
+            for outcome in execute(report_timed, [job]):
+                batch.end(outcome)
+    finally:
+        batch.write()
+    return tuple(batch.entries.values())
+
+
+def report_timed(job: Job) -> tuple[tuple[Reported, ...], float]:
+    """What `run_batch` runs, in whatever process: the reports, and the seconds they took."""
+    began = time.perf_counter()
+    return report_source(job), time.perf_counter() - began
+
+
+class _Batch:
+    """The state of a batch, written to its folder every few seconds."""
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: Settings,
+        command: str | None,
+        tell: Callable[[Entry, tuple[Reported, ...], int, int], None] | None,
+        work: Mapping[str, Job],
+    ) -> None:
+        self.folder, self.settings, self.command, self.tell = folder, settings, command, tell
+        self.entries = {source: entry_of(job) for source, job in work.items()}
+        self._written = -math.inf
+
+    def is_done(self, old: Entry | None, job: Job) -> bool:
+        """Whether an earlier run has done the same; its entry is kept then."""
+        entry = self.entries[str(job.source)]
+        whole = any((job.folder / name).exists() for name in ("summary.json", "population.json"))
+        if old is None or old.state != "done" or old.key != entry.key or not whole:
+            return False
+        self._keep(old, ())
+        return True
+
+    def end(self, outcome: Outcome) -> None:
+        """Note how a job ended."""
+        job = outcome.item
+        reports, seconds = outcome.result or ((), None)
+        failures = [one.error for one in reports if one.error is not None]
+        error = outcome.error or (failures[0] if failures else None)
+        rows = [
+            row_of(
+                one.name,
+                job.folder if one.page is None else one.page.parent,
+                one.headline.status if one.headline else None,
+                one.error,
+            )
+            for one in reports
+        ]
+        if outcome.error is not None:
+            rows = [row_of(recording_name(job.source), job.folder, None, outcome.error)]
+        entry = replace(
+            self.entries[str(job.source)],
+            state="done" if error is None else "failed",
+            error=error,
+            seconds=seconds,
+            rows=tuple(rows),
+        )
+        self._keep(entry, reports)
+
+    def _keep(self, entry: Entry, reports: tuple[Reported, ...]) -> None:
+        self.entries[entry.source] = entry
+        if self.tell is not None:
+            ended = sum(one.state != "waiting" for one in self.entries.values())
+            self.tell(entry, reports, ended, len(self.entries))
+        if time.monotonic() - self._written > SECONDS_BETWEEN_WRITES:
+            self.write()
+
+    def write(self) -> None:
+        """Manifest and index."""
+        write_manifest(self.folder, self.entries, self.command, asdict(self.settings))
+        write_index(self.folder, [row for entry in self.entries.values() for row in entry.rows])
+        self._written = time.monotonic()
+
+
+def _executor(executor: concurrent.futures.Executor | Executor | None) -> Executor:
+    if executor is None:
+        return executors.processes(executors.usable_cores())
+    if isinstance(executor, concurrent.futures.Executor):
+        return executors.futures(executor)
+    return executor

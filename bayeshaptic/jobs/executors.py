@@ -40,11 +40,14 @@ class Outcome:
         What it returned; None where it failed.
     error : str or None
         One line saying why it failed.
+    refused : bool
+        Whether it failed by its input, and would again.
     """
 
     item: Any
     result: Any = None
     error: str | None = None
+    refused: bool = False
 
 
 Executor = Callable[[Job, Sequence[Any]], Iterator[Outcome]]
@@ -157,7 +160,8 @@ def dask(address: str) -> Executor:
     Parameters
     ----------
     address : str
-        The scheduler's address, for example ``tcp://10.0.0.1:8786``.
+        The scheduler's address, for example ``tcp://10.0.0.1:8786``; "local" starts a cluster of
+        processes on this machine.
 
     Returns
     -------
@@ -175,6 +179,8 @@ def dask(address: str) -> Executor:
             "running on a dask cluster needs the dask extra: pip install 'bayeshaptic[dask]'"
         ) from None
 
+    if address == "local":
+        return _local_dask
     if not re.fullmatch(r"\w+://\S+", address):
         raise InputError(f"'{address}' is no dask address: write it as in tcp://10.0.0.1:8786")
 
@@ -200,6 +206,15 @@ def dask(address: str) -> Executor:
     return run
 
 
+def _local_dask(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+    import distributed
+
+    with distributed.LocalCluster(
+        n_workers=usable_cores(), threads_per_worker=1, dashboard_address=None
+    ) as cluster:
+        yield from dask(cluster.scheduler_address)(job, items)
+
+
 def usable_cores() -> int:
     """How many cores this process may use."""
     try:
@@ -212,7 +227,7 @@ def _attempt(job: Job, item: Any) -> Outcome:
     try:
         return Outcome(item, result=job(item))
     except Exception as error:
-        return Outcome(item, error=describe(error))
+        return Outcome(item, error=describe(error), refused=isinstance(error, InputError))
 
 
 def _start_worker(parent: int) -> None:

@@ -54,11 +54,12 @@ class Settings:
 
 @dataclass(frozen=True)
 class Job:
-    """One recording or study, and the folder for its report."""
+    """One recording or study, the folder for its report, and the command that asked for it."""
 
     source: Path
     folder: Path
     settings: Settings
+    command: str | None = None
 
 
 def refuse_file(folder: Path) -> None:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from bayeshaptic.devices import Device, load_device
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.jobs.job import Job, Settings
+from bayeshaptic.jobs.job import Job
 from bayeshaptic.recordings.read import read_measurement, recording_name
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.report import write_report
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.words import in_short
+from bayeshaptic.report.provenance import provenance
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.types import Progress
 
@@ -24,6 +28,7 @@ from bayeshaptic.types import Progress
 def report_recording(job: Job, progress: Progress | None) -> Reported:
     """Read, analyse and report; see `bayeshaptic.jobs.batch.report_source`."""
     settings = job.settings
+    began = time.perf_counter()
     device = None if settings.device is None else load_device(settings.device)
     resolution = settings.encoder_resolution
     if resolution is None and device is not None:
@@ -40,18 +45,20 @@ def report_recording(job: Job, progress: Progress | None) -> Reported:
     )
     if device is not None and isinstance(measurement, Recording):
         measurement = replace(measurement, device=device.name)
-    return _report(measurement, recording_name(job.source), job.folder, settings, device, progress)
+    read = time.perf_counter() - began
+    return _report(measurement, job, read, device, progress)
 
 
 def _report(
     measurement: Recording | Etfe,
-    name: str,
-    folder: Path,
-    settings: Settings,
+    job: Job,
+    seconds_of_reading: float,
     device: Device | None,
     progress: Progress | None,
 ) -> Reported:
     """Analyse one measurement and write its report."""
+    settings = job.settings
+    began = time.perf_counter()
     options = Options(
         device=device,
         delay_s=settings.delay_s,
@@ -62,10 +69,15 @@ def _report(
         progress=progress,
     )
     run = close_loop if settings.close_loop else analyse
-    return reported(name, run(measurement, settings.model, options), folder)
+    result = run(measurement, settings.model, options)
+    seconds = {"read": seconds_of_reading, "analyse": time.perf_counter() - began}
+    origin = provenance(job.command, asdict(settings), settings.seed, job.source, seconds)
+    return reported(recording_name(job.source), result, job.folder, origin)
 
 
-def reported(name: str, result: Result, folder: Path) -> Reported:
+def reported(
+    name: str, result: Result, folder: Path, origin: Mapping[str, Any] | None = None
+) -> Reported:
     """Write the report of one analysed measurement, and say what is in it.
 
     Parameters
@@ -73,9 +85,10 @@ def reported(name: str, result: Result, folder: Path) -> Reported:
     name : str
     result : Analysis or Closed
     folder : Path
+    origin : mapping, optional
+        See `bayeshaptic.report.provenance`.
     """
-
-    page = write_report(result, folder)
+    page = write_report(result, folder, origin)
     warnings = tuple(notice.text for notice in result.analysis.notices if notice.level == "warning")
     remark = in_short(result.closed) if result.closed else ""
     return Reported(name, page, headline(result), remark, warnings)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from bayeshaptic.jobs.job import Job, refuse_file
 from bayeshaptic.jobs.recording import reported
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study, read_study
+from bayeshaptic.report.provenance import provenance
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.write import write_study_report
@@ -51,7 +54,7 @@ def report_study(job: Job, progress: Progress | None, workers: int = 1) -> tuple
 
     def executor(analyse: Callable[..., Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
         names = [Path(folder).name for folder in folders_of(tasks, job.folder)]
-        work = partial(analyse_and_report, analyse, folders_of(tasks, job.folder))
+        work = partial(analyse_and_report, analyse, folders_of(tasks, job.folder), job=job)
         for outcome in _executor(progress, names, workers)(work, tasks):
             number = outcome.item.number
             if outcome.error is None:
@@ -106,7 +109,12 @@ def report_population(
 
 
 def analyse_and_report(
-    analyse: Callable[..., Any], folders: Sequence[Path], task: Any, part: Progress | None = None
+    analyse: Callable[..., Any],
+    folders: Sequence[Path],
+    task: Any,
+    part: Progress | None = None,
+    *,
+    job: Job,
 ) -> tuple[Any, Reported]:
     """Analyse one recording and write its report: in whatever process this runs.
 
@@ -119,11 +127,20 @@ def analyse_and_report(
     task : Task
     part : callable, optional
         Progress of this recording.
+    job : Job
+        That of the study.
     """
-
     folder = folders[task.number]
+    began = time.perf_counter()
     result = analyse(task, part)
-    return result, reported(folder.name, result, folder)
+    origin = provenance(
+        job.command,
+        asdict(job.settings),
+        job.settings.seed,
+        task.entry.path,
+        {"analyse": time.perf_counter() - began},
+    )
+    return result, reported(folder.name, result, folder, origin)
 
 
 def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:

@@ -12,6 +12,7 @@ from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.estimates import RISKS, finite
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.provenance import provenance
 from bayeshaptic.report.result import tip_limit
 from bayeshaptic.report.trust import doubtful_parameters
 from bayeshaptic.version import __version__
@@ -33,7 +34,7 @@ _ERROR = {
 _DIAGNOSIS = dict.fromkeys(("verdict", "residual_class", "effects", "candidates"))
 
 
-def summary(result: Result) -> dict[str, Any]:
+def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Everything that `summary.json` holds, as plain dictionaries, lists, strings and floats.
 
     Parameters
@@ -41,6 +42,8 @@ def summary(result: Result) -> dict[str, Any]:
     result : Analysis, or what closing the loop returns
         The latter has `analysis` (of the model with its effects) and the mappings `diagnosis`,
         `before` and `after` in the form of the file; without it those are null.
+    origin : mapping or None
+        What `provenance` gives; by default only what the result itself knows.
 
     Returns
     -------
@@ -67,13 +70,14 @@ def summary(result: Result) -> dict[str, Any]:
             "recommendation": _recommendation(result),
             "diagnosis": diagnosis,
             "error": {name: _ERROR | dict(given or {}) for name, given in error.items()},
+            "provenance": origin or provenance(seed=analysis.posterior.seed),
         }
     )
 
 
-def summary_json(result: Result) -> str:
+def summary_json(result: Result, origin: Mapping[str, Any] | None = None) -> str:
     """`summary` as text; strict JSON, without NaN and infinity."""
-    return json.dumps(summary(result), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return json.dumps(summary(result, origin), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def plain(value: Any) -> Any:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import InputError
@@ -27,7 +29,9 @@ _LAST = "summary.json"
 
 
 @single_threaded
-def write_report(result: Result, out_dir: str | Path) -> Path:
+def write_report(
+    result: Result, out_dir: str | Path, origin: Mapping[str, Any] | None = None
+) -> Path:
     """Write report.html, summary.json, limits.json and .csv, posterior.nc and the figures.
 
     The files are made in a hidden folder and moved when all of them are there: an interrupted run
@@ -38,6 +42,8 @@ def write_report(result: Result, out_dir: str | Path) -> Path:
     result : Analysis, or what closing the loop returns
     out_dir : str or Path
         Made where it is missing, with its parents.
+    origin : mapping or None
+        The `provenance` of `summary.json`, where the caller knows more than the result.
 
     Returns
     -------
@@ -53,12 +59,12 @@ def write_report(result: Result, out_dir: str | Path) -> Path:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out_dir}: is a file; name a folder for the report.")
     with draft_in(out if out.exists() else out.parent) as draft:
-        _write_all(result, draft)
+        _write_all(result, draft, origin)
         _move(draft, out)
     return out / "report.html"
 
 
-def _write_all(result: Result, folder: Path) -> None:
+def _write_all(result: Result, folder: Path, origin: Mapping[str, Any] | None) -> None:
     analysis = result.analysis
     pictures = draw_pictures(result)
     sections = _sections(result, folder)
@@ -68,7 +74,7 @@ def _write_all(result: Result, folder: Path) -> None:
     analysis.posterior.save(folder / "posterior.nc")
     page = render(result, pictures, [section.html for section in sections])
     (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
-    (folder / _LAST).write_text(summary_json(result), encoding="utf-8", newline="\n")
+    (folder / _LAST).write_text(summary_json(result, origin), encoding="utf-8", newline="\n")
 
 
 def _sections(result: Result, folder: Path) -> tuple[Section, ...]:

@@ -13,12 +13,25 @@ from bayeshaptic.recordings.readers.reader import Arrays, Reader
 _BUILT_IN = tuple(module.READER for module in (delimited, matlab, hdf5, npz, tdms, spreadsheet))
 _registry: list[Reader] = [*_BUILT_IN]
 
-__all__ = ["Arrays", "Reader", "read_arrays", "read_here", "reader_for", "register_reader"]
+__all__ = [
+    "Arrays",
+    "Reader",
+    "known_suffixes",
+    "read_arrays",
+    "read_here",
+    "reader_for",
+    "register_reader",
+]
 
 
 def register_reader(reader: Reader) -> None:
     """Add a file format; it comes before those that are there, so that it can replace one."""
     _registry.insert(0, reader)
+
+
+def known_suffixes() -> tuple[str, ...]:
+    """The ends of file names that some reader knows, in lower case."""
+    return tuple(suffix for reader in _registry for suffix in reader.suffixes)
 
 
 def reader_for(path: Path) -> Reader:
@@ -32,9 +45,9 @@ def reader_for(path: Path) -> Reader:
     for reader in _registry:
         if path.name.lower().endswith(reader.suffixes):
             return reader
-    known = " ".join(suffix for reader in _registry for suffix in reader.suffixes)
     raise InputError(
-        f"{path}: no reader for files ending in '{path.suffix}'; known endings: {known}"
+        f"{path}: no reader for files ending in '{path.suffix}'; known endings: "
+        + " ".join(known_suffixes())
     )
 
 

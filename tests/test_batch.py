@@ -1,0 +1,123 @@
+"""Many recordings: found in folders, indexed, resumed; a failure stops nobody."""
+
+from __future__ import annotations
+
+import csv
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+import bayeshaptic as bh
+from bayeshaptic import cli
+from bayeshaptic.errors import InputError
+from bayeshaptic.jobs import batch, executors
+from bayeshaptic.jobs.job import Job
+from bayeshaptic.jobs.sources import find_sources
+from bayeshaptic.report.headline import Headline
+from bayeshaptic.report.reported import Reported
+
+LIMIT = {"unit": "N/m", "q05": 900.0, "q50": 1000.0, "q95": 1100.0, "safe": {"0.01": 850.0}}
+SUMMARY = {
+    "recording": {"device": "d", "user": "<Ada>", "configuration": None},
+    "critical_stiffness": LIMIT | {"frequency_hz": {"q50": 50.0}},
+    "diagnosis": {"verdict": "consistent"},
+}
+
+
+class Reports:
+    """Stands for the analysis: counts what it is asked, and fails where the file says so."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+        self.disk_is_full = True
+
+    def __call__(self, job: Job) -> tuple[Reported, ...]:
+        self.asked.append(job.source.name)
+        content = job.source.read_text()
+        if content == "bad":
+            raise InputError(f"{job.source}: refused")
+        if content == "full" and self.disk_is_full:
+            self.disk_is_full = False
+            raise OSError(28, "No space left on device")
+        job.folder.mkdir(parents=True, exist_ok=True)
+        (job.folder / "summary.json").write_text(json.dumps(SUMMARY))
+        headline = Headline("safe", "Render it.", ())
+        return (Reported(job.source.name, job.folder / "report.html", headline),)
+
+
+@pytest.fixture
+def reports(monkeypatch: pytest.MonkeyPatch) -> Reports:
+    found = Reports()
+    monkeypatch.setattr(batch, "report_source", found)
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    place = tmp_path / "recordings"
+    (place / "more").mkdir(parents=True)
+    for name, text in {"a.csv": "1", "b.csv": "bad", "more/c.csv": "full"}.items():
+        (place / name).write_text(text)
+    return place
+
+
+def test_what_is_in_a_folder(folder: Path) -> None:
+    (folder / "s.toml").write_text("[[recording]]\nfile='more/c.csv'\n")
+    (folder / "device.toml").write_text("kind='rotational'\n")
+    (folder / ".hidden.csv").write_text("1")
+    (folder / "old").mkdir()
+    for name in ("summary.json", "limits.csv", "x.npz"):
+        (folder / "old" / name).write_text("1")
+    assert [path.name for path in find_sources([folder])] == ["s.toml", "a.csv", "b.csv"]
+    with pytest.raises(InputError, match="no studies and no recordings"):
+        find_sources([folder / "old"])
+
+
+def test_a_batch_goes_on_and_is_resumed(folder: Path, tmp_path: Path, reports: Reports) -> None:
+    out = tmp_path / "out"
+
+    def run() -> list[str]:
+        reports.asked.clear()
+        entries = bh.run_batch([folder], out, executor=executors.serial)
+        assert [entry.state for entry in entries] == ["done", "failed", "done"]
+        return reports.asked
+
+    # What a full disk stopped is tried again, at the end; what was refused is not.
+    assert run() == ["a.csv", "b.csv", "c.csv", "c.csv"]
+    assert run() == ["b.csv"]
+    (folder / "a.csv").write_text("2")
+    assert run() == ["a.csv", "b.csv"]
+    (out / "c" / "summary.json").unlink()
+    assert run() == ["b.csv", "c.csv"]
+    (out / "manifest.json").write_text("{")
+    assert run() == ["a.csv", "b.csv", "c.csv"]
+
+    rows = list(csv.DictReader((out / "index.csv").open()))
+    assert [row["status"] for row in rows] == ["safe", "failed", "safe"]
+    assert float(rows[0]["safe"]) == 850
+    (failed,) = csv.DictReader((out / "failed.csv").open())
+    assert failed["error"].endswith("b.csv: refused")
+    page = (out / "index.html").read_text()
+    assert 'href="a/report.html"' in page and "&lt;Ada&gt;" in page and "http" not in page
+    assert json.loads((out / "manifest.json").read_text())["versions"]["bayeshaptic"]
+
+
+def test_any_executor(folder: Path, tmp_path: Path, reports: Reports) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        entries = bh.run_batch([folder], tmp_path / "out", executor=pool)
+    assert [entry.state for entry in entries] == ["done", "failed", "done"]
+
+
+def test_the_commands(
+    folder: Path, tmp_path: Path, reports: Reports, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    command = ["batch", str(folder), "-o", str(out), "--workers", "1", "--log", "json"]
+    assert cli.main(command) == 1
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [line["state"] for line in lines] == ["done", "failed", "done"]
+    assert cli.main(["status", str(out)]) == 1
+    assert "2 of 3 done, 1 failed, 0 left" in capsys.readouterr().out
+    assert cli.main(["status", str(tmp_path)]) == 2
