@@ -96,7 +96,7 @@ def test_a_study_through_the_command(
     assert limits["device"] == "phantom" and limits["cases"]
 
 
-def _only_the_summary(result: Any, folder: Path) -> Path:
+def _only_the_summary(result: Any, folder: Path, origin: Any = None) -> Path:
     """In the place of a recording's report, which other tests look at."""
     folder.mkdir(parents=True)
     (folder / "report.html").write_text("<!DOCTYPE html>")
