@@ -488,7 +488,7 @@ class TestReport:
         return tmp_path / "study.toml"
 
     def test_study(self, run: Run, three: Path, tmp_path: Path) -> None:
-        status, out, err = run("report", three, "--no-loop", "--workers", "1")
+        status, out, err = run("report", three, "--no-loop", "--workers", "1", "--allow-outside")
         folder = tmp_path / "study-report"
         assert status == 1
         assert "error: bad: " in only_line(err)
