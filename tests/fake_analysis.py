@@ -119,6 +119,7 @@ def fake_analysis(
         seconds={"read": 0.1, "etfe": 0.3, "fit": 0.4, "sample": 1.2},
         noise_scale=fit.reduced_chi_square if misfit > 1.2 else 1.0,
         lever_m=lever_m,
+        in_loop=None,
     )
 
 

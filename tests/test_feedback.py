@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
@@ -14,8 +13,9 @@ from test_measured import PERIOD_S, servo
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.feedback.explain import explain_force, has_feedback
+from bayeshaptic.diagnosis.feedback.explain import explain_force
 from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.loop import force_words
 
 FRICTION_N = 20.0
@@ -34,24 +34,22 @@ def test_the_friction_of_a_servo_is_found_in_its_force(closed: Closed) -> None:
     assert has_feedback(closed.base.notices) and closed.force is not None
     (friction,) = closed.effects
     assert friction.name == "coulomb_friction" and friction.family == "nonlinear"
-    estimate = friction.estimates["friction_force"]
+    found = closed.analysis.posterior.summary()["coulomb"]
     # Four of its own standard deviations, or one per cent (friction is not quite a step in time).
-    assert abs(estimate.mean - FRICTION_N) < max(4 * estimate.sd, 0.01 * FRICTION_N)
-    assert estimate.unit == "N"
+    assert abs(found["mean"] - FRICTION_N) < max(4 * found["sd"], 0.01 * FRICTION_N)
+    assert found["unit"] == "N"
     linear, first, *_ = closed.force.further.steps
     assert first.term == "coulomb" and first.held_out_rms < 0.3 * linear.held_out_rms
 
 
 def test_the_response_is_not_mended_with_what_the_controller_did(closed: Closed) -> None:
-    assert closed.analysis.fit is closed.base.fit
+    assert closed.analysis.etfe is closed.base.etfe
     assert closed.traced.candidates == () and closed.before.keys() == closed.after.keys()
 
 
-def test_the_report_tells_of_the_force_and_recommends_nothing(
-    closed: Closed, tmp_path: Path
-) -> None:
+def test_the_report_tells_of_the_force_and_of_the_motion(closed: Closed, tmp_path: Path) -> None:
     page = text_of(bh.write_report(closed, tmp_path / "out"))
-    assert "Do not ship a stiffness" in page
+    assert "The motion, simulated in the loop" in page and "feedback biases it" in page
     assert "The force, explained by the motion" in page and "What the model lacked" not in page
     assert "the model lacked dry (Coulomb) friction" in page
     names = {path.name for path in (tmp_path / "out").glob("loop_*.png")}
@@ -59,12 +57,13 @@ def test_the_report_tells_of_the_force_and_recommends_nothing(
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["recording"]["feedback"] is True
     (effect,) = summary["diagnosis"]["effects"]
-    assert effect["parameters"]["friction_force"]["q05"] < FRICTION_N * 1.01
+    assert effect["parameters"]["coulomb"]["q05"] < FRICTION_N * 1.01
+    assert summary["critical_stiffness"]["etfe"] == {"q05": None, "q50": None, "q95": None}
 
 
 def test_an_older_report_does_not_leave_its_figure(closed: Closed, tmp_path: Path) -> None:
     bh.write_report(closed, tmp_path)
-    bh.write_report(replace(closed, force=None), tmp_path)
+    bh.write_report(fake_closed("explained", "nonlinear"), tmp_path)
     assert not (tmp_path / "loop_inverse.png").exists()
 
 

@@ -20,6 +20,7 @@ from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, one_period, place
 from bayeshaptic.diagnosis.state import REPORT, share
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import compress
@@ -193,6 +194,16 @@ def test_the_published_values_of_emps(measured: Find) -> None:
     linear, friction = (step.held_out_rms for step in found.steps)
     assert linear == pytest.approx(9.1, abs=0.1) and friction == pytest.approx(2.2, abs=0.1)
     assert inverse_dynamics(recording).steps[-1].held_out_rms < 1.2
+
+
+def test_the_motion_of_emps_in_its_loop(measured: Find) -> None:
+    recording = bh.read_recording(measured("emps/DATA_EMPS.mat"), columns=SERVO_COLUMNS)
+    found = fit_motion(recording)
+    published = np.array([95.1089, 203.5034, 20.3935, -3.1648])
+    assert found.converged
+    # The 99 % interval of a Student t with eight degrees of freedom.
+    assert np.all(np.abs(found.values[:4] - published) < 3.36 * found.sd[:4])
+    assert np.all(found.sd[:4] < [0.5, 20.0, 2.0, 1.0]) and found.error_rms < 2e-6
 
 
 def test_drag_predicts_lines_and_a_load_that_were_not_fitted(measured: Find) -> None:

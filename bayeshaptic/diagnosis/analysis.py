@@ -11,15 +11,17 @@ from typing import Any
 
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.feedback.in_loop import InLoop
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
 from bayeshaptic.diagnosis.options import Options, measurement_of
-from bayeshaptic.errors import Notice
+from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.choose import Choice, choose_model
 from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.sufficiency import refuse_too_little
@@ -31,6 +33,7 @@ from bayeshaptic.threads import single_threaded
 _MOST_EVALUATIONS = 400_000
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
 _MISFIT_EVALUATIONS = 100_000
+_WIDEST = 0.4  # of the sampling rate: a band's upper end
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,8 @@ class Analysis:
         Factor on the noise variance in the posterior: the reduced chi-square where the model
         misfits, 1 elsewhere.
     lever_m : float or None
+    in_loop : InLoop or None
+        The motion that posterior and limit come from, where feedback biases the response.
     """
 
     recording: Recording | None
@@ -74,6 +79,7 @@ class Analysis:
     seconds: Mapping[str, float]
     noise_scale: float = 1.0
     lever_m: float | None = None
+    in_loop: InLoop | None = None
 
     # What a report asks of any result, closed loop or not: see `bayeshaptic.diagnosis.result`.
     @property
@@ -165,12 +171,12 @@ def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -
     if isinstance(measurement, Recording):
         with clock.stage("checks"):
             options.report(0.0, "checking the recording")
-            notices = check_recording(measurement, device)
+            notices = told(measurement.feedback, check_recording(measurement, device))
             if not any(notice.topic == "feedback" for notice in notices):
                 refuse_too_little(measurement)
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
-            etfe = estimate_etfe(measurement, options.band_hz)
+            etfe = _response(measurement, options.band_hz, has_feedback(notices))
     else:
         etfe = measurement
     with clock.stage("least squares"):
@@ -237,6 +243,17 @@ def finish(
         noise_scale=scale,
         lever_m=begun.lever_m,
     )
+
+
+def _response(recording: Recording, band_hz: tuple[float, float] | None, biased: bool) -> Etfe:
+    """The response; one that feedback biases is for comparison only, and any band will do."""
+    try:
+        return estimate_etfe(recording, band_hz)
+    except InputError:
+        if not biased or band_hz is not None:
+            raise
+    widest = (1 / recording.duration_s, _WIDEST / recording.period_s)
+    return estimate_etfe(recording, widest)
 
 
 def _fit(

@@ -19,15 +19,16 @@ from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
-    has_feedback,
     trace_force,
 )
 from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.options import Options, measurement_of
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
@@ -137,6 +138,12 @@ def close_loop(
     else:
         traced = trace(begun.etfe, begun.fit, chosen.within(0.05, 0.4).report, chosen.budget_s)
     tracing = time.perf_counter() - began
+    if force is not None:
+        one_mass = (model.name if isinstance(model, Model) else model) == "rigid"
+        found = analyse_in_loop(begun, one_mass, chosen.within(0.3, 0.95))
+        if found is not None:
+            error = _limit_alone(found)
+            return Closed(found, found, in_the_loop(traced, found), error, error, force)
     changed = force is None and bool(traced.state.accepted)
     state = traced.state
     base = finish(
@@ -215,6 +222,12 @@ def _error(analysis: Analysis) -> dict[str, Any]:
         "critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)},
         "critical_stiffness_db": float(db) if db is not None and np.isfinite(db) else None,
     }
+
+
+def _limit_alone(analysis: Analysis) -> dict[str, Any]:
+    """Of an analysis that is not of the response, the limit; the rest is missing."""
+    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
+    return {"critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)}}
 
 
 def _notices(traced: Traced) -> tuple[Notice, ...]:

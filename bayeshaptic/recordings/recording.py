@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import Notice
+from bayeshaptic.recordings.feedback import Feedback
 
 FORCE_UNITS = ("N", "Nm", "A")
 POSITION_UNITS = ("m", "rad")
@@ -49,6 +50,8 @@ class Recording:
         The file it was read from.
     notices : tuple of Notice
         What was found and assumed when it was read.
+    feedback : Feedback or None
+        The controller that was in the loop, where somebody said which.
     """
 
     force: NDArray[np.float64] = field(repr=False)
@@ -66,6 +69,7 @@ class Recording:
     time_jitter: float | None = None
     source: Path | None = None
     notices: tuple[Notice, ...] = ()
+    feedback: Feedback | None = None
 
     @property
     def kind(self) -> str:

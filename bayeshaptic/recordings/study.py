@@ -11,12 +11,13 @@ from bayeshaptic.devices import Device, device_from_table, device_names, load_de
 from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import parse_columns
+from bayeshaptic.recordings.feedback import Feedback, read_feedback
 from bayeshaptic.recordings.known_limits import Reference, read_references
 from bayeshaptic.recordings.read import Columns, Span, read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 
-STUDY_KEYS = ("device", "prior", "recording", "reference")
+STUDY_KEYS = ("device", "prior", "feedback", "recording", "reference")
 ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns", "rows", "seconds")
 PRIOR_KEYS = ("median", "log_sd", "scale", "floor", "mean", "sd", "low", "high", "log")
 
@@ -69,6 +70,8 @@ class Study:
     notices : tuple of Notice
     references : tuple of Reference
         Limits known from elsewhere, to compare with.
+    feedback : Feedback or None
+        The controller that was in the loop while all of them were made.
     """
 
     name: str
@@ -79,6 +82,7 @@ class Study:
     prior: Mapping[str, Mapping[str, float | bool]] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
     references: tuple[Reference, ...] = ()
+    feedback: Feedback | None = None
 
     @property
     def users(self) -> tuple[str, ...]:
@@ -114,6 +118,7 @@ class Study:
             configuration=entry.configuration,
             trial=entry.trial,
             level=entry.level,
+            feedback=self.feedback,
         )
 
     def read_all(self) -> tuple[Recording | Etfe, ...]:
@@ -133,7 +138,8 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
     they apply `user`, `configuration` (a number or a name), `trial`, `level`, `rows` or
     `seconds` (the part to read) and `columns` of its own. Recordings are
     looked for but not read; `Study.read` does that. Optional ``[[reference]]`` tables hold limits
-    known from elsewhere: `label`, `held`, and `critical_stiffness` or `critical_stiffness_db`.
+    known from elsewhere: `label`, `held`, and `critical_stiffness` or `critical_stiffness_db`. An
+    optional ``[feedback]`` table says which controller was in the loop.
 
     Parameters
     ----------
@@ -177,6 +183,7 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
         prior=_prior(table.content.get("prior", {}), f"{path}, [prior]"),
         notices=notices,
         references=read_references(table.content.get("reference", []), path),
+        feedback=read_feedback(table.content.get("feedback"), f"{path}, [feedback]"),
     )
 
 

@@ -24,12 +24,6 @@ def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, 
     etfe, posterior = analysis.etfe, analysis.posterior
     ensembles, steps, walkers, _ = posterior.chains.shape
     unit = pretty_unit(etfe.force_unit)
-    noise = (
-        f" Because the model misfits, the posterior takes {pure(analysis.noise_scale)} times that "
-        "variance."
-        if analysis.noise_scale != 1.0
-        else ""
-    )
     return (
         "The device, its configuration and the way it is held are those of the recording: another "
         "person, posture or configuration has another limit.",
@@ -43,15 +37,38 @@ def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, 
         _constancy(closed),
         _model(analysis, closed),
         *_widening(closed),
+        *_noise(analysis),
+        "Priors as in the table below. Intervals are 90 % and equal-tailed: from the 5 % to the "
+        f"95 % quantile. {ensembles} ensembles of {walkers} walkers, {steps} steps, seed "
+        f"{posterior.seed}.",
+    )
+
+
+def _noise(analysis: Analysis) -> tuple[str, ...]:
+    """What is taken to be noise, and where it was looked at."""
+    if analysis.in_loop is not None:
+        motion = analysis.in_loop.motion
+        return (
+            f"The device is one mass up to {quantity(motion.bandwidth_hz, 'Hz')}, where the "
+            "command has its power, and at the frequency of the limit.",
+            "What is left of the motion may be correlated, and depend on position and direction; "
+            "it widens the intervals by its own correlation, and by what changes when slower "
+            "motion counts more. It has the same mean however the mass moves.",
+        )
+    etfe = analysis.etfe
+    noise = (
+        f" Because the model misfits, the posterior takes {pure(analysis.noise_scale)} times that "
+        "variance."
+        if analysis.noise_scale != 1.0
+        else ""
+    )
+    return (
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
         "extrapolates.",
         "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is "
         "estimated in each window of lines and integrated out. The leakage of a random excitation "
         "is removed in each window; what is left over is independent from window to "
         f"window.{noise}",
-        "Priors as in the table below. Intervals are 90 % and equal-tailed: from the 5 % to the "
-        f"95 % quantile. {ensembles} ensembles of {walkers} walkers, {steps} steps, seed "
-        f"{posterior.seed}.",
     )
 
 
@@ -77,7 +94,7 @@ def _model(analysis: Analysis, closed: Closed | None) -> str:
 
 
 def _widening(closed: Closed | None) -> tuple[str, ...]:
-    if closed is None:
+    if closed is None or closed.analysis.in_loop is not None:
         return ()
     spread = math.sqrt(sum(effect.limit_log_sd**2 for effect in closed.effects))
     found = []

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.estimates import decibel, own_limit
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
@@ -97,7 +97,9 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
         found.append(
             "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
         )
-    if has_feedback(analysis.notices):
+    if analysis.in_loop is not None:
+        found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
+    if has_feedback(analysis.notices) and analysis.in_loop is None:
         undecided = any("cannot be decided" in notice.text for notice in analysis.notices)
         how = "may have been" if undecided else "was"
         found.append(
@@ -134,11 +136,16 @@ def _untrusted(
     limit = analysis.limit
     sentence = f"Do not ship a stiffness from this report: {_joined(objections)}."
     middle, low, high = (limit.quantile(p) for p in (0.5, 0.05, 0.95))
+    shown = estimate(middle, low, high, limit.unit)
     details = []
-    if not _far_from_measured(analysis):
+    if analysis.in_loop is not None:
         details.append(
-            f"The model's limit and its interval, {estimate(middle, low, high, limit.unit)}, are "
-            "not to be trusted; they stand below for comparison only."
+            f"As one mass with friction, followed through the feedback, it has a limit of {shown}."
+        )
+    elif not _far_from_measured(analysis):
+        details.append(
+            f"The model's limit and its interval, {shown}, are not to be trusted; they stand below "
+            "for comparison only."
         )
     own = own_limit(analysis)
     if own is not None and not has_feedback(analysis.notices):

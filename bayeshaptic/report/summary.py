@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.estimates import RISKS, finite
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.provenance import provenance

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.misfit import misfit_is_clear
 from bayeshaptic.report.result import families_of, is_unexplained
 
@@ -24,6 +24,9 @@ def doubtful_parameters(result: Result) -> dict[str, str]:
     """
     analysis, closed = result.analysis, result.closed
     names = analysis.model.names
+    if analysis.in_loop is not None:
+        why = "; ".join(analysis.in_loop.doubts)
+        return dict.fromkeys(names, why) if why else {}
     if has_feedback(analysis.notices):
         return dict.fromkeys(names, "feedback biases it")
     if is_unexplained(result) or misfit_is_clear(analysis):

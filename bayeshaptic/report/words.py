@@ -23,6 +23,11 @@ _WIDE_DB = 1.5  # of an interval, from which it is worth a word why
 
 def misfit(analysis: Analysis, loop: bool = False) -> str:
     """How the residual compares with the noise, and where it is worst."""
+    if analysis.in_loop is not None:
+        return (
+            "Feedback biases the measured response, and the model was not fitted to it but to the "
+            "motion: where the two differ here, the response is wrong, or more than one mass moves."
+        )
     fit = analysis.fit
     order = np.argsort(fit.frequency_hz)
     bands = third_octaves(fit.frequency_hz[order], fit.residual[order])

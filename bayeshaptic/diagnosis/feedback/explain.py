@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bayeshaptic.diagnosis.acceptance import verdict_of
@@ -11,7 +10,7 @@ from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics, inv
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.effects.library import effects
-from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.errors import InputError
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -34,11 +33,6 @@ class ForceExplained:
 
     first: InverseDynamics
     further: InverseDynamics
-
-
-def has_feedback(notices: Iterable[Notice]) -> bool:
-    """Whether a warning says that the force was computed from the motion."""
-    return any(n.topic == "feedback" and n.level == "warning" for n in notices)
 
 
 def explain_force(recording: Recording | None) -> ForceExplained | None:

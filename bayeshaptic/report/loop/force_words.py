@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from bayeshaptic.inference.time_domain.fit import NAMES
 from bayeshaptic.report.quantities import pure, quantity, scale
 
 if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.feedback.explain import ForceExplained
+    from bayeshaptic.diagnosis.feedback.in_loop import InLoop
     from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics
+    from bayeshaptic.recordings.recording import Recording
     from bayeshaptic.report.tables import Rows
 
 _DASH = "\N{EN DASH}"
@@ -78,15 +84,55 @@ def coefficients(force: ForceExplained) -> Rows:
     )
 
 
-def remains(force: ForceExplained) -> str:
+def remains(force: ForceExplained, in_loop: InLoop | None) -> str:
     """What is left of the force, all of it fitted."""
+    limit = (
+        "No limit follows from this: for a critical stiffness, record with an external excitation."
+        if in_loop is None
+        else "The limit does not rest on these numbers, but on the motion."
+    )
     first, further = (pure(100 * f.relative_error, 3) for f in (force.first, force.further))
     return (
         f"What is left is {first} % of the force with the first term and {further} % with all of "
         "them. The terms beyond the first describe this recording and are no law, and with them a "
-        "coefficient means something else than without. No limit follows from this: for a critical "
-        "stiffness, record with an external excitation."
+        f"coefficient means something else than without. {limit}"
     )
+
+
+def motion(found: InLoop, recording: Recording) -> str:
+    """How near the simulated motion is to the measured one, and what was fitted with it."""
+    unit, force = recording.position_unit, recording.force_unit
+    way = quantity(float(np.ptp(recording.position)), unit)
+    text = (
+        "One mass with viscous and dry friction, a constant force and a delay, simulated in the "
+        f"same loop, stays within {quantity(found.motion.error_rms, unit)} rms of the measured "
+        f"motion over {way}. A force that changes along the way and with the direction, "
+        f"{quantity(found.motion.uneven_rms, force)} rms, was fitted with it: how much of it is "
+        "friction or constant force cannot be told, which widens both."
+    )
+    if not found.halves:
+        return text
+    return (
+        f"{text} With the values of the other half of the recording the power of the error is "
+        f"{pure(found.held_out, 3)} times that with its own, and "
+        f"{pure(100 * found.covered, 2)} % of the samples lie in the 90 % band."
+    )
+
+
+def halves(found: InLoop, analysis: Analysis) -> Rows:
+    """A row a parameter: (what it is, whole recording, first half, second half)."""
+    rows = []
+    for index, name in enumerate(NAMES):
+        if name not in analysis.model.names:
+            continue
+        fits = (found.motion, *found.halves)
+        row = scale(float(fits[0].values[index]), analysis.model.unit(name))
+        cells = []
+        for fit in fits:
+            value, sd = float(fit.values[index]), float(fit.sd[index])
+            cells.append(f"{row.number(value, sd)} ± {row.number(sd, sd)} {row.unit}".rstrip())
+        rows.append((analysis.model.parameter(name).title, *cells))
+    return tuple(rows)
 
 
 def _value(found: InverseDynamics, name: str, unit: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayeshaptic.diagnosis.feedback.explain import has_feedback
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.result import is_unexplained
 
 if TYPE_CHECKING:

@@ -1,0 +1,125 @@
+"""The motion of a recording with feedback, fitted; and what speaks against a limit from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
+from bayeshaptic.inference.time_domain.follower import Follower, pid
+from bayeshaptic.models import HalfNormal
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.types import Floats
+
+# Half a recording has too few strokes to say much: the halves may differ by so many of their sds.
+_APART = 4.0
+_WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
+_CENTRAL = 1.6449  # standard deviations that hold 90 %
+_WORDS = {"m": "mass", "b": "viscous damping", "delay_s": "delay"}
+
+
+@dataclass(frozen=True)
+class InLoop:
+    """The motion in the loop, fitted to the whole recording and to each of its halves.
+
+    Attributes
+    ----------
+    motion : MotionFit
+    halves : tuple of MotionFit
+        Empty where a half is too short for itself.
+    held_out : float
+        Power of each half's error with the other half's values, over that with its own.
+    covered : float
+        Share of each half's samples that lie in the 90 % band of the other half's error.
+    doubts : tuple of str
+        Why neither parameters nor limit can be relied on.
+    questions : tuple of str
+        Why no stiffness can be recommended where the parameters can be relied on.
+    """
+
+    motion: MotionFit
+    halves: tuple[MotionFit, ...]
+    held_out: float
+    covered: float
+    doubts: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
+
+
+def follow_in_loop(recording: Recording) -> InLoop | None:
+    """Fit the motion of one mass; None where none can be found beside the measured one."""
+    follower = _declared(recording)
+    middle = recording.samples // 2
+    parts = (recording.part(0, middle), recording.part(middle, recording.samples))
+    try:
+        motion = fit_motion(recording, follower)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    try:
+        halves = tuple(fit_motion(part, follower) for part in parts)
+    except (InputError, np.linalg.LinAlgError):
+        return InLoop(motion, (), float("inf"), 0.0, ("half of the recording is not enough",))
+    own = [half.error_on(part) for half, part in zip(halves, parts, strict=True)]
+    other = [half.error_on(part) for half, part in zip(halves[::-1], parts, strict=True)]
+    bands = [_CENTRAL * np.sqrt(np.mean(error**2)) for error in own]
+    covered = [np.mean(np.abs(e) < b) for e, b in zip(other, bands[::-1], strict=True)]
+    doubts = _differences(*halves)
+    if not motion.converged:
+        doubts += ("the fit of the motion did not settle",)
+    return InLoop(motion, halves, _power(other) / _power(own), float(np.mean(covered)), doubts)
+
+
+def open_questions(
+    found: InLoop, posterior: Posterior, limit: CriticalStiffness, one_mass: bool
+) -> tuple[str, ...]:
+    """What speaks against the limit alone; `one_mass` says that the device was declared to be one.
+
+    Parameters
+    ----------
+    found : InLoop
+    posterior : Posterior
+    limit : CriticalStiffness
+    one_mass : bool
+    """
+    reasons = []
+    if not one_mass:
+        reasons.append(
+            f"nothing here shows how the device vibrates above {found.motion.bandwidth_hz:.3g} Hz, "
+            "where a mode may set a lower limit than that of one mass (where it is known to be "
+            "one, say --model rigid)"
+        )
+    model = posterior.model
+    for name, dominated in posterior.prior_dominated.items():
+        free = name != "delay_s" or isinstance(model.prior(name), HalfNormal)
+        if dominated and free and name in _WORDS:
+            reasons.append(f"the recording says too little of the {_WORDS[name]}")
+    low, high = (limit.quantile(p) for p in (0.05, 0.95))
+    if not (low > 0 and 20 * np.log10(high / low) < _WIDEST_DB):
+        reasons.append("the recording leaves the limit open within more than a factor of two")
+    return tuple(reasons)
+
+
+def _declared(recording: Recording) -> Follower | None:
+    told = recording.feedback
+    if told is None:
+        return None
+    gains = (told.proportional, told.derivative, told.integral)
+    return pid(*gains, told.filter_hz, recording.period_s)
+
+
+def _power(errors: list[Floats]) -> float:
+    return float(np.mean(np.concatenate(errors) ** 2))
+
+
+def _differences(first: MotionFit, second: MotionFit) -> tuple[str, ...]:
+    """Of mass, damping and delay, what the halves disagree about."""
+    apart = np.abs(first.values - second.values)
+    sd = np.sqrt(np.diag(first.covariance) + np.diag(second.covariance))
+    return tuple(
+        f"the two halves of the recording disagree about the {_WORDS[name]}"
+        for name, far in zip(NAMES, apart > _APART * sd, strict=True)
+        if far and name in _WORDS
+    )

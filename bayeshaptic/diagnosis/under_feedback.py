@@ -1,0 +1,91 @@
+"""The analysis of a recording with feedback: posterior and limit from the motion in its loop."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from bayeshaptic.diagnosis.analysis import Analysis, Begun
+from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop, open_questions
+from bayeshaptic.diagnosis.limit_known import LimitKnown
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
+from bayeshaptic.inference.least_squares import MISFIT
+from bayeshaptic.inference.sampler import sample
+from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
+from bayeshaptic.inference.time_domain.model import rigid_with_friction
+from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
+
+_BIASED = (
+    "The force was computed from the motion, so that the measured response is biased, and shown "
+    "for comparison only. The parameters and the limit are not read from it: they come from the "
+    "motion of one mass with friction, simulated in the same loop beside the measured one."
+)
+_NO_WITNESS = "feedback biases it"
+
+
+def analyse_in_loop(begun: Begun, one_mass: bool, options: Options) -> Analysis | None:
+    """The analysis by the motion in the loop; None where no such motion can be found.
+
+    Parameters
+    ----------
+    begun : Begun
+    one_mass : bool
+        Whether the device was declared to be one: otherwise no limit is recommended.
+    options : Options
+    """
+    began = time.perf_counter()
+    recording = begun.etfe.recording
+    found = None if recording is None else follow_in_loop(recording)
+    if recording is None or found is None:
+        return None
+    delay = options.delay_s, options.delay_sd_s
+    model = rigid_with_friction(recording, found.motion, begun.device, *delay, options.prior)
+    fit = in_loop_fit(model, begun.etfe, found.motion, found.held_out)
+    watch = LimitKnown(model)
+    posterior = sample(
+        model,
+        begun.etfe,
+        start=fit,
+        seed=options.seed,
+        progress=options.report,
+        **({"rule": watch} if options.ess is None else {"ess": options.ess}),
+    )
+    # What the response says is no part of this likelihood.
+    posterior = replace(posterior, windows=None, etfe=None)
+    limit = watch.limit_of(posterior)
+    questions = open_questions(found, posterior, limit, one_mass)
+    told = tuple(replace(n, text=_BIASED) if n.topic == "feedback" else n for n in begun.notices)
+    return Analysis(
+        recording=recording,
+        etfe=begun.etfe,
+        device=begun.device,
+        model=model,
+        choice=None,
+        fit=fit,
+        posterior=posterior,
+        limit=limit,
+        etfe_limit=EtfeCriticalStiffness(None, None, None, None, limit.unit, _NO_WITNESS),
+        notices=told + limit.notices,
+        seconds={**begun.seconds, "motion in the loop": time.perf_counter() - began},
+        lever_m=begun.lever_m,
+        in_loop=replace(found, questions=questions),
+    )
+
+
+def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:
+    """What was found in the force, with its numbers and the verdict of the motion.
+
+    "explained" and "consistent" say here that each half of the recording predicts the other; that
+    a force is left which is not noise is in the widths.
+    """
+    assert analysis.in_loop is not None
+    names = ("coulomb", "offset")
+    accepted = tuple(
+        replace(effect, estimates={}, parameters=names) for effect in traced.state.accepted
+    )
+    verdict, left = (EXPLAINED, accepted[0].family) if accepted else (CONSISTENT, None)
+    if analysis.in_loop.doubts or analysis.in_loop.held_out > MISFIT:
+        verdict, left = UNEXPLAINED, traced.residual_class
+    state = replace(traced.state, accepted=accepted)
+    return replace(traced, verdict=verdict, residual_class=left, state=state)

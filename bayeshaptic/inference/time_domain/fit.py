@@ -1,0 +1,214 @@
+r"""The motion of one mass in a loop, fitted to a recording with feedback.
+
+A mass with viscous and dry friction, a constant force and a delay is driven by the recorded command
+*and* by a follower of the measured position.  Where the follower is the controller that was in the
+loop, this is the closed-loop output error (A. Janot, P.-O. Vandanjon and M. Gautier, "A generic
+instrumental variable approach for industrial robot identification", IEEE Transactions on Control
+Systems Technology 22, 2014): what enters the model holds no noise, so that feedback biases nothing,
+and no reference is needed.  Another follower costs an error of second order in the remaining force;
+a second one, with a lower bandwidth, shows how large it is, and widens the result.
+
+Errors have equal weights on purpose.  Weights by the residual's own spectrum hand friction over to
+the noise where the remaining force depends on position and direction: such a force is in the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
+from bayeshaptic.inference.time_domain.loop import LOWEST, PLAIN, Loop
+from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, Way, ridge
+from bayeshaptic.inference.time_domain.widths import covariance, mean_of_uneven
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.types import Floats
+
+NAMES = ("m", "b", "coulomb", "offset", "delay_s")
+_BAND = 0.025  # of the sampling rate: of the inverse dynamics that the fit begins with
+_OTHER = 0.4  # bandwidth of the second follower over that of the first
+_STEPS = 10
+
+
+@dataclass(frozen=True)
+class MotionFit:
+    """One mass in a loop, fitted.
+
+    Attributes
+    ----------
+    values : ndarray, shape (5,)
+        `NAMES`: mass, viscous damping, dry friction, constant force (positive against a positive
+        command), delay in s.  Not held above zero: where the data put a parameter below, its
+        part above is what the posterior keeps.
+    inside : ndarray, shape (5,)
+        The best values that are possible.
+    covariance : ndarray, shape (5, 5)
+    bandwidth_hz : float
+        Of the follower, or of the command where the feedback was declared.
+    error_rms : float
+        Of the position, measured less simulated.
+    uneven_rms : float
+        Of the force that changes along the way.
+    converged : bool
+    simulated : ndarray, shape (N,)
+        The position in the simulated loop.
+    uneven : ndarray, shape (2 WAVES,)
+        The force that changes along the way: its waves forward and backward.
+    way : Way
+    follower : Follower
+    """
+
+    values: Floats
+    inside: Floats
+    covariance: Floats
+    bandwidth_hz: float
+    error_rms: float
+    uneven_rms: float
+    converged: bool
+    simulated: Floats = field(repr=False)
+    uneven: Floats = field(repr=False)
+    way: Way
+    follower: Follower
+
+    @property
+    def sd(self) -> Floats:
+        return np.sqrt(np.diag(self.covariance))
+
+    def error_on(self, recording: Recording) -> Floats:
+        """Measured less simulated position of another recording, with these values; (N,)."""
+        loop = replace(Loop.of(recording, self.bandwidth_hz, self.way), follower=self.follower)
+        start = np.append(self.inside, [recording.position[0], 0.0])
+        return loop.error(start, self.uneven)
+
+
+def fit_motion(recording: Recording, feedback: Follower | None = None) -> MotionFit:
+    """Fit one mass with friction to a recording made in closed loop.
+
+    Parameters
+    ----------
+    recording : Recording
+    feedback : Follower, optional
+        The controller's feedback of the position, as a force for measured - simulated.  Unknown by
+        default: a spring and a damper as wide as the command's spectrum stand for it.
+
+    Returns
+    -------
+    MotionFit
+
+    Raises
+    ------
+    InputError
+        Where no motion of one mass can be found beside the measured one.
+    """
+    start = _inverse_dynamics(recording)
+    width = bandwidth_hz(recording.force, recording.period_s)
+    way = Way.of(recording.position)
+    loop = Loop.of(recording, width, way).led(feedback, start)
+    first = _fit(loop, start, recording.name)
+    second = _fit(loop.led(None, start, _OTHER), first.inside, recording.name)
+    apart = (second.values - first.values)[: len(NAMES)]
+    spread = first.covariance[: len(NAMES), : len(NAMES)] + np.outer(apart, apart)
+    for index in (NAMES.index("coulomb"), NAMES.index("offset")):
+        spread[index, index] += 0.5 * mean_of_uneven(first.found)
+    assert loop.follower is not None
+    return MotionFit(
+        first.values[: len(NAMES)],
+        first.inside[: len(NAMES)],
+        spread,
+        width,
+        float(np.sqrt(np.mean(first.error**2))),
+        float(np.sqrt(np.mean((first.uneven.reshape(2, WAVES) @ loop.shapes) ** 2))),
+        first.converged and second.converged,
+        loop.position - first.error,
+        first.uneven,
+        way,
+        loop.follower,
+    )
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A fit with one follower; shapes (7,), (7,), (2 WAVES,), (7, 7), (N,)."""
+
+    values: Floats
+    inside: Floats
+    uneven: Floats
+    covariance: Floats
+    error: Floats
+    found: Ridge
+    converged: bool
+
+
+def _fit(loop: Loop, start: Floats, name: str) -> _Found:
+    """Gauss-Newton steps, first without the uneven force, then with it."""
+    values, uneven = start, np.zeros(2 * WAVES)
+    for with_waves in (False, True):
+        converged = False
+        for _ in range(_STEPS):
+            error, columns, solved = _linearised(loop, values, uneven, with_waves, name)
+            better = _step(loop, values, uneven, error, solved)
+            if better is None:
+                converged = True
+                break
+            values, uneven, gain = better
+            if gain < 1e-4:
+                converged = True
+                break
+    error, columns, solved = _linearised(loop, values, uneven, True, name)
+    left = error + columns[:, PLAIN:] @ uneven - columns @ solved.solution
+    spread = covariance(columns, left, solved, loop.independent)[:PLAIN, :PLAIN]
+    best = values + solved.solution[:PLAIN]
+    return _Found(best, values, uneven, spread, error, solved, converged)
+
+
+def _linearised(
+    loop: Loop, values: Floats, uneven: Floats, with_waves: bool, name: str
+) -> tuple[Floats, Floats, Ridge]:
+    """The error, its slopes, and the linear problem's solution for the step and all waves."""
+    error = loop.error(values, uneven)
+    columns = loop.columns(values, uneven, error)
+    if not (np.all(np.isfinite(error)) and np.all(np.isfinite(columns))):
+        raise InputError(f"{name}: no motion of one mass stays near the measured one")
+    if not with_waves:
+        columns[:, PLAIN:] = 0.0
+    size = float(np.std(loop.force))
+    target = error + columns[:, PLAIN:] @ uneven
+    return error, columns, ridge(columns, target, PLAIN, size, loop.independent)
+
+
+def _step(
+    loop: Loop, values: Floats, uneven: Floats, error: Floats, solved: Ridge
+) -> tuple[Floats, Floats, float] | None:
+    """As much of the step as lowers the penalised error, and by which share; None where none."""
+    penalty = solved.share[PLAIN:]
+    before = float(error @ error + penalty @ uneven**2)
+    share = 1.0
+    for _ in range(6):
+        trial = np.maximum(values + share * solved.solution[:PLAIN], LOWEST)
+        trial[0] = np.clip(trial[0], 0.5 * values[0], 2 * values[0])
+        more = uneven + share * (solved.solution[PLAIN:] - uneven)
+        left = loop.error(trial, more)
+        after = float(left @ left + penalty @ more**2)
+        if after < before:
+            return trial, more, 1 - after / before
+        share *= 0.4
+    return None
+
+
+def _inverse_dynamics(recording: Recording) -> Floats:
+    """Where to begin, shape (7,): least squares of the force on the filtered motion."""
+    from scipy.signal import butter, sosfiltfilt
+
+    force, position, period_s = recording.force, recording.position, recording.period_s
+    low = butter(4, 2 * _BAND, output="sos")
+    x = sosfiltfilt(low, position)
+    v = np.gradient(x, period_s)
+    sign = np.tanh(v / (0.02 * np.std(v)))
+    columns = np.stack([np.gradient(v, period_s), v, sosfiltfilt(low, sign), np.ones_like(v)], 1)
+    mass, damping, dry, offset = np.linalg.lstsq(columns, sosfiltfilt(low, force), rcond=None)[0]
+    if not mass > 0:
+        mass = np.std(force) / np.std(columns[:, 0])
+    start = [mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, 0.5 * period_s, position[0], 0]
+    return np.array(start, dtype=np.float64)

@@ -1,0 +1,134 @@
+"""A force that changes along the way, in each direction: how large it is, from the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.types import Floats
+
+WAVES = 12  # half waves along the way, a direction
+_LENGTHS = (1.0, 3.0, 8.0)  # waves from which they are smaller
+_SIZES = (1e-5, 1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6)  # of the command's rms
+_ROUNDS = 15
+
+
+@dataclass(frozen=True)
+class Way:
+    """Where a recording has been: the lowest and the highest position."""
+
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, position: Floats) -> Way:
+        return cls(float(position.min()), float(position.max()))
+
+
+def waves(position: Floats, way: Way) -> Floats:
+    """cos(pi j s), j from 1, over the share s of the way; shape (WAVES, N).
+
+    Their mean over the way is zero: constant force and dry friction are means over it.
+    """
+    share = np.clip((position - way.low) / (way.high - way.low), 0.0, 1.0)
+    return np.asarray(np.cos(np.pi * np.arange(1, WAVES + 1)[:, None] * share))
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """A linear fit in which some columns have normal priors.
+
+    Attributes
+    ----------
+    solution : ndarray, shape (C,)
+    inverse : ndarray, shape (C, C)
+        Of columns' column + the priors' share.
+    share : ndarray, shape (C,)
+        That share: noise variance over prior variance; 0 without a prior.
+    prior : ndarray, shape (C,)
+        Prior variances; 0 without a prior.
+    used : float
+        Effective number of columns.
+    """
+
+    solution: Floats
+    inverse: Floats
+    share: Floats
+    prior: Floats
+    used: float
+
+
+def ridge(columns: Floats, target: Floats, plain: int, size: float, effective: float) -> Ridge:
+    """Fit `target`, with prior variances by the largest marginal likelihood.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (N, C)
+        The first `plain` have no prior, the others are `waves` forward and then backward.
+    target : ndarray, shape (N,)
+    plain : int
+    size : float
+        Of the command, which the priors are scaled by.
+    effective : float
+        Number of independent samples that the N are worth.
+    """
+    gram, along = columns.T @ columns, columns.T @ target
+    scale = np.sqrt(np.diag(gram))
+    scale[scale == 0] = 1.0
+    gram, along = gram / np.outer(scale, scale), along / scale
+    found = _Evidence(gram, along, scale, plain, float(target @ target), len(target), effective)
+    order = np.tile(np.arange(1, WAVES + 1), 2)
+    best, prior, noise = -np.inf, np.zeros(0), 0.0
+    for length in _LENGTHS:
+        shape = 1 / (1 + (order / length) ** 2)
+        shape *= 2 / shape.sum()
+        for share in _SIZES:
+            variances = (share * size) ** 2 * shape
+            evidence, at_best = found(variances)
+            if evidence > best:
+                best, prior, noise = evidence, variances, at_best
+    weight = np.zeros(len(scale))
+    weight[plain:] = found.thin * noise / prior
+    inverse = np.linalg.inv(gram + np.diag(weight / scale**2 + 1e-12))
+    used = float(np.trace(inverse @ gram))
+    variances = np.append(np.zeros(plain), prior)
+    solution = inverse @ along / scale
+    return Ridge(solution, inverse / np.outer(scale, scale), weight, variances, used)
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """Marginal likelihood of prior variances, the noise at its best."""
+
+    gram: Floats
+    along: Floats
+    scale: Floats
+    plain: int
+    power: float
+    samples: int
+    effective: float
+
+    @property
+    def thin(self) -> float:
+        return self.samples / self.effective
+
+    def __call__(self, prior: Floats) -> tuple[float, float]:
+        """Log evidence up to a constant, and the noise variance."""
+        weight = np.zeros(len(self.scale))
+        noise = 0.1 * self.power / self.samples
+        freedom = max(float(self.effective) - self.plain, 1.0)
+        for _ in range(_ROUNDS):
+            weight[self.plain :] = self.thin * noise / prior
+            full = self.gram + np.diag(weight / self.scale**2 + 1e-12)
+            left = self.power - float(self.along @ np.linalg.solve(full, self.along))
+            new = max(left, 1e-12 * self.power) / self.samples * self.effective / freedom
+            settled = abs(new / noise - 1) < 1e-3
+            noise = new
+            if settled:
+                break
+        weight[self.plain :] = 1 / prior
+        full = self.gram / (self.thin * noise) + np.diag(weight / self.scale**2)
+        full += 1e-16 * np.eye(len(full))
+        determinant = np.linalg.slogdet(full)[1] + np.log(prior).sum()
+        return float(-0.5 * self.effective * np.log(noise) - 0.5 * determinant), float(noise)

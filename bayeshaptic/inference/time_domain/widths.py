@@ -1,0 +1,58 @@
+"""How far estimates may be off where the residual is correlated, and not of the noise's shape."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge
+from bayeshaptic.types import Floats
+
+FREEDOM = 8  # cosines, and so degrees of freedom
+_SMOOTH, _FEWEST = 0.35, 6  # lines either side of one, as a share of its number, and at least
+
+
+def covariance(columns: Floats, residual: Floats, found: Ridge, effective: float) -> Floats:
+    """Covariance of the solution, shape (C, C).
+
+    The sum of three parts: what slow correlation does (the scores' long-run variance from
+    their lowest cosines: E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, Journal of Business
+    and Economic Statistics 36, 2018), what a stationary residual of that spectrum does, and what
+    the priors leave open.
+    """
+    inner = found.inverse
+    lost = effective / max(effective - found.used, 0.2 * effective)
+    slow = inner @ _cosines(columns, residual).T
+    still = inner @ _stationary(columns, residual) @ inner
+    held = inner * found.share
+    return lost * (slow @ slow.T / FREEDOM + still) + (held * found.prior) @ held.T
+
+
+def mean_of_uneven(found: Ridge) -> float:
+    """Variance of the mean of a force with that prior over the way, as far as it is not known.
+
+    That of its longest half wave: how much of it lies in the constant is a matter of where the
+    way happens to begin and to end.
+    """
+    return float(found.prior[-WAVES])
+
+
+def _cosines(columns: Floats, residual: Floats) -> Floats:
+    """The scores' lowest cosine coefficients, shape (FREEDOM, C)."""
+    middle = (np.arange(len(residual)) + 0.5) / len(residual)
+    order = np.arange(1, FREEDOM + 1)[:, None]
+    return np.asarray((np.sqrt(2) * np.cos(np.pi * order * middle) * residual) @ columns)
+
+
+def _stationary(columns: Floats, residual: Floats) -> Floats:
+    """Variance of the scores for a residual that is independent of the columns, shape (C, C)."""
+    count = len(residual)
+    taper = np.sqrt(8 / 3) * np.hanning(count)
+    power = np.abs(np.fft.rfft(residual * taper)) ** 2 / count
+    line = np.arange(len(power))
+    half = np.maximum(_FEWEST, (_SMOOTH * line).astype(int))
+    low, high = np.maximum(line - half, 0), np.minimum(line + half + 1, len(power))
+    sums = np.append(0.0, np.cumsum(power))
+    smooth = (sums[high] - sums[low]) / (high - low)
+    weight = np.where(line == 0, 1.0, 2.0) * smooth / count
+    spectra = np.fft.rfft(columns * taper[:, None], axis=0)
+    return np.asarray(((spectra.conj() * weight[:, None]).T @ spectra).real)

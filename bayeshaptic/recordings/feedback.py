@@ -1,0 +1,70 @@
+"""Feedback: whether a recording has it, and the controller, as far as it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from bayeshaptic.devices.table import Table
+from bayeshaptic.errors import InputError, Notice
+
+_KEYS = ("law", "proportional", "derivative", "integral", "filter_hz")
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """The law u[k] = ... - P y[k] - I T sum y - D d[k] of a PID controller.
+
+    d is the first difference of the position over the period, low-passed:
+    d[k] = a d[k-1] + (1 - a) (y[k] - y[k-1]) / T with a = exp(-2 pi filter_hz T).  What it follows
+    need not be known.
+
+    Attributes
+    ----------
+    proportional : float
+        Force over position.
+    derivative : float
+        Force over velocity.
+    integral : float
+        Force over the integral of position, a second.
+    filter_hz : float or None
+        None: the difference is not filtered.
+    """
+
+    proportional: float
+    derivative: float = 0.0
+    integral: float = 0.0
+    filter_hz: float | None = None
+
+
+def has_feedback(notices: Iterable[Notice]) -> bool:
+    """Whether a warning says that the force was computed from the motion."""
+    return any(n.topic == "feedback" and n.level == "warning" for n in notices)
+
+
+def told(feedback: Feedback | None, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+    """`notices`, with the warning where feedback was declared and nothing in the data shows it."""
+    if feedback is None or has_feedback(notices):
+        return notices
+    text = "The force was computed from the motion: [feedback] says by which controller."
+    return (*notices, Notice("warning", "feedback", text))
+
+
+def read_feedback(content: object, where: str) -> Feedback | None:
+    """The ``[feedback]`` table of a study; None without one.
+
+    Raises
+    ------
+    InputError
+        For another law than "pid", no proportional gain, and unknown or impossible values.
+    """
+    if content is None:
+        return None
+    table = Table(content, where, known=_KEYS)
+    table.text("law", ("pid",))
+    proportional = table.number("proportional")
+    if proportional is None:
+        raise InputError(f"{where} needs a proportional gain, in force over position")
+    derivative, integral = (table.number(key) or 0.0 for key in ("derivative", "integral"))
+    filter_hz = table.number("filter_hz", lowest=0.0, above=True)
+    return Feedback(proportional, derivative, integral, filter_hz)

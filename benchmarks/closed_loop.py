@@ -1,0 +1,214 @@
+"""Recordings made in closed loop: how often the intervals hold what the bench was.
+
+    python -m benchmarks.closed_loop [COUNT]
+
+Rigid devices of 0.1 to 10 kg under five controllers and four kinds of references, 2 to 30 s.  In
+seven of ten there is a force that depends on the position, and friction that changes along the way,
+differs between the directions, and fades near standstill: none of these is a law of the model.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.inference.time_domain.widths import FREEDOM
+from bayeshaptic.models import rigid
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.rig import Bench, run_loop
+from bayeshaptic.rig.effects import Effect
+from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.types import Floats
+
+PERIOD_S = 1e-3
+CONTROLLERS = ("P", "PD", "PI", "PID", "PD, filtered")
+REFERENCES = ("steps", "ramps", "noise", "trajectory")
+WAVES = 6
+DRAWS = 600
+
+
+@dataclass(frozen=True)
+class Track(Effect):
+    """A force on the device that nobody commands: the last entry of a list that others write."""
+
+    name = "track"
+    force: tuple[list[float], ...] = ()
+
+    def command(self, force: Floats, progress: Floats, time_s: Floats) -> Floats:
+        return force + self.force[0][0]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recording, and the truth in the order of `NAMES`."""
+
+    recording: Recording
+    truth: Floats
+    what: str
+
+
+def reference(kind: str, count: int, stroke: float, rng: np.random.Generator) -> Floats:
+    """What the controller follows, shape (count,)."""
+    if kind == "noise":
+        from scipy.signal import butter, sosfilt
+
+        low = butter(2, rng.uniform(2, 8), fs=1 / PERIOD_S, output="sos")
+        wander = sosfilt(low, rng.standard_normal(count + 2000))[2000:]
+        return wander / wander.std() * stroke * 0.5
+    pieces, last, total = [], 0.0, 0
+    while total < count:
+        length = int(rng.uniform(0.3, 0.9) / PERIOD_S)
+        pause = int(rng.uniform(0, 0.2) / PERIOD_S) if kind == "trajectory" else 0
+        goal = rng.uniform(-1, 1) * stroke
+        share = np.arange(1, length + 1) / length
+        shape = {
+            "steps": np.ones(length),
+            "ramps": share,
+            "trajectory": share**3 * (10 - 15 * share + 6 * share**2),
+        }[kind]
+        pieces.append(np.append(last + (goal - last) * shape, np.full(pause, goal)))
+        last, total = goal, total + length + pause
+    return np.concatenate(pieces)[:count]
+
+
+def gains(kind: str, mass: float, rng: np.random.Generator) -> tuple[float, ...]:
+    """Damping of the device, and P, D, I and what the velocity's filter keeps."""
+    if kind in ("P", "PI"):  # the device itself must damp the loop
+        rate = rng.uniform(6, 25)
+        omega = rate / (2 * rng.uniform(0.25, 0.7))
+        derivative = 0.0
+    else:
+        rate = np.exp(rng.uniform(np.log(2), np.log(20)))
+        omega = 2 * np.pi * rng.uniform(2, 12)
+        derivative = max(2 * rng.uniform(0.4, 1) * mass * omega - mass * rate, 0.0)
+    spring = mass * omega**2
+    integral = spring * omega * rng.uniform(0.05, 0.15) if "I" in kind else 0.0
+    filtered = kind in ("PID", "PD, filtered")
+    keep = np.exp(-2 * np.pi * rng.uniform(60, 200) * PERIOD_S) if filtered else 0.0
+    return mass * rate, spring, derivative, integral, keep
+
+
+def make(seed: int) -> Case:
+    """One recording; controllers and references in turn."""
+    rng = np.random.default_rng(seed)
+    controller = CONTROLLERS[seed % 5]
+    kind = REFERENCES[seed // 5 % 4]
+    seconds = float(np.exp(rng.uniform(np.log(2), np.log(30))))
+    mass = float(np.exp(rng.uniform(np.log(0.1), np.log(10))))
+    stroke = rng.uniform(0.02, 0.1)
+    damping, spring, derivative, integral, keep = gains(controller, mass, rng)
+    wanted = reference(kind, round(seconds / PERIOD_S), stroke, rng)
+    size = spring * stroke * (0.1 if kind == "trajectory" else 0.3)
+    dry = 0.0 if rng.uniform() < 0.35 else rng.uniform(0.03, 0.3) * size
+    uneven = 0.0 if rng.uniform() < 0.3 else rng.uniform(0.01, 0.06) * size
+    offset = rng.uniform(-0.1, 0.1) * size
+    apart = rng.uniform(-0.3, 0.3) * dry if uneven else 0.0
+    delay = rng.uniform(0, 2) * PERIOD_S
+    phase = rng.uniform(0, 2 * np.pi, (3, WAVES))
+    height = rng.standard_normal((3, WAVES)) / np.sqrt(np.arange(1, WAVES + 1))
+    height /= np.sqrt(np.sum(height**2, axis=1) / 2)[:, None]
+    height *= np.array([uneven, 0.25 * dry * bool(uneven), 0.25 * dry * bool(uneven)])[:, None]
+    number = 0.7 * np.pi * np.arange(1, WAVES + 1) / stroke
+    slow = 0.02 * stroke * np.sqrt(spring / mass)
+
+    def along(which: int, position: Floats | float) -> Floats:
+        """Force along the way; 0: as such, 1 and 2: of friction, forward and backward."""
+        at = np.asarray(position)[..., None] * number + phase[which]
+        return np.asarray(np.sum(height[which] * np.sin(at), axis=-1))
+
+    force = [offset]
+    now = dict.fromkeys(("position", "velocity", "sum", "smooth"), 0.0)
+
+    def control(k: int, position: float) -> float:
+        rate = (position - now["position"]) / PERIOD_S if k else 0.0
+        now["position"] = position
+        now["velocity"] = keep * now["velocity"] + (1 - keep) * rate
+        now["sum"] += (wanted[k] - position) * PERIOD_S
+        now["smooth"] = 0.8 * now["smooth"] + 0.2 * rate
+        moving = float(np.clip(now["smooth"] / slow, -1, 1))
+        friction = float(along(1 if moving > 0 else 2, position))
+        force[0] = offset + float(along(0, position)) - moving * friction - abs(moving) * apart
+        follow = spring * (wanted[k] - position)
+        return float(follow - derivative * now["velocity"] + integral * now["sum"])
+
+    bench = Bench(
+        "rigid",
+        {"m": mass, "b": damping},
+        delay_s=delay,
+        encoder_resolution=10 ** rng.uniform(-6.3, -5),
+    ).with_effect(Track((force,)))
+    if dry:
+        bench = bench.with_effect("coulomb_friction", force=dry)
+    done = run_loop(bench, control, seconds, seed=seed, give_up=100 * stroke)
+    way = np.linspace(done.position.min(), done.position.max(), 400)
+    mean, forward, backward = (float(along(which, way).mean()) for which in range(3))
+    truth = np.array(
+        [
+            mass,
+            damping,
+            dry + (forward + backward) / 2,
+            -offset - mean + (forward - backward) / 2 + apart,
+            delay,
+        ]
+    )
+    recording = recording_from_arrays(done.force, done.position, PERIOD_S, name=f"seed {seed}")
+    return Case(recording, truth, f"{controller}, {kind}, {seconds:.1f} s")
+
+
+def limit_draws(case: Case, values: Floats, covariance: Floats, seed: int) -> Floats:
+    """K_CR of the truth, then of draws from the posterior; inf alone where there are none."""
+    rng = np.random.default_rng(seed)
+    sd = np.sqrt(np.diag(covariance))
+    root = np.linalg.cholesky(covariance / np.outer(sd, sd) + 1e-9 * np.eye(len(sd)))
+    count = 10 * DRAWS
+    stretch = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, count))[:, None]
+    drawn = values + sd * (rng.standard_normal((count, len(sd))) @ root.T) * stretch
+    prior = np.exp(-0.5 * (drawn[:, 4] / (2 * PERIOD_S)) ** 2)
+    kept = np.all(drawn[:, [0, 1, 2, 4]] > 0, axis=1) & (rng.uniform(size=count) < prior)
+    theta = np.concatenate([case.truth[None], drawn[kept][:DRAWS]])[:, [0, 1, 4]]
+    return critical_stiffness(rigid(period_s=PERIOD_S), theta).samples
+
+
+def main(count: int) -> None:
+    """Print the coverage of every parameter and of K_CR."""
+    from scipy.stats import t as student
+
+    reach = student.ppf(0.95, FREEDOM)
+    inside, ranks, widths, seconds = [], [], [], 0.0
+    for seed in range(100, 100 + count):
+        case = make(seed)
+        began = time.process_time()
+        try:
+            found = fit_motion(case.recording)
+        except InputError as error:
+            print(error)
+            continue
+        seconds += time.process_time() - began
+        inside.append(np.abs(found.values - case.truth) < reach * found.sd)
+        limits = limit_draws(case, found.values, found.covariance, seed)
+        if len(limits) > DRAWS // 10:
+            ranks.append(float(np.mean(limits[1:] < limits[0])))
+            low, high = np.quantile(limits[1:], [0.05, 0.95])
+            widths.append(float(20 * np.log10(high / low)))
+        print(f"seed {seed}: {case.what}")
+    print(f"{len(inside)} recordings, {seconds / len(inside):.2f} s of CPU time each")
+    for name, share in zip(NAMES, np.mean(inside, axis=0), strict=True):
+        print(f"{name:8s} 90 % interval holds the truth in {100 * share:.0f} %")
+    rank, width = np.array(ranks), np.array(widths)
+    for widest in (np.inf, 6.0, 3.0):
+        some = rank[width < widest]
+        held = np.mean((some > 0.05) & (some < 0.95))
+        print(
+            f"K_CR, intervals under {widest:g} dB ({len(some)}): holds the truth in "
+            f"{100 * held:.0f} %, lies above it in {100 * np.mean(some <= 0.05):.0f} %"
+        )
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 200)

@@ -1,0 +1,129 @@
+"""Recordings in closed loop: the bench's loops, followed and fitted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.inference.time_domain.follower import pid
+from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood
+from bayeshaptic.inference.time_domain.loop import Loop
+from bayeshaptic.inference.time_domain.model import rigid_with_friction
+from bayeshaptic.inference.time_domain.uneven import WAVES, Way
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.feedback import Feedback
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report.headline import headline
+from bayeshaptic.rig import Bench, run_loop
+
+TRUTH = {"m": 2.0, "b": 12.0, "coulomb": 1.5, "offset": -0.4, "delay_s": 0.7e-3}
+GAINS = (3000.0, 110.0, 4000.0, 150.0)  # of the PID controller; the last is its filter's, Hz
+
+
+def in_loop(seconds: float, friction: float, resolution: float, offset: float = 0.0) -> Recording:
+    """A rigid device under a PID controller that moves it from place to place."""
+    bench = Bench(
+        "rigid",
+        {"m": TRUTH["m"], "b": TRUTH["b"]},
+        delay_s=TRUTH["delay_s"],
+        encoder_resolution=resolution,
+    )
+    if friction:
+        bench = bench.with_effect("coulomb_friction", force=friction)
+    spring, damper, integral, filter_hz = GAINS
+    keep = np.exp(-2 * np.pi * filter_hz * 1e-3)
+    now = {"position": 0.0, "velocity": 0.0, "sum": 0.0}
+    places = np.append(0.0, np.random.default_rng(1).uniform(-0.04, 0.04, 100))
+    share = np.arange(300) / 300
+    shape = share**3 * (10 - 15 * share + 6 * share**2)
+    path = (places[:-1, None] + np.diff(places)[:, None] * shape).ravel()
+
+    def controller(k: int, position: float) -> float:
+        wanted = path[k]
+        rate = (position - now["position"]) / 1e-3 if k else 0.0
+        now["velocity"] = keep * now["velocity"] + (1 - keep) * rate
+        now["position"] = position
+        now["sum"] += (wanted - position) * 1e-3
+        return float(
+            spring * (wanted - position) - damper * now["velocity"] + integral * now["sum"]
+        )
+
+    done = run_loop(bench, controller, seconds)
+    # A constant force on the device is a constant in the command that nobody feels.
+    return recording_from_arrays(done.force + offset, done.position, period_s=1e-3)
+
+
+def declared(recording: Recording) -> Recording:
+    return replace(recording, feedback=Feedback(*GAINS))
+
+
+def test_the_simulated_motion_is_the_benchs() -> None:
+    recording = in_loop(1.0, friction=0.0, resolution=0.0)
+    loop = Loop.of(recording, 10.0, Way.of(recording.position))
+    loop = replace(loop, follower=pid(*GAINS, 1e-3))
+    values = np.array([TRUTH["m"], TRUTH["b"], 0.0, 0.0, TRUTH["delay_s"], 0.0, 0.0])
+    error = loop.error(values, np.zeros(2 * WAVES))
+    assert np.abs(error).max() < 1e-10 * np.ptp(recording.position)
+
+
+def test_dry_friction_sticks_and_slips_as_on_the_bench() -> None:
+    recording = in_loop(1.0, friction=TRUTH["coulomb"], resolution=0.0)
+    loop = Loop.of(recording, 10.0, Way.of(recording.position))
+    loop = replace(loop, follower=pid(*GAINS, 1e-3))
+    values = np.array([*TRUTH.values(), 0.0, 0.0])
+    values[3] = 0.0
+    error = loop.error(values, np.zeros(2 * WAVES))
+    without = loop.error(values * (np.arange(7) != 2), np.zeros(2 * WAVES))
+    # The bench's steps are an eighth of a period, ours are exact.
+    assert np.std(error) < 1e-3 * np.std(without)
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["unknown controller", "declared"])
+def test_the_fit_covers_what_the_bench_was(known: bool) -> None:
+    recording = in_loop(2.5, TRUTH["coulomb"], 2e-6, TRUTH["offset"])
+    follower = pid(*GAINS, 1e-3) if known else None
+    found = fit_motion(recording, follower)
+    truth = np.array([TRUTH[name] for name in NAMES])
+    truth[3] = TRUTH["offset"]
+    assert found.converged
+    assert np.all(np.abs(found.values - truth) < 4.5 * found.sd)  # 1 in 500, 8 degrees of freedom
+    assert np.all(found.sd[:3] < [0.02, 0.5, 0.2])
+    assert found.error_rms < 1e-4 * np.ptp(recording.position)
+
+
+def test_the_likelihood_is_a_students_t_around_the_fit() -> None:
+    recording = in_loop(2.0, TRUTH["coulomb"], 2e-6)
+    motion = fit_motion(recording)
+    model = rigid_with_friction(recording, motion)
+    likelihood = MotionLikelihood(model, motion)
+    assert model.names == NAMES
+    steps = motion.values + np.outer([0.0, 2.0], motion.sd)
+    peak, away = likelihood(steps)
+    distance = 2.0 * motion.sd @ np.linalg.solve(motion.covariance, 2.0 * motion.sd)
+    assert peak == pytest.approx(0.0, abs=1e-6)
+    assert away == pytest.approx(-6.5 * np.log1p(distance / 8), rel=1e-4)
+    known = rigid_with_friction(recording, motion, delay_s=1e-3, delay_sd_s=0.0)
+    held = MotionLikelihood(known, motion)(motion.values[None, :4])
+    assert held == pytest.approx(likelihood(np.append(motion.values[:4], 1e-3)[None]))
+
+
+def test_a_recording_in_closed_loop_has_a_limit() -> None:
+    recording = declared(in_loop(4.0, TRUTH["coulomb"], 2e-6))
+    closed = close_loop("rigid", recording, ess=600)
+    analysis = closed.analysis
+    assert analysis.in_loop is not None
+    assert analysis.posterior.converged
+    truth = Bench(
+        "rigid", {"m": TRUTH["m"], "b": TRUTH["b"]}, delay_s=TRUTH["delay_s"]
+    ).true_critical_stiffness()
+    assert analysis.limit.quantile(0.005) < truth < analysis.limit.quantile(0.995)
+    assert closed.verdict == "explained"
+    assert headline(closed).status == "caution"
+    # Nobody said that it is one mass: its modes are not known.
+    auto = close_loop("auto", recording, ess=600)
+    assert headline(auto).status == "untrusted"
+    assert "where a mode may set a lower limit" in headline(auto).sentence
