@@ -113,7 +113,7 @@ def test_the_likelihood_is_a_students_t_around_the_fit() -> None:
 
 def test_a_recording_in_closed_loop_has_a_limit() -> None:
     recording = declared(in_loop(4.0, TRUTH["coulomb"], 2e-6))
-    closed = close_loop("rigid", recording, ess=600)
+    closed = close_loop(recording, "rigid", ess=600)
     analysis = closed.analysis
     assert analysis.in_loop is not None
     assert analysis.posterior.converged
