@@ -74,6 +74,10 @@ class Fit:
     def likelihood(self) -> Likelihood:
         return Likelihood(self.model, self.windows)
 
+    def at(self, theta: Floats) -> Fit:
+        """The fit of the same data at other values, shape (P,)."""
+        return summarise(self.model, self.windows, theta, self.starts)
+
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
         """The fitted sampled response at `frequency_hz`, shape (L,)."""
         return self.model.response(self.theta, frequency_hz)

@@ -14,7 +14,6 @@ from bayeshaptic.inference.least_squares import (
     REACH_SDS,
     Fit,
     least_squares,
-    summarise,
     weighted_residuals,
 )
 from bayeshaptic.inference.posterior import Posterior
@@ -159,7 +158,7 @@ def _converged(fit: Fit) -> Fit:
     start = here.coordinate(fit.theta[None])
     residuals = weighted_residuals(fit.likelihood, here)
     phi, _ = minimise(residuals, start, low, high, _POLISH, _SETTLED)
-    return summarise(fit.model, fit.windows, here.natural(phi)[0], fit.starts)
+    return fit.at(here.natural(phi)[0])
 
 
 def _run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -78,6 +78,9 @@ class InLoopFit(Fit):
     def likelihood(self) -> MotionLikelihood:  # type: ignore[override]
         assert self.motion is not None
         return MotionLikelihood(self.model, self.motion)
+
+    def at(self, theta: Floats) -> InLoopFit:
+        return replace(self, theta=theta)
 
 
 def in_loop_fit(model: Model, etfe: Etfe, motion: MotionFit, held_out: float) -> InLoopFit:
