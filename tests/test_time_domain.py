@@ -124,6 +124,6 @@ def test_a_recording_in_closed_loop_has_a_limit() -> None:
     assert closed.verdict == "explained"
     assert headline(closed).status == "caution"
     # Nobody said that it is one mass: its modes are not known.
-    auto = close_loop("auto", recording, ess=600)
+    auto = close_loop(recording, "auto", ess=600)
     assert headline(auto).status == "untrusted"
     assert "where a mode may set a lower limit" in headline(auto).sentence
