@@ -75,7 +75,12 @@ class Fit:
         return Likelihood(self.model, self.windows)
 
     def at(self, theta: Floats) -> Fit:
-        """The fit of the same data at other values, shape (P,)."""
+        """The fit of the same data at other values.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (P,)
+        """
         return summarise(self.model, self.windows, theta, self.starts)
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
