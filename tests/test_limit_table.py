@@ -45,7 +45,7 @@ def test_json_is_strict_and_has_every_limit(table, one):
     assert (found["device"], found["status"], found["period_s"]) == ("lhifam", "safe", 1e-3)
     assert (found["stiffness_unit"], found["damping_unit"]) == ("N/m", "N s/m")
     assert found["stiffness"]["0.05"] == pytest.approx(one.limit.safe(0.05), rel=1e-5)
-    assert found["stiffness"]["0.001"] is None  # 2400 draws do not say it
+    assert found["stiffness"]["0.001"] == pytest.approx(one.limit.safe(0.001), rel=1e-5)
     assert [c["label"] for c in found["cases"]] == ["held"]
     backward, low_pass = found["boundaries"]
     assert (backward["damping_filter"], backward["cutoff_hz"]) == ("backward", None)
@@ -149,8 +149,8 @@ def test_small_risks_come_from_the_lowest_of_many_draws():
 
 
 def test_no_boundary_is_stated_where_the_stiffness_without_damping_is_not(one):
-    few = replace(one.limit, samples=one.limit.samples[:1000], chains=1)
-    found = limit_table([replace(one, draws=one.draws[:1000], limit=few)], [LowPass(80.0)])
+    few = replace(one.limit, samples=one.limit.samples[:60], chains=1)
+    found = limit_table([replace(one, draws=one.draws[:60], limit=few)], [LowPass(80.0)])
     for risk, stiffness in zip(found.risks, found.stiffness, strict=True):
         assert (found.filters[0].boundary(risk) is None) or stiffness is not None
     assert found.stiffness[found.risks.index(0.01)] is None

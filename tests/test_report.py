@@ -391,7 +391,7 @@ def test_an_interrupted_report_leaves_nothing_half_written(
         written(analysis, out)
         before = {path.name: path.read_bytes() for path in out.iterdir()}
 
-    def fail(result: Any) -> str:
+    def fail(*_: Any) -> str:
         raise error
 
     monkeypatch.setattr(write, "summary_json", fail)

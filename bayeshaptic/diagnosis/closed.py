@@ -15,13 +15,13 @@ from bayeshaptic.diagnosis.analysis import (
     begin,
     finish,
 )
+from bayeshaptic.diagnosis.base_model import traced_from_best_base
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
     trace_force,
 )
-from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.options import Options, measurement_of
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
@@ -136,7 +136,7 @@ def close_loop(
     if force is not None:  # the response is biased: whatever is traced in it may be the controller
         traced = trace_force(begun.etfe, begun.fit, force)
     else:
-        traced = trace(begun.etfe, begun.fit, chosen.within(0.05, 0.4).report, chosen.budget_s)
+        begun, traced = traced_from_best_base(begun, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
     if force is not None:
         one_mass = (model.name if isinstance(model, Model) else model) == "rigid"

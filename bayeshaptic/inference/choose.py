@@ -90,7 +90,9 @@ def choose_model(
         own = {key: value for key, value in (prior or {}).items() if key in model.names}
         fits[name] = least_squares(model.with_prior(own), etfe, seed=seed)
     noise = max(1.0, min(fit.reduced_chi_square for fit in fits.values()))
-    candidates = {name: Candidate(fit, _score(fit, noise)) for name, fit in fits.items()}
+    candidates = {
+        name: Candidate(fit, information_criterion(fit, noise)) for name, fit in fits.items()
+    }
     best = _best(candidates, noise)
     return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
 
@@ -111,10 +113,20 @@ def _best(candidates: Mapping[str, Candidate], noise: float) -> str:
     return best
 
 
-def _score(fit: Fit, noise: float) -> float:
+def information_criterion(fit: Fit, noise: float, further: int = 0) -> float:
+    """Bayesian information criterion of a fit; smaller is better.
+
+    Parameters
+    ----------
+    fit : Fit
+    noise : float
+        Factor on the noise variance (a quasi-likelihood where no model reaches the noise).
+    further : int
+        Parameters beside those of the fit's model.
+    """
     numbers = 2 * len(fit.residual)
     deviance = 2 * float(np.sum(np.abs(fit.residual) ** 2)) / noise
-    return deviance + fit.model.size * np.log(numbers)
+    return deviance + (fit.model.size + further) * float(np.log(numbers))
 
 
 def _reason(best: str, candidates: Mapping[str, Candidate], noise: float, held: bool | None) -> str:

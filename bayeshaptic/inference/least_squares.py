@@ -161,7 +161,10 @@ def search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
 
 
 def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[Floats], Floats]:
-    """Real residuals of unit variance, as a function of coordinates: (B, P) to (B, N)."""
+    """Real residuals of unit variance, as a function of coordinates: (B, P) to (B, N).
+
+    A window after the other, of each number the real part and then the imaginary one.
+    """
 
     def residuals(phi: Floats) -> Floats:
         left = likelihood.normalised(here.natural(phi))

@@ -208,12 +208,11 @@ def _information(model: Model, fit: Fit, theta: Floats, noise_scale: float) -> I
     residuals: Callable[[Floats], Floats] = weighted_residuals(likelihood, here)
     slopes = jacobian(residuals, here.coordinate(theta[None]))[0]
     count, nodes = fit.windows.target.shape
-    parts = slopes.reshape(2, count, nodes, model.size).transpose(1, 0, 2, 3)
     return Information(
         model,
         here,
         theta,
-        parts.reshape(count, 2 * nodes, model.size),
+        slopes.reshape(count, 2 * nodes, model.size),
         fit.windows.lines,
         fit.windows.frequency_hz.mean(axis=1),
         noise_scale,

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers.layout import find_layout
+from bayeshaptic.recordings.readers.layout import NUMBER, find_layout
 from bayeshaptic.recordings.readers.reader import MOST_TEXT, Arrays, Reader
 
 Lines = list[tuple[int, str]]
@@ -109,8 +109,15 @@ def _separator(lines: list[str]) -> str | None:
     sample = lines[len(lines) // 2 :][:50]
     for separator in ("\t", ";", ","):
         if 2 * sum(separator in line for line in sample) > len(sample):
-            return separator
+            # Numbers with decimal commas and blanks between them are no table of commas.
+            blanks = separator == "," and 2 * sum(map(_is_of_blanks, sample)) > len(sample)
+            return None if blanks else separator
     return None
+
+
+def _is_of_blanks(line: str) -> bool:
+    fields = line.split()
+    return len(fields) > 1 and all(map(NUMBER.fullmatch, fields))
 
 
 def _fields(line: str, separator: str | None) -> list[str]:

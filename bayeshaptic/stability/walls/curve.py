@@ -150,9 +150,9 @@ def inverse_curve(system: LinearSystem | EvaluableSystem, period_s: float) -> In
     for start in range(0, len(every), _CHUNK):
         rows = every[start : start + _CHUNK]
         value[rows] = -1 / response.at(rows, theta[rows])
-    return InverseCurve(
-        response, period_s, np.ones(len(every)), theta, value, -1 / response.at_ends()[1]
-    )
+    with np.errstate(divide="ignore"):  # without damping G may be zero there: no limit
+        nyquist = -1 / response.at_ends()[1]
+    return InverseCurve(response, period_s, np.ones(len(every)), theta, value, nyquist)
 
 
 def along_stiffness(curve: KbCurve, levels: Floats, lowest_above: Floats | None = None) -> Events:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.stability.tail import ENOUGH_BELOW
 from bayeshaptic.stability.walls.region import KbRegion, region_of_draws
 from bayeshaptic.types import Floats
 
@@ -71,7 +72,7 @@ def lower_tail(
         Down to which quantiles are wanted.
     """
     samples = case.limit.samples
-    if len(samples) != len(case.draws) or case.limit.safe(risk) is None:
+    if len(samples) != len(case.draws) or case.limit.effective_below(risk) < ENOUGH_BELOW:
         return None
     index = np.linspace(0, len(samples) - 1, min(len(samples), _MOST)).astype(int)
     possible = np.all(limits > 0, axis=0)  # near the ends the ends themselves tell

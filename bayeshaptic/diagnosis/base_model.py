@@ -1,0 +1,91 @@
+"""Which base model, when each of them may lack something.
+
+A mode or a spring that the right base model lacks can make a wrong one fit better: a second mode
+looks like a hand, a hand like a spring and a base that gives.  So where the base model that was
+chosen misfits, the loop is closed on the others, too, and they are compared with their effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bayeshaptic.diagnosis.analysis import Begun
+from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
+from bayeshaptic.inference.choose import information_criterion
+from bayeshaptic.inference.least_squares import MISFIT
+
+
+def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced]:
+    """Close the loop, on every base model in question where the chosen one misfits.
+
+    Parameters
+    ----------
+    begun : Begun
+    options : Options
+        Its progress is that of the loop.
+
+    Returns
+    -------
+    begun : Begun
+        With the base model whose explanation is the best.
+    traced : Traced
+    """
+    own = trace(begun.etfe, begun.fit, options.report, options.budget_s)
+    rivals = _rivals(begun)
+    if not rivals or not own.state.accepted or _is_the_least(own, begun, rivals):
+        return begun, own
+    found = {begun.fit.model.name: (begun, own)}
+    for name in rivals:
+        other = replace(begun, fit=begun.choice.candidates[name].fit)  # type: ignore[union-attr]
+        spent = options.budget_s / 2  # a wrong base finds much to try
+        found[name] = other, trace(other.etfe, other.fit, options.report, spent)
+    noise = max(1.0, min(t.state.fit.reduced_chi_square for _, t in found.values()))
+    best = min(found, key=lambda name: _rank(found[name][1], noise))
+    begun, traced = found[best]
+    assert begun.choice is not None
+    choice = replace(
+        begun.choice, fit=begun.fit, reason=begun.choice.reason + _said(best, found, noise)
+    )
+    return replace(begun, choice=choice), traced
+
+
+def _rivals(begun: Begun) -> tuple[str, ...]:
+    """The base models that could be instead: none where the chosen one fits, or was asked for.
+
+    A rigid device with a mode is a free one.
+    """
+    if begun.choice is None or begun.fit.reduced_chi_square < MISFIT:
+        return ()
+    chosen = begun.fit.model.name
+    return tuple(name for name in begun.choice.candidates if name not in (chosen, "rigid"))
+
+
+def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
+    """Whether one effect explains everything, on the simplest base model that there is."""
+    sizes = [begun.choice.candidates[name].fit.model.size for name in rivals if begun.choice]
+    simple = own.verdict == EXPLAINED and len(own.state.accepted) == 1
+    return simple and all(begun.fit.model.size < size for size in sizes)
+
+
+def _rank(traced: Traced, noise: float) -> tuple[bool, float]:
+    """What is explained comes first, then the information criterion."""
+    return traced.verdict == UNEXPLAINED, _criterion(traced, noise)
+
+
+def _criterion(traced: Traced, noise: float) -> float:
+    """BIC of the model with its effects; those beside the model count by their estimates."""
+    beside = sum(len(effect.estimates) for effect in traced.state.accepted)
+    return information_criterion(traced.state.fit, noise, beside)
+
+
+def _said(best: str, found: dict[str, tuple[Begun, Traced]], noise: float) -> str:
+    words = []
+    for name, (_, traced) in found.items():
+        effects = ", ".join(effect.title for effect in traced.state.accepted) or "no effect"
+        behind = _criterion(traced, noise) - _criterion(found[best][1], noise)
+        side = "worse" if behind > 0 else "lower"
+        compared = "" if name == best else f", BIC {abs(behind):,.0f} {side}"
+        words.append(f"{name} with {effects} ({traced.verdict}{compared})")
+    return f" With what each of them lacks, {best} explains the most: {'; '.join(words)}."
