@@ -48,6 +48,12 @@ def test_an_unknown_device_is_found_from_the_data_alone(device, held):
         assert abs(error) < 5 * fit.sd[index], name
 
 
+def test_any_set_of_starts_leads_to_the_same_optimum():
+    etfe, _ = measured("phantom", True, seed=4)
+    fits = [bh.least_squares(bh.grasped(), etfe, seed=s) for s in range(8)]
+    assert max(fit.reduced_chi_square for fit in fits) < 1.25
+
+
 def test_a_parameter_at_its_bound_has_no_error_bar():
     etfe, _ = measured("phantom", False, seed=2)
     fits = [bh.least_squares(bh.free(device="phantom"), etfe, seed=s) for s in range(2)]

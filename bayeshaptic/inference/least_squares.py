@@ -22,7 +22,10 @@ from bayeshaptic.types import Floats
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
 REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
-_KEPT_STARTS = 24
+# Before a start is in its valley its cost says little of how deep that is, and many of those that
+# reach the deepest need more than 15 steps: with 24 starts of 15 steps, one fit in 20 of a held
+# Phantom without a device file ended in another valley.
+_KEPT_STARTS, _STEPS_TO_A_VALLEY = 48, 40
 _REWINDOWINGS = 2
 
 
@@ -192,7 +195,7 @@ def _best_of_many(
         phi, cost = minimise(residuals, phi, low, high, steps=5, tolerance=1e-2)
         order = np.argsort(cost)
     phi = phi[order[:_KEPT_STARTS]]
-    phi, cost = minimise(residuals, phi, low, high, steps=15, tolerance=1e-2)
+    phi, cost = minimise(residuals, phi, low, high, _STEPS_TO_A_VALLEY, tolerance=1e-2)
     phi = phi[np.argsort(cost + penalty(phi))[:6]]
     return minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
 
