@@ -459,14 +459,14 @@ class TestReport:
         status, _, err = run(
             "report", phantom, "--model", "free", "--device", "phantom", "--delay-s", "2e-4",
             "--delay-sd-s", "1e-5", "--band", "1,150", "--encoder-resolution", "1e-3",
-            "--seed", "7", *extra,
+            "--seed", "7", "--held", "no", *extra,
         )  # fmt: skip
         assert status == 2 and "seen enough" in err
         assert seen["model"] == "free" and seen["device"].name == "phantom" and seen["seed"] == 7
         assert (seen["delay_s"], seen["delay_sd_s"]) == (2e-4, 1e-5)
         assert seen["band_hz"] == (1.0, 150.0)
         assert seen["measurement"].encoder_resolution == 1e-3
-        assert seen["measurement"].device == "phantom" and seen["held"] is None
+        assert seen["measurement"].device == "phantom" and seen["held"] is False
 
     @pytest.fixture
     def three(self, phantom: Path, tmp_path: Path) -> Path:

@@ -141,6 +141,12 @@ def add_analysis_options(parser: argparse.ArgumentParser) -> None:
         help="frequencies used, in Hz (default: chosen from the data)",
     )
     analysis.add_argument(
+        "--held",
+        choices=("yes", "no"),
+        help="whether somebody held the device: then the base model is chosen among those of held, "
+        "or of free, devices (default: from the data; of a study, from its users)",
+    )
+    analysis.add_argument(
         "--no-loop",
         action="store_true",
         help="take the model as it is, without looking for what it lacks: quicker, and the limit "
@@ -196,6 +202,7 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         seed=arguments.seed,
         budget_s=arguments.budget,
         close_loop=not arguments.no_loop,
+        held=None if arguments.held is None else arguments.held == "yes",
         allow_outside=arguments.allow_outside,
         rows=arguments.rows,
         seconds=arguments.seconds,

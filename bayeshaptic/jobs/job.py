@@ -28,6 +28,8 @@ class Settings:
     seed : int
     budget_s : float
         What looking for it may cost, in nominal seconds.
+    held : bool or None
+        Whether somebody held the device; of a study its users say so.
     close_loop : bool
         Whether to look for what the model lacks.
     allow_outside : bool
@@ -47,6 +49,7 @@ class Settings:
     seed: int = 0
     budget_s: float = BUDGET_S
     close_loop: bool = True
+    held: bool | None = None
     allow_outside: bool = False
     rows: tuple[float | None, float | None] | None = None
     seconds: tuple[float | None, float | None] | None = None

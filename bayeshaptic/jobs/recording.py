@@ -66,6 +66,7 @@ def _report(
         band_hz=settings.band_hz,
         seed=settings.seed,
         budget_s=settings.budget_s,
+        held=settings.held,
         progress=progress,
     )
     run = close_loop if settings.close_loop else analyse

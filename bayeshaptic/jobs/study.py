@@ -154,7 +154,6 @@ def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:
 
 
 def _read(job: Job) -> Study:
-
     refuse_file(job.folder)
     for option in ("rows", "seconds"):
         if getattr(job.settings, option) is not None:
@@ -162,6 +161,10 @@ def _read(job: Job) -> Study:
                 f"--{option} is for a single recording; for a study write {option} = [A, B] in "
                 f"{job.source}, beside the recording's file"
             )
+    if job.settings.held is not None:
+        raise InputError(
+            f"--held is for a single recording; in {job.source}, who held the device is its user"
+        )
     for option in ("columns", "period_s", "encoder_resolution"):
         if getattr(job.settings, option) is not None:
             raise InputError(
