@@ -90,15 +90,13 @@ def test_parameters_are_recovered_from_a_recording(case: Case) -> None:
 
 @every_case
 def test_optimum_is_found_from_the_fit_alone_and_from_the_device_file_alone(
-    case: Case, request: pytest.FixtureRequest
+    case: Case,
 ) -> None:
-    if case.id == "mode on the motor":
-        known = "the fit without the mode is bent so far that the way from it alone is barred"
-        request.applymarker(pytest.mark.xfail(reason=known, strict=False))
     before = base_fit(case)
+    alone = np.concatenate([before.theta[None], *before.elsewhere[:, None]])
     found = [
-        fit_with_effect(case, base[None], keep=6).log_likelihood
-        for base in (before.theta, before.model.values)
+        fit_with_effect(case, bases, keep=6 * len(bases)).log_likelihood
+        for bases in (alone, before.model.values[None])
     ]
     assert found[0] == pytest.approx(found[1], abs=0.5)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -27,6 +27,9 @@ REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations
 # Phantom without a device file ended in another valley.
 _KEPT_STARTS, _STEPS_TO_A_VALLEY = 48, 40
 _REWINDOWINGS = 2
+_REFINED = 6  # of them converged to the end
+_ONE_VALLEY = 0.02  # relative steps of cost within a valley
+_OTHER_VALLEYS = 2
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,9 @@ class Fit:
         Normalised deviations: E|.|^2 = 1 where the model is true.
     starts : int
         How many starting points ended within 0.5 of the best half chi-square, of those refined.
+    elsewhere : ndarray, shape (V, P)
+        Where many starting points ended that did not end here: a model that lacks something may fit
+        best when bent far from the truth.
     """
 
     model: Model
@@ -67,6 +73,7 @@ class Fit:
     frequency_hz: Floats = field(repr=False)
     residual: NDArray[np.complex128] = field(repr=False)
     starts: int = 0
+    elsewhere: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False, kw_only=True)
 
     @property
     def sd(self) -> Floats:
@@ -115,16 +122,37 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
     model = informed(model, etfe)
     if start is None:
         start = starting_points(model, etfe, np.random.default_rng(seed))
-    theta, agreeing = refine(model, compress(etfe), start)
+    found = refine(model, compress(etfe), start)
+    theta = found.theta
     for _ in range(_REWINDOWINGS):
         windows = compress(etfe, partial(model.response, theta))
         theta = polish(model, windows, theta)
-    return summarise(model, windows, theta, agreeing)
+    fit = summarise(model, windows, theta, found.agreeing)
+    return replace(fit, elsewhere=found.elsewhere)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where starting points ended.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (P,)
+        The best.
+    agreeing : int
+        How many of those refined to the end found the same optimum.
+    elsewhere : ndarray, shape (V, P)
+        The best points of the other valleys in which several ended, that with most of them first.
+    """
+
+    theta: Floats
+    agreeing: int
+    elsewhere: Floats
 
 
 def refine(
     model: Model, windows: Windows, start: Floats, strata: NDArray[np.int_] | None = None
-) -> tuple[Floats, int]:
+) -> Optimum:
     """The best fit to `windows` from many starting vectors, shape (S, P).
 
     Of the optima found, that with the highest posterior density: masses may swap their parts in
@@ -132,9 +160,7 @@ def refine(
 
     Returns
     -------
-    theta : ndarray, shape (P,)
-    agreeing : int
-        How many of those refined to the end found the same optimum.
+    Optimum
     """
     here, low, high = search_box(model)
     residuals = weighted_residuals(Likelihood(model, windows), here)
@@ -143,9 +169,12 @@ def refine(
     def penalty(phi: Floats) -> Floats:
         return -model.log_prior(here.natural(phi)) - here.log_jacobian(phi)
 
-    phi, cost = _best_of_many(residuals, penalty, phi, low, high, strata)
+    phi, cost = _valleys(residuals, phi, low, high, strata)
+    elsewhere = here.natural(_other_valleys(phi, cost))
+    phi = phi[np.argsort(cost + penalty(phi))[:_REFINED]]
+    phi, cost = minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
     best = np.argmin(cost + penalty(phi))
-    return here.natural(phi)[best], int(np.sum(cost < cost[best] + 0.5))
+    return Optimum(here.natural(phi)[best], int(np.sum(cost < cost[best] + 0.5)), elsewhere)
 
 
 def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
@@ -176,15 +205,14 @@ def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[F
     return residuals
 
 
-def _best_of_many(
+def _valleys(
     residuals: Callable[[Floats], Floats],
-    penalty: Callable[[Floats], Floats],
     phi: Floats,
     low: Floats,
     high: Floats,
     strata: NDArray[np.int_] | None,
 ) -> tuple[Floats, Floats]:
-    """Sift the starting points, refine the better ones, converge the best."""
+    """Sift the starting points and lead the better ones into their valleys."""
     with np.errstate(all="ignore"):
         cost = np.einsum("bn,bn->b", *(2 * [residuals(phi)]))
     order = np.argsort(np.where(np.isfinite(cost), cost, np.inf))
@@ -195,9 +223,21 @@ def _best_of_many(
         phi, cost = minimise(residuals, phi, low, high, steps=5, tolerance=1e-2)
         order = np.argsort(cost)
     phi = phi[order[:_KEPT_STARTS]]
-    phi, cost = minimise(residuals, phi, low, high, _STEPS_TO_A_VALLEY, tolerance=1e-2)
-    phi = phi[np.argsort(cost + penalty(phi))[:6]]
-    return minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
+    return minimise(residuals, phi, low, high, _STEPS_TO_A_VALLEY, tolerance=1e-2)
+
+
+def _other_valleys(phi: Floats, cost: Floats) -> Floats:
+    """The best points of valleys other than the deepest, where several starting points lie.
+
+    Points of one valley differ little in their cost.
+    """
+    order = np.argsort(cost)
+    step = cost[order][1:] > (1 + _ONE_VALLEY) * cost[order][:-1]
+    valley = np.concatenate([[0], np.cumsum(step)])
+    _, first, size = np.unique(valley, return_index=True, return_counts=True)
+    largest = 1 + np.argsort(-size[1:], kind="stable")
+    kept = [i for i in largest if size[i] > 1][:_OTHER_VALLEYS]
+    return phi[order[first[kept]]]
 
 
 def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) -> Fit:

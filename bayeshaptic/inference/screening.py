@@ -16,17 +16,22 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 
-def starting_bases(model: Model, theta: Floats) -> Floats:
-    """Base vectors to start from: the fit `theta`, and what is believed without it.
+def starting_bases(model: Model, theta: Floats, elsewhere: Floats | None = None) -> Floats:
+    """Base vectors to start from: the fit, where else its starts ended, and what is believed.
 
-    With a device file its own values too, and the fit with the file's hand: what the model lacks
-    is often taken for a strange hand.
+    The best fit of a model that lacks something may be bent so far that the way from it is barred;
+    the valley where most starting points end is then the nearer one.  With a device file its own
+    values too, and the fit with the file's hand: what the model lacks is often taken for a strange
+    hand.
 
     Parameters
     ----------
     model : Model
         Without the effect.
     theta : ndarray, shape (P,)
+        Its fit.
+    elsewhere : ndarray, shape (V, P), optional
+        `Fit.elsewhere`.
 
     Returns
     -------
@@ -35,7 +40,10 @@ def starting_bases(model: Model, theta: Floats) -> Floats:
     believed = np.array([model.reference.get(name, np.nan) for name in model.names])
     nominal = np.where(np.isnan(believed), theta, believed)
     hand = np.isin(model.names, HAND)
-    return np.unique(np.stack([theta, nominal, np.where(hand, nominal, theta)]), axis=0)
+    bases = np.stack([theta, nominal, np.where(hand, nominal, theta)])
+    if elsewhere is not None and elsewhere.size:
+        bases = np.concatenate([bases, elsewhere])
+    return np.unique(bases, axis=0)
 
 
 def promising_starts(

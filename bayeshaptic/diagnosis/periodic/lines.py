@@ -34,6 +34,7 @@ from bayeshaptic.diagnosis.trials.linear import sieve
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.inference.least_squares import Fit, least_squares, refine
+from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
@@ -100,7 +101,8 @@ class LineTrials:
                 tick(basis.title)
                 self._keep(found, (basis.name, basis.place), self._with_force(state, basis))
         rest = self._rest(state.part).part(self.fitted)
-        sieved = sieve(state.part.model, self.etfe, rest, state.part.theta)
+        bases = starting_bases(state.part.model, state.part.theta, state.fit.elsewhere)
+        sieved = sieve(state.part.model, self.etfe, rest, bases)
         for one in sieved:
             near = one.gain >= thresholds.REACH * sieved[0].gain
             if not (near and meter.affords(one.effect.title)):
@@ -155,7 +157,7 @@ class LineTrials:
     ) -> Trial:
         part = state.part
         model = part.model.with_effect(effect)
-        theta, _ = refine(model, rest, starts)
+        theta = refine(model, rest, starts).theta
         tried = self._balance(model, part.forces, theta, part.strength)
         names = tuple(p.name for p in effect.parameters)
         accepted = Accepted(

@@ -74,11 +74,11 @@ def _fitted_again(state: State, found: Inspection) -> State:
 
     From the device's own values, too: clipping may have led the current fit far away.
     """
-    model, theta = state.model, state.fit.theta
     etfe = estimate_etfe(found.mended, state.etfe.band_hz)
     etfe = discounted(replace(etfe, notices=state.etfe.notices), found.measured)
-    starts = starting_bases(model, theta)
-    return replace(state, etfe=etfe, fit=least_squares(model, etfe, start=starts))
+    fit = state.fit
+    starts = starting_bases(fit.model, fit.theta, fit.elsewhere)
+    return replace(state, etfe=etfe, fit=least_squares(fit.model, etfe, start=starts))
 
 
 @dataclass(frozen=True)

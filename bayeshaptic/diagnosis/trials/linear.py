@@ -89,7 +89,8 @@ def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[
     """
     theta, windows = _fit_part(state.model, state.etfe, state.fit.windows, state.fit.theta[None])
     base = log_likelihoods(state.model, windows, theta)
-    found = sieve(state.model, state.etfe, windows.part(share(windows, FIT)), state.fit.theta)
+    bases = starting_bases(state.model, state.fit.theta, state.fit.elsewhere)
+    found = sieve(state.model, state.etfe, windows.part(share(windows, FIT)), bases)
     best: dict[str, Trial] = {}
     for one in found:
         effect = one.effect
@@ -103,7 +104,7 @@ def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[
     return list(best.values())
 
 
-def sieve(model: Model, etfe: Etfe, windows: Windows, theta: Floats) -> list[Sieved]:
+def sieve(model: Model, etfe: Etfe, windows: Windows, bases: Floats) -> list[Sieved]:
     """All candidates after a few steps on the windows, the most promising first.
 
     Parameters
@@ -112,11 +113,11 @@ def sieve(model: Model, etfe: Etfe, windows: Windows, theta: Floats) -> list[Sie
     etfe : Etfe
     windows : Windows
         To fit.
-    theta : ndarray, shape (P,)
-        The present fit.
+    bases : ndarray, shape (S, P)
+        `starting_bases` of the present fit.
     """
-    bases = starting_bases(model, theta)
-    before = float(np.sum(np.abs(Likelihood(model, windows).normalised(theta[None])) ** 2))
+    misfits = np.abs(Likelihood(model, windows).normalised(bases)) ** 2
+    before = float(np.min(np.sum(misfits, axis=(1, 2))))
     size = windows.target.size
     found = []
     for effect in linear_candidates(model, etfe):
@@ -160,6 +161,6 @@ def _try(state: State, windows: Windows, one: Sieved, base: Floats, followed: bo
 
 def _fit_part(model: Model, etfe: Etfe, windows: Windows, starts: Floats) -> tuple[Floats, Windows]:
     """Fit the windows to fit by, twice: the second time compressed around the first fit."""
-    theta, _ = refine(model, windows.part(share(windows, FIT)), starts)
+    theta = refine(model, windows.part(share(windows, FIT)), starts).theta
     windows = compress(etfe, partial(model.response, theta))
     return polish(model, windows.part(share(windows, FIT)), theta), windows
