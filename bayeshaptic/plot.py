@@ -9,12 +9,24 @@ Each function draws on the axes that it is given, or on those of a new figure, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
-from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import InputError
+from bayeshaptic.report.figures import (
+    answer,
+    stiffness,
+    style,
+)
+from bayeshaptic.report.figures import crossings as crossings_figure
+from bayeshaptic.report.figures import marginals as marginals_figure
+from bayeshaptic.report.figures import pairs as pairs_figure
+from bayeshaptic.report.figures import residuals as residuals_figure
+from bayeshaptic.report.figures import response as response_figure
+from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
+from bayeshaptic.report.figures.walls import kb
+from bayeshaptic.report.walls.section import case_of, table_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,64 +48,99 @@ __all__ = [
 _WIDTH_IN = 7.4
 
 
-def limit(result: Result, ax: Axes | None = None) -> Axes:
-    """The distribution of the critical stiffness by binding crossing, with the risks.
+class OnePanel(Protocol):
+    """A figure of one panel."""
 
-    Parameters
-    ----------
-    result : Analysis or Closed
-    ax : Axes, optional
-        By default those of a new figure.
-
-    Returns
-    -------
-    Axes
-    """
-    from bayeshaptic.report.figures import stiffness
-
-    axes = _axes(ax, 3.3)
-    stiffness.draw_on(axes, result)
-    return axes
+    def __call__(self, result: Result, ax: Axes | None = None) -> Axes:
+        """Draw it."""
 
 
-def estimates(result: Result, ax: Axes | None = None) -> Axes:
-    """Every estimate of the limit on one axis: model, deterministic fit, measurement, rules.
+class SeveralPanels(Protocol):
+    """A figure of several panels."""
 
-    Parameters
-    ----------
-    result : Analysis or Closed
-    ax : Axes, optional
-        By default those of a new figure.
-
-    Returns
-    -------
-    Axes
-    """
-    from bayeshaptic.report.figures import answer
-
-    axes = _axes(ax, 2.4)
-    answer.draw_on(axes, result)
-    return axes
+    def __call__(self, result: Result, ax: Sequence[Axes] | None = None) -> Sequence[Axes]:
+        """Draw it."""
 
 
-def before_after(closed: Closed, ax: Axes | None = None) -> Axes:
-    """The critical stiffness before and after closing the loop, beside the measurement's own.
+def _one(name: str, what: str, draw_on: Callable[[Axes, Any], None], height_in: float) -> OnePanel:
+    """The public function of a figure of one panel."""
 
-    Parameters
-    ----------
-    closed : Closed
-    ax : Axes, optional
-        By default those of a new figure.
+    def drawn(result: Result, ax: Axes | None = None) -> Axes:
+        axes = _axes(ax, height_in)
+        draw_on(axes, result)
+        return axes
 
-    Returns
-    -------
-    Axes
-    """
-    from bayeshaptic.report.figures.loop import stiffness
+    return _named(drawn, name, what, "ax : Axes, optional\n    By default those of a new figure.")
 
-    axes = _axes(ax, 2.0)
-    stiffness.draw_on(axes, closed)
-    return axes
+
+def _several(
+    name: str,
+    what: str,
+    draw_on: Callable[[Sequence[Axes], Any], None],
+    heights_in: tuple[float, ...],
+    panels: str = "Two",
+    most: Callable[[Any], int] = lambda result: 2,
+) -> SeveralPanels:
+    """The public function of a figure of two panels or more."""
+
+    def drawn(result: Result, ax: Sequence[Axes] | None = None) -> Sequence[Axes]:
+        given = _stacked(ax, heights_in, range(2, most(result) + 1))
+        draw_on(given, result)
+        return given
+
+    return _named(
+        drawn, name, what, f"ax : sequence of Axes, optional\n    {panels}; by default new ones."
+    )
+
+
+def _named(function: Any, name: str, what: str, ax: str) -> Any:
+    function.__name__ = function.__qualname__ = name
+    kind = "sequence of Axes" if "sequence" in ax else "Axes"
+    function.__doc__ = (
+        f"{what}\n\nParameters\n----------\nresult : Analysis or Closed\n{ax}\n\n"
+        f"Returns\n-------\n{kind}\n"
+    )
+    return function
+
+
+limit = _one(
+    "limit",
+    "The distribution of the critical stiffness by binding crossing, with the risks.",
+    stiffness.draw_on,
+    3.3,
+)
+estimates = _one(
+    "estimates",
+    "Every estimate of the limit on one axis: model, deterministic fit, measurement, rules.",
+    answer.draw_on,
+    2.4,
+)
+before_after = _one(
+    "before_after",
+    "The critical stiffness before and after closing the loop, beside the measurement's own.",
+    loop_stiffness.draw_on,
+    2.0,
+)
+response = _several(
+    "response",
+    "The measured frequency response with the model's band: gain and phase.",
+    response_figure.draw_on,
+    (2.8, 2.0),
+    "Two for gain and phase, a third for their ratio, a fourth for the coherence",
+    lambda result: len(response_figure.heights_of(result)),
+)
+crossings = _several(
+    "crossings",
+    "Where the limit comes from: 1/|G| and the phase, with every crossing.",
+    crossings_figure.draw_on,
+    (2.6, 1.8),
+)
+residual = _several(
+    "residual",
+    "What the model leaves over, in units of the noise, by line and in third octaves.",
+    residuals_figure.draw_on,
+    (2.5, 1.7),
+)
 
 
 def walls(result: Result, ax: Axes | None = None, table: LimitTable | None = None) -> Axes:
@@ -111,77 +158,12 @@ def walls(result: Result, ax: Axes | None = None, table: LimitTable | None = Non
     -------
     Axes
     """
-    from bayeshaptic.report.figures import style
-    from bayeshaptic.report.figures.walls import kb
-    from bayeshaptic.report.walls.section import case_of, table_of
-
     known = table_of([case_of(result)]) if table is None else table
     axes = _axes(ax, 3.5)
     kb.draw_on(axes, known.filters[0], known)
     if axes.get_legend_handles_labels()[0]:  # no boundary where the draws are too few for one
         style.legend(axes)
     return axes
-
-
-def response(result: Result, ax: Sequence[Axes] | None = None) -> Sequence[Axes]:
-    """The measured frequency response with the model's band: gain and phase.
-
-    Parameters
-    ----------
-    result : Analysis or Closed
-    ax : sequence of Axes, optional
-        Two for gain and phase, a third for their ratio, a fourth for the coherence; by default
-        two of a new figure.
-
-    Returns
-    -------
-    sequence of Axes
-    """
-    from bayeshaptic.report.figures import response as figure
-
-    panels = _several(ax, (2.8, 2.0), range(2, len(figure.heights_of(result)) + 1))
-    figure.draw_on(panels, result)
-    return panels
-
-
-def crossings(result: Result, ax: Sequence[Axes] | None = None) -> Sequence[Axes]:
-    """Where the limit comes from: 1/|G| and the phase, with every crossing.
-
-    Parameters
-    ----------
-    result : Analysis or Closed
-    ax : sequence of Axes, optional
-        Two; by default those of a new figure.
-
-    Returns
-    -------
-    sequence of Axes
-    """
-    from bayeshaptic.report.figures import crossings as figure
-
-    panels = _several(ax, (2.6, 1.8), (2,))
-    figure.draw_on(panels, result)
-    return panels
-
-
-def residual(result: Result, ax: Sequence[Axes] | None = None) -> Sequence[Axes]:
-    """What the model leaves over, in units of the noise, by line and in third octaves.
-
-    Parameters
-    ----------
-    result : Analysis or Closed
-    ax : sequence of Axes, optional
-        Two; by default those of a new figure.
-
-    Returns
-    -------
-    sequence of Axes
-    """
-    from bayeshaptic.report.figures import residuals
-
-    panels = _several(ax, (2.5, 1.7), (2,))
-    residuals.draw_on(panels, result)
-    return panels
 
 
 def marginals(result: Result, name: str, ax: Axes | None = None) -> Axes:
@@ -204,11 +186,9 @@ def marginals(result: Result, name: str, ax: Axes | None = None) -> Axes:
     InputError
         If the model has no such parameter.
     """
-    from bayeshaptic.report.figures import marginals as figure
-
     _known(result, name)
     axes = _axes(ax, 2.4, 3.6)
-    figure.draw_on(axes, result, name)
+    marginals_figure.draw_on(axes, result, name)
     return axes
 
 
@@ -232,11 +212,9 @@ def pairs(result: Result, x: str, y: str, ax: Axes | None = None) -> Axes:
     InputError
         If the model has no such parameter.
     """
-    from bayeshaptic.report.figures import pairs as figure
-
     _known(result, x, y)
     axes = _axes(ax, 3.6, 3.6)
-    figure.draw_on(axes, result, x, y)
+    pairs_figure.draw_on(axes, result, x, y)
     return axes
 
 
@@ -255,7 +233,7 @@ def _axes(ax: Axes | None, height_in: float, width_in: float = _WIDTH_IN) -> Axe
     return plt.subplots(figsize=(width_in, height_in), layout="constrained")[1]
 
 
-def _several(
+def _stacked(
     ax: Sequence[Axes] | None, heights: tuple[float, ...], counts: Sequence[int]
 ) -> Sequence[Axes]:
     if ax is not None:

@@ -11,7 +11,7 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.models import build_model
-from bayeshaptic.report.walls.rules import rules_of
+from bayeshaptic.report.numbers.rules import rules_of
 from bayeshaptic.report.walls.section import limits_section
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Backward, LowPass

@@ -22,18 +22,18 @@ from fake_analysis import CASES, FEEDBACK, fake_analysis, fake_closed
 import bayeshaptic
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.report import write, write_report
-from bayeshaptic.report.estimates import least_squares_limit, witnesses
 from bayeshaptic.report.figures import PICTURES, draw_pictures
 from bayeshaptic.report.figures.pairs import correlation, strongest
-from bayeshaptic.report.figures.residuals import third_octaves
 from bayeshaptic.report.figures.sampler import rank_histogram
 from bayeshaptic.report.figures.style import Drawn, drawn
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.numbers.estimates import least_squares_limit, witnesses
+from bayeshaptic.report.numbers.octaves import third_octaves
+from bayeshaptic.report.numbers.quantities import estimate, interval, percent, quantity, scale
 from bayeshaptic.report.page.answer import FARED
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.methods import bibtex, methods
 from bayeshaptic.report.page.next_step import next_step
-from bayeshaptic.report.quantities import estimate, interval, percent, quantity, scale
 from bayeshaptic.report.tables import comparison, parameters, safe
 from bayeshaptic.report.words import agreement, hump, misfit
 

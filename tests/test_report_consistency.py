@@ -17,16 +17,17 @@ from fake_study import fake_study
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.next_experiment import Experiment
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.report import section, write, write_report
+from bayeshaptic.report import write, write_report
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, style
 from bayeshaptic.report.guidance.words import _next, experiment_rows
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.tables import outcomes
-from bayeshaptic.report.misfit import misfit_is_clear
-from bayeshaptic.report.quantities import estimate
+from bayeshaptic.report.numbers.misfit import misfit_is_clear
+from bayeshaptic.report.numbers.quantities import estimate
+from bayeshaptic.report.numbers.trust import doubtful_parameters
+from bayeshaptic.report.page import section
 from bayeshaptic.report.study import write as study_write
 from bayeshaptic.report.study.words import configurations
-from bayeshaptic.report.trust import doubtful_parameters
 from bayeshaptic.report.walls.section import table_of
 from bayeshaptic.stability.guidance.shares import VarianceShares
 

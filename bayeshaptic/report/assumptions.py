@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-import platform
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 from bayeshaptic.models.structures import QUANTITIES
 from bayeshaptic.report import words
-from bayeshaptic.report.quantities import interval, pretty_unit, pure, quantity
-from bayeshaptic.version import __version__
+from bayeshaptic.report.numbers.quantities import interval, pretty_unit, pure, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
-
-LIBRARIES = ("numpy", "scipy", "emcee", "arviz", "matplotlib")
 
 
 def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, ...]:
@@ -137,14 +132,3 @@ def priors(analysis: Analysis) -> tuple[tuple[str, str, str], ...]:
     for name, value in model.fixed.items():
         rows.append((name, QUANTITIES[name][1], f"known: {quantity(value, 's')}"))
     return tuple(rows)
-
-
-def versions() -> tuple[tuple[str, str], ...]:
-    """(name, version) of this package, of Python and of the libraries that made the numbers."""
-    found = [("bayeshaptic", __version__), ("Python", platform.python_version())]
-    for library in LIBRARIES:
-        try:
-            found.append((library, version(library)))
-        except PackageNotFoundError:
-            continue
-    return tuple(found)

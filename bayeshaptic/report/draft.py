@@ -7,9 +7,11 @@ import re
 import shutil
 import socket
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from bayeshaptic.errors import InputError
 
 _NAME = re.compile(r"\.report-(?P<host>[\w-]*)-(?P<pid>\d+)-[0-9a-f]{12}")
 
@@ -27,6 +29,37 @@ def draft_in(folder: Path) -> Iterator[Path]:
         yield draft
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def report_in(out_dir: str | Path, last: str, stale: Iterable[str]) -> Iterator[Path]:
+    """A folder to write a report into; moved to `out_dir` when the block ends without an error.
+
+    An interrupted run leaves what was there before. Other files in `out_dir` stay.
+
+    Parameters
+    ----------
+    out_dir : str or Path
+        Made where it is missing, with its parents.
+    last : str
+        The file that others wait for.
+    stale : iterable of str
+        Files of an older report that would contradict this one, unless this one has them too.
+
+    Raises
+    ------
+    InputError
+        If `out_dir` is a file.
+    """
+    out = Path(out_dir).resolve()
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out_dir}: is a file; name a folder for the report.")
+    with draft_in(out if out.exists() else out.parent) as draft:
+        yield draft
+        for name in stale:
+            if not (draft / name).exists():
+                (out / name).unlink(missing_ok=True)
+        move_all(draft, out, last)
 
 
 def move_all(draft: Path, folder: Path, last: str) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.estimates import decibel, own_limit
 from bayeshaptic.report.loop.words import in_short
-from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
-from bayeshaptic.report.quantities import estimate, percent, pure, quantity
-from bayeshaptic.report.result import tip_limit
+from bayeshaptic.report.numbers.estimates import decibel, own_limit
+from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
+from bayeshaptic.report.numbers.quantities import estimate, percent, pure, quantity
+from bayeshaptic.report.numbers.result import tip_limit
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import html
-import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report import tables, words
@@ -21,38 +14,15 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop import tables as loop_tables
 from bayeshaptic.report.loop import words as loop_words
+from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.page import answer, methods
+from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, unique, with_contents
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.next_step import next_step
 from bayeshaptic.report.page.reproduce import reproduce
-from bayeshaptic.report.trust import doubtful_parameters
-from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
-    from jinja2 import Template
-
     from bayeshaptic.diagnosis.analysis import Analysis
-    from bayeshaptic.errors import Notice
-
-TEMPLATES = Path(__file__).parent / "templates"
-LABELS = {
-    "safe": "Recommendation",
-    "caution": "Recommendation, with caution",
-    "untrusted": "No recommendation",
-}
-
-
-@dataclass(frozen=True)
-class EmbeddedPicture:
-    """A figure inside of the page: as SVG, or as PNG where that is smaller."""
-
-    name: str
-    alternative: str
-    source: str
-    width: int
-    height: int
-    svg: str | None = None
-
 
 FILES = (
     ("summary.json", "the numbers of this page"),
@@ -60,6 +30,7 @@ FILES = (
     ("limits.csv", "the same as a table"),
     ("posterior.nc", "the draws, for ArviZ"),
 )
+_SHOWN = {p.name: p.alternative for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES)}
 _CONTENTS = (
     ("summary", "Summary"),
     ("limit", "Limit"),
@@ -99,7 +70,7 @@ def render(result: Result, pictures: Mapping[str, Drawn], sections: Sequence[str
         doubtful=words.doubtful(result),
         untrusted=doubtful_parameters(result),
         notices=unique(analysis.notices),
-        pictures={name: embedded(name, drawn) for name, drawn in pictures.items()},
+        pictures={name: embedded(name, one, _SHOWN[name]) for name, one in pictures.items()},
         words=words,
         tables=tables,
         loop_words=loop_words,
@@ -116,28 +87,6 @@ def render(result: Result, pictures: Mapping[str, Drawn], sections: Sequence[str
     return with_contents(page, _CONTENTS)
 
 
-def frame() -> dict[str, Any]:
-    """What every page has: style, script and its hash, version, the moment."""
-    script = (TEMPLATES / "page.js").read_text(encoding="utf-8")
-    digest = hashlib.sha256(script.encode()).digest()
-    return {
-        "style": style(),
-        "script": script,
-        "script_hash": base64.b64encode(digest).decode("ascii"),
-        "version": __version__,
-        "written": written(),
-    }
-
-
-def with_contents(page: str, contents: Sequence[tuple[str, str]]) -> str:
-    """The page with links to those of the sections that it has."""
-    links = "".join(
-        f'<a href="#{key}">{name}</a>\n' for key, name in contents if f'<section id="{key}"' in page
-    )
-    place = page.index("</nav>")
-    return page[:place] + links + page[place:]
-
-
 def title(analysis: Analysis) -> str:
     """What the report is about: the device, who held it, and the recording's name."""
     recording = analysis.recording
@@ -149,46 +98,3 @@ def title(analysis: Analysis) -> str:
         return recording.name
     held = f", held by {recording.user}" if recording.user else ""
     return f"{name}{held}: {recording.name}"
-
-
-def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
-    """Warnings first, without repetitions."""
-    once = tuple(dict.fromkeys(notices))
-    return tuple(sorted(once, key=lambda notice: notice.level != "warning"))
-
-
-def embedded(name: str, drawn: Drawn, alternative: str = "") -> EmbeddedPicture:
-    """A figure as a part of the page, with the words that stand for it."""
-    width, height = struct.unpack(">II", drawn.png[16:24])  # of the PNG's header
-    pictures = (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES)
-    words = alternative or next((p.alternative for p in pictures if p.name == name), name)
-    if drawn.svg is not None:
-        label = f'role="img" aria-label="{html.escape(words)}"'
-        svg = drawn.svg.replace("<svg", f"<svg {label}", 1)
-        return EmbeddedPicture(name, words, "", width, height, svg)
-    source = "data:image/png;base64," + base64.b64encode(drawn.png).decode("ascii")
-    return EmbeddedPicture(name, words, source, width, height)
-
-
-def template(name: str) -> Template:
-    """A template of the folder `templates`."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES, encoding="utf-8"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template(name)
-
-
-def style() -> str:
-    """The style sheet of every page."""
-    return (TEMPLATES / "report.css").read_text(encoding="utf-8")
-
-
-def written() -> str:
-    """The moment, for a person."""
-    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")

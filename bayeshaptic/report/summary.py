@@ -10,18 +10,16 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.estimates import RISKS, finite
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, finite
+from bayeshaptic.report.numbers.result import tip_limit
+from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.provenance import provenance
-from bayeshaptic.report.result import tip_limit
-from bayeshaptic.report.trust import doubtful_parameters
 from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.stability.critical import CriticalStiffness
-
-QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 
 _ERROR = {
     "weighted_rms": None,

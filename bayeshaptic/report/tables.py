@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.estimates import RISKS, decibel, finite, witnesses
-from bayeshaptic.report.quantities import (
+from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
+from bayeshaptic.report.numbers.quantities import (
     interval,
     percent,
     pretty_unit,
@@ -19,42 +18,20 @@ from bayeshaptic.report.quantities import (
     scale,
     spread_of,
 )
-from bayeshaptic.report.result import tip_limit
-from bayeshaptic.report.summary import QUANTILES
-from bayeshaptic.report.trust import doubtful_parameters
+from bayeshaptic.report.numbers.result import tip_limit
+from bayeshaptic.report.numbers.rows import ParameterRow, Rows
+from bayeshaptic.report.numbers.trust import doubtful_parameters
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.models.prior import Prior
 
-Rows = tuple[tuple[str, ...], ...]
 _DASH = "\N{EN DASH}"
 _SHOWN = ("q05", "q95", "mean", "sd")
 _OUTCOMES = {
     "at a bound": "least squares stopped at its bound: no error bar",
     "prior-dominated": "the data alone do not decide it",
 }
-
-
-@dataclass(frozen=True)
-class ParameterRow:
-    """One parameter: all numbers in the unit of the row.
-
-    `reference` is the device file's value, a dash without one; `shrinkage` the posterior's width as
-    a share of the prior's.
-    """
-
-    name: str
-    title: str
-    unit: str
-    least_squares: str
-    posterior: str
-    range: str
-    reference: str
-    ess: str
-    rhat: str
-    remarks: str
-    shrinkage: str = _DASH
 
 
 def parameters(result: Result) -> tuple[ParameterRow, ...]:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.estimates import Witness, correction, decibel, witnesses
-from bayeshaptic.report.figures.residuals import third_octaves
-from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear
-from bayeshaptic.report.quantities import estimate, interval, percent, pure, quantity
-from bayeshaptic.report.trust import doubtful_parameters
+from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
+from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
+from bayeshaptic.report.numbers.octaves import third_octaves
+from bayeshaptic.report.numbers.quantities import estimate, interval, percent, pure, quantity
+from bayeshaptic.report.numbers.trust import doubtful_parameters
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.errors import InputError
-from bayeshaptic.report.draft import draft_in, move_all
+from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.html import render
-from bayeshaptic.report.section import Section
+from bayeshaptic.report.page.section import Section
 from bayeshaptic.report.summary import summary_json
 from bayeshaptic.report.walls.section import (
     case_of,
@@ -26,6 +25,7 @@ from bayeshaptic.threads import single_threaded
 
 # Whoever waits for a report looks for its summary: it arrives when the rest is there.
 _LAST = "summary.json"
+_MAY_BE_MISSING = tuple(f"{p.name}.png" for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES))
 
 
 @single_threaded
@@ -55,13 +55,9 @@ def write_report(
     InputError
         If `out_dir` is a file.
     """
-    out = Path(out_dir).resolve()
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out_dir}: is a file; name a folder for the report.")
-    with draft_in(out if out.exists() else out.parent) as draft:
-        _write_all(result, draft, origin)
-        _move(draft, out)
-    return out / "report.html"
+    with report_in(out_dir, _LAST, _MAY_BE_MISSING) as folder:
+        _write_all(result, folder, origin)
+    return Path(out_dir).resolve() / "report.html"
 
 
 def _write_all(result: Result, folder: Path, origin: Mapping[str, Any] | None) -> None:
@@ -90,10 +86,3 @@ def _sections(result: Result, folder: Path) -> tuple[Section, ...]:
     )
     advice = guidance_section(case, analysis)
     return (walls,) if advice is None else (walls, advice)
-
-
-def _move(draft: Path, out: Path) -> None:
-    for picture in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES):
-        if not (draft / f"{picture.name}.png").exists():
-            (out / f"{picture.name}.png").unlink(missing_ok=True)
-    move_all(draft, out, _LAST)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import thinned
-from bayeshaptic.report.quantities import Scale, quantity, scale
+from bayeshaptic.report.numbers.quantities import Scale, quantity, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,11 +29,7 @@ LINEAR_DEG = 10.0
 
 def draw(result: Result) -> Figure:
     """Stiffness above, phase from -180 degrees below, up to the Nyquist frequency."""
-    figure = style.new_figure(4.4)
-    panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    draw_on(panels, result)
-    figure.align_ylabels(panels)
-    return figure
+    return style.two_panels(4.4, lambda panels: draw_on(panels, result))
 
 
 def draw_on(panels: Sequence[Axes], result: Result) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import Scale, scale
+from bayeshaptic.report.numbers.quantities import Scale, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.estimates import RISKS, Witness, decibel, own_limit, witnesses
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import Scale, percent, scale
+from bayeshaptic.report.figures.histogram import BINS, risk_lines, stacked
+from bayeshaptic.report.numbers.estimates import Witness, decibel, own_limit, witnesses
+from bayeshaptic.report.numbers.quantities import Scale, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     from bayeshaptic.diagnosis.analysis import Analysis
 
-BINS = 60
 WIDEST = 4.0  # times the histogram's own width, to show the measurement's interval beside it
 LOG_BEYOND = 8.0  # a distribution wider than this factor is drawn on a logarithmic axis
 
@@ -53,7 +53,8 @@ def _histogram(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...]) -> Non
     low, high = (float(v) for v in np.quantile(samples[samples > 0], (0.0005, 0.9995)))
     logarithmic = high > LOG_BEYOND * low
     edges = _edges(low, high, logarithmic) * row.factor
-    _stack(axes, analysis, row, edges, logarithmic)
+    width = np.diff(np.log(edges) if logarithmic else edges)
+    stacked(axes, limit, limit.samples * row.factor, edges, width)
     axes.set_xlim(*_reach(analysis, row, edges))
     axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
     _lines(axes, analysis, rows, row)
@@ -88,46 +89,10 @@ def _reach(analysis: Analysis, row: Scale, edges: NDArray[Any]) -> tuple[float, 
     return (wide_low, wide_high) if fits else (low, high)
 
 
-def _stack(
-    axes: Axes, analysis: Analysis, row: Scale, edges: NDArray[Any], logarithmic: bool
-) -> None:
-    """One colour and hatch a binding crossing, stacked; density over K, or over log K."""
-    samples = analysis.limit.samples
-    width = np.diff(np.log(edges) if logarithmic else edges)
-    base = np.zeros(len(edges) - 1)
-    for number, crossing in enumerate(analysis.limit.crossings):
-        part = samples[(analysis.limit.group == number) & np.isfinite(samples)] * row.factor
-        height = np.histogram(part, edges)[0] / (len(samples) * width)
-        colour = style.CYCLE[number % len(style.CYCLE)]
-        axes.stairs(
-            base + height,
-            edges,
-            baseline=base,
-            fill=True,
-            facecolor=colour,
-            alpha=0.55,
-            edgecolor=style.DATA,
-            linewidth=0.0,
-            hatch=style.HATCHES[number % len(style.HATCHES)],
-            label=f"{crossing.label}: {percent(crossing.probability)}",
-        )
-        axes.stairs(base + height, edges, baseline=base, color=colour, linewidth=0.8)
-        base = base + height
-
-
 def _lines(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...], row: Scale) -> None:
     """Safe stiffnesses, least squares, and the measurement's own crossing."""
     low, high = axes.get_xlim()
-    for number, risk in enumerate(RISKS):
-        safe = analysis.limit.safe(risk)
-        if safe is not None and low <= safe * row.factor <= high:
-            axes.axvline(
-                safe * row.factor,
-                color=style.DATA,
-                linewidth=1.0,
-                linestyle=style.DASHES[1:][number],
-                label=f"{percent(risk)} risk of instability",
-            )
+    risk_lines(axes, analysis.limit, lambda safe: safe * row.factor, "of instability")
     own = [w.key for w in rows if w.key in ("etfe", "corrected")][-1:]
     for witness in rows:
         if witness.middle is None or not low <= witness.middle * row.factor <= high:

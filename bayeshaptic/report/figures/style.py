@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,15 @@ def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
 
     figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
+    return figure
+
+
+def two_panels(height_in: float, draw_on: Callable[[Sequence[Axes]], None]) -> Figure:
+    """A figure of two panels on one frequency axis, drawn by `draw_on`."""
+    figure = new_figure(height_in)
+    panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    draw_on(panels)
+    figure.align_ylabels(panels)
     return figure
 
 

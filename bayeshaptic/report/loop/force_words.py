@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.inference.time_domain.fit import NAMES
-from bayeshaptic.report.quantities import pure, quantity, scale
+from bayeshaptic.report.numbers.quantities import pure, quantity, scale
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.feedback.in_loop import InLoop
     from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics
     from bayeshaptic.recordings.recording import Recording
-    from bayeshaptic.report.tables import Rows
+    from bayeshaptic.report.numbers.rows import Rows
 
 _DASH = "\N{EN DASH}"
 

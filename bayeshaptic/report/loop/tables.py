@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.effects.laws import tested
-from bayeshaptic.effects.library import effects
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
-from bayeshaptic.report.quantities import estimate, quantity, scale
-from bayeshaptic.report.tables import ParameterRow, Rows
+from bayeshaptic.report.numbers.quantities import estimate, quantity, scale
+from bayeshaptic.report.numbers.rows import ParameterRow, Rows
+from bayeshaptic.report.numbers.titles import question, title_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
@@ -20,13 +19,6 @@ if TYPE_CHECKING:
 
 _DASH = "\N{EN DASH}"
 _SHOWN = 8
-_TESTS = {
-    "bands": "residual, band by band",
-    "total": "residual over all frequencies",
-    "smooth change": "a smooth change of the response",
-    "a steady change": "a steady change during the recording",
-    "a change and back": "a change during the recording, and back",
-}
 
 
 @dataclass(frozen=True)
@@ -110,18 +102,6 @@ def outcomes(closed: Closed) -> Rows:
         )
         for test in closed.traced.before
     )
-
-
-def question(test: Test) -> str:
-    """What a test asks."""
-    shape = tested().get(test.name)
-    return shape.title if shape else _TESTS.get(test.name) or title_of(test.name)
-
-
-def title_of(name: str) -> str:
-    """An effect's title, from the name that files and commands use."""
-    known = {effect.name: effect.title for effect in effects()}
-    return str(known.get(name, name.replace("_", " ")))
 
 
 def errors(closed: Closed) -> Rows:

@@ -8,14 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.traced import CONSISTENT, UNEXPLAINED
-from bayeshaptic.report.estimates import decibel
 from bayeshaptic.report.loop import force_words
-from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear
-from bayeshaptic.report.quantities import estimate, interval, pretty_unit, pure, quantity, scale
+from bayeshaptic.report.loop.unexplained import remainder, worst
+from bayeshaptic.report.numbers.estimates import decibel
+from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
+from bayeshaptic.report.numbers.quantities import (
+    estimate,
+    pretty_unit,
+    pure,
+    quantity,
+    scale,
+)
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
-    from bayeshaptic.diagnosis.residuals.residual import Test
     from bayeshaptic.diagnosis.state import Accepted
 
 _SAME = 0.005  # relative change of an error that is not worth a word
@@ -28,18 +34,6 @@ _MOST_NUMBERS = 3
 _UNCOUNTABLE = {"backlash", "damping", "delay", "drag", "friction", "quantisation", "stiffness"}
 _PLURAL = {"rows", "samples", "saturation", "steps"}
 
-MEASURE_NEXT = {
-    "linear": "Record the device with a known mass fixed to the part that you suspect: the mode "
-    "that moves belongs to it. An accelerometer on the base or on the handle shows motion that the "
-    "encoder does not see.",
-    "nonlinear": "Record at half and at twice the force: what changes with the level is not "
-    "linear. A relay experiment measures the limit itself, at its own amplitude.",
-    "time-varying": "Record for a shorter time, and with nobody holding the device: if it still "
-    "changes, look for warmth and play in the device, else at the grip.",
-    "measurement": "Record with the force at zero: what the encoder shows then is not the "
-    "device. Look at the resolution, the time stamps and the cable of the encoder.",
-}
-
 
 def verdict(closed: Closed) -> tuple[str, ...]:
     """The paragraphs that open the section: what was found, and what it did."""
@@ -47,7 +41,7 @@ def verdict(closed: Closed) -> tuple[str, ...]:
         return (_nothing(closed),)
     found = (lacked(closed),) if closed.effects else ()
     if closed.verdict == UNEXPLAINED:
-        return (*found, *_remainder(closed))
+        return (*found, *remainder(closed))
     return (*found, _rest(closed))
 
 
@@ -131,11 +125,6 @@ def force_caption(closed: Closed) -> str:
     )
 
 
-def worst(tests: tuple[Test, ...]) -> Test | None:
-    """The test that is furthest beyond its threshold, or nearest to it."""
-    return max(tests, key=lambda test: test.excess, default=None)
-
-
 def parameter_words(name: str) -> str:
     """What an estimate that is no parameter of the model is, from its name."""
     if name.endswith(_OVER):
@@ -162,61 +151,6 @@ def _nothing(closed: Closed) -> str:
     return (
         f"Nothing to find: {len(tests)} tests of the residual were made, and none found more than "
         f"noise would give.{nearest} Nothing was added to the model."
-    )
-
-
-def _remainder(closed: Closed) -> tuple[str, ...]:
-    left = [test for test in closed.traced.after if test.flagged]
-    top = worst(tuple(left))
-    assert top is not None
-    families = dict.fromkeys(test.family for test in sorted(left, key=lambda t: -t.excess))
-    more = "more " if closed.effects else ""
-    where = "" if top.frequency_hz is None else f", around {quantity(top.frequency_hz, 'Hz')}"
-    first = (
-        f"There is something {more}here that has no name in the library. Its class is "
-        f"{' and '.join(families)}{where}: {top.text}, where {pure(top.threshold)} would raise "
-        f"suspicion. {_tried(closed)}{_skipped(closed)}"
-    )
-    advice = [MEASURE_NEXT[family] for family in families if family in MEASURE_NEXT]
-    if "linear" in families and closed.model.name == "grasped":
-        advice.append("Record it with nobody holding it, too: then the hand is not in question.")
-    return first, _widened(closed), f"What to measure next: {' '.join(advice)}"
-
-
-def _tried(closed: Closed) -> str:
-    # The last round is the one that found nothing for what is left.
-    last = max((c.round for c in closed.traced.candidates), default=0)
-    tried = [c for c in closed.traced.candidates if c.round == last and not c.accepted]
-    if not tried:
-        return "No effect of the library that could be behind it explains any of it."
-    names = ", ".join(c.title for c in sorted(tried, key=lambda c: -c.score))
-    return (
-        f"Tried without success, the best first: {names}. None of them predicts the part of the "
-        "recording that it was not fitted to well enough to be believed."
-    )
-
-
-def _skipped(closed: Closed) -> str:
-    """What did not fit in the budget."""
-    skipped = closed.traced.skipped
-    if not skipped:
-        return ""
-    return (
-        f" Not tried, because the budget of the search was spent: {', '.join(skipped)}; a larger "
-        "--budget tries them."
-    )
-
-
-def _widened(closed: Closed) -> str:
-    from bayeshaptic.stability.critical import critical_stiffness
-
-    limit = closed.analysis.limit
-    narrow = critical_stiffness(closed.analysis.posterior)
-    before = interval(narrow.quantile(0.05), narrow.quantile(0.95), limit.unit)
-    after = interval(limit.quantile(0.05), limit.quantile(0.95), limit.unit)
-    return (
-        f"The critical stiffness was widened for it: the 90 % interval goes from {before} to "
-        f"{after}. Use its lower end."
     )
 
 

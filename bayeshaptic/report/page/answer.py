@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.quantities import estimate, percent, quantity
-from bayeshaptic.report.result import tip_limit
+from bayeshaptic.report.numbers.quantities import estimate, percent, quantity
+from bayeshaptic.report.numbers.result import tip_limit
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
-    from bayeshaptic.report.tables import Rows
+    from bayeshaptic.report.numbers.rows import Rows
 
 _WORTH_NAMING = 0.001
 # Of benchmarks/README.md: how often 90 % intervals of K_CR held the truth of simulated recordings,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
+from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.result import is_unexplained
+from bayeshaptic.report.numbers.result import is_unexplained
 
 if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline

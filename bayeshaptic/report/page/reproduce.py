@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
 import shlex
 from collections.abc import Mapping
-from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.assumptions import versions
+from bayeshaptic.report.provenance import sha256, versions
 
 if TYPE_CHECKING:
-    from bayeshaptic.report.tables import Rows
+    from bayeshaptic.report.numbers.rows import Rows
 
 
 def reproduce(result: Result) -> Rows:
@@ -36,7 +33,7 @@ def reproduce(result: Result) -> Rows:
     took = ", ".join(f"{name} {spent:.1f} s" for name, spent in seconds.items())
     if took:
         rows.append(("Time taken", took))
-    return (*rows, *versions())
+    return (*rows, *versions().items())
 
 
 def _file(result: Result, known: Any) -> list[tuple[str, ...]]:
@@ -49,9 +46,3 @@ def _file(result: Result, known: Any) -> list[tuple[str, ...]]:
     if digest:
         rows.append(("SHA-256", digest))
     return rows
-
-
-@cache
-def sha256(path: Path) -> str | None:
-    """Of a file; None where it is not there any more."""
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from bayeshaptic.report.assumptions import versions
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
-from bayeshaptic.report.html import LABELS, embedded, frame, template, unique, with_contents
+from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, unique, with_contents
+from bayeshaptic.report.provenance import versions
 from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
 from bayeshaptic.report.study.headline import study_headline
@@ -71,9 +71,9 @@ def render_study(
         configurations=configurations(study),
         parts=tuple(parts),
         lacking=missing(study),
-        pictures={name: embedded(name, one, words.get(name, "")) for name, one in pictures.items()},
+        pictures={name: embedded(name, one, words[name]) for name, one in pictures.items()},
         assumptions=assumptions(study),
-        versions=versions(),
+        versions=tuple(versions().items()),
     )
     return with_contents(page, _CONTENTS)
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.inference.population.reweighting import ALONE
-from bayeshaptic.report.estimates import RISKS
-from bayeshaptic.report.summary import QUANTILES, plain
+from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS
+from bayeshaptic.report.summary import plain
 from bayeshaptic.study.recorded_cases import place_of
 from bayeshaptic.types import Floats
 

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.report.estimates import RISKS, decibel
-from bayeshaptic.report.loop.tables import title_of
-from bayeshaptic.report.quantities import interval, percent, pure, quantity, scale
+from bayeshaptic.report.numbers.cases import has_draws, raw_limits
+from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel
+from bayeshaptic.report.numbers.quantities import interval, percent, pure, quantity, scale
+from bayeshaptic.report.numbers.rows import Rows
+from bayeshaptic.report.numbers.titles import title_of
 from bayeshaptic.report.study.words import spread_db
-from bayeshaptic.report.summary import QUANTILES
-from bayeshaptic.report.tables import Rows
 from bayeshaptic.stability.tail import ENOUGH_BELOW
-from bayeshaptic.study.recorded_cases import place_of
 
 if TYPE_CHECKING:
     from bayeshaptic.inference.population.infer import Population
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 _DASH = "\N{EN DASH}"
 _LEVELS = tuple(QUANTILES.values())
 _MOST_CASES = 8
-_FEWEST = 20  # different draws, for an interval
 
 
 def device(study: StudyAnalysis) -> Rows:
@@ -156,29 +154,6 @@ def users(study: StudyAnalysis) -> Rows:
         middles = ", ".join(f"{decibel(one.quantile(0.5)):.2f}" for one in own)
         rows.append((case.label.removeprefix("user "), middles or _DASH, *given))
     return tuple(rows)
-
-
-def has_draws(case: Case) -> bool:
-    """Whether a case has enough different draws for an interval, and not a few weighted ones."""
-    return len(np.unique(case.limit.samples)) >= _FEWEST
-
-
-def raw_limits(study: StudyAnalysis) -> dict[str, tuple[Any, ...]]:
-    """Limits of each user's recordings by themselves, by the label of the user's case."""
-    found: dict[str, tuple[Any, ...]] = {}
-    for case in study.users:
-        found[case.label] = tuple(
-            one.analysis.limit
-            for one in study.recordings
-            if one.analysis is not None and one.entry.user is not None and belongs(one, case)
-        )
-    return found
-
-
-def belongs(one: Analysed, case: Case) -> bool:
-    """Whether a recording is of the user, and the configuration, of a case."""
-    user = f"user {one.entry.user}"
-    return case.label in (user, user + place_of(one.entry.configuration))
 
 
 def population(found: Population) -> Rows:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.report.estimates import decibel
-from bayeshaptic.report.quantities import estimate, percent, pure
-from bayeshaptic.report.study.bands import band_of
-from bayeshaptic.stability.cases import CONFIGURATION, FREE
+from bayeshaptic.report.numbers.bands import band_of
+from bayeshaptic.report.numbers.cases import is_free
+from bayeshaptic.report.numbers.estimates import decibel
+from bayeshaptic.report.numbers.quantities import estimate, percent, pure
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
@@ -22,11 +22,6 @@ _AS_BAD_DB = 1.0
 _BETWEEN_DB = 0.1  # beyond the ends of a range, worth a word
 _CONFIGURATION = ", configuration "
 Z90 = 3.29  # width of a normal 90 % interval in standard deviations
-
-
-def is_free(label: str, group: str) -> bool:
-    """Whether nobody holds the device in a case, recorded or predicted along a coordinate."""
-    return group == FREE or (group == CONFIGURATION and label.endswith("nobody holds it"))
 
 
 def hands(study: StudyAnalysis) -> str:

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bayeshaptic.errors import InputError
-from bayeshaptic.report.draft import draft_in, move_all
+from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.study.headline import study_headline
@@ -18,13 +17,18 @@ from bayeshaptic.report.walls.section import limits_section, table_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
-    from bayeshaptic.report.section import Section
+    from bayeshaptic.report.page.section import Section
     from bayeshaptic.stability.cases import Case
     from bayeshaptic.study.analysis import StudyAnalysis
 
 # Whoever waits for a report looks for its numbers: they arrive when the rest is there.
 _LAST = "population.json"
-_MAY_BE_MISSING = ("limits.json", "limits.csv", "index.html")
+_MAY_BE_MISSING = (
+    "limits.json",
+    "limits.csv",
+    "index.html",
+    *(f"{picture.name}.png" for picture in STUDY_PICTURES),
+)
 
 
 def write_study_report(
@@ -59,12 +63,9 @@ def write_study_report(
         If `out_dir` is a file.
     """
     out = Path(out_dir).resolve()
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out_dir}: is a file; name a folder for the report.")
     links = {name: _link(Path(page), out) for name, page in (pages or {}).items()}
-    with draft_in(out) as draft:
-        _write_all(study, draft, links, walls)
-        _move(draft, out)
+    with report_in(out_dir, _LAST, _MAY_BE_MISSING) as folder:
+        _write_all(study, folder, links, walls)
     return out / "report.html"
 
 
@@ -109,11 +110,3 @@ def _analysis_of(case: Case, study: StudyAnalysis) -> Analysis | None:
 
 def _link(page: Path, out: Path) -> str:
     return Path(os.path.relpath(page.resolve(), out)).as_posix()
-
-
-def _move(draft: Path, out: Path) -> None:
-    older = (*_MAY_BE_MISSING, *(f"{picture.name}.png" for picture in STUDY_PICTURES))
-    for name in older:  # one of an older report would contradict this one
-        if not (draft / name).exists():
-            (out / name).unlink(missing_ok=True)
-    move_all(draft, out, _LAST)

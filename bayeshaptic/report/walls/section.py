@@ -10,8 +10,8 @@ import numpy as np
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures.walls import curve as limits_curve
 from bayeshaptic.report.figures.walls import kb as limits_kb
-from bayeshaptic.report.section import Section, section
-from bayeshaptic.report.walls.rules import rules_of
+from bayeshaptic.report.numbers.rules import rules_of
+from bayeshaptic.report.page.section import Section, section
 from bayeshaptic.report.walls.words import rule_rows, width_rows, words
 from bayeshaptic.stability.cases import FREE, HELD, Case, DeviceLimit
 from bayeshaptic.stability.walls.damping import Damping

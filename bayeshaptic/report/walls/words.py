@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bayeshaptic.report.quantities import percent, pretty_unit, pure, quantity
+from bayeshaptic.report.numbers.quantities import percent, pretty_unit, pure, quantity
 
 if TYPE_CHECKING:
-    from bayeshaptic.report.walls.rules import Rules
+    from bayeshaptic.report.numbers.rules import Rules
     from bayeshaptic.stability.walls.limit_table import FilterLimits, LimitTable
     from bayeshaptic.stability.walls.width import ZWidth
 

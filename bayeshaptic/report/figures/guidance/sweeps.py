@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import scale
+from bayeshaptic.report.numbers.quantities import scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.recordings.response.etfe import RandomSpectra
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import scale
+from bayeshaptic.report.numbers.quantities import scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

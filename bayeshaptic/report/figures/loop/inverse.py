@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import scale
+from bayeshaptic.report.numbers.quantities import scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.figures.residuals import third_octaves
+from bayeshaptic.report.figures.octaves import noise_band, rms_axis
+from bayeshaptic.report.numbers.octaves import third_octaves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,13 +39,13 @@ def draw(closed: Closed) -> Figure:
         frequency, residual = _sorted(fit)
         bands = third_octaves(frequency, residual)
         if number == 0:
-            _noise(top, bands)
+            noise_band(top, bands)
         label = list(fits)[number]
         top.plot(bands.frequency_hz, bands.rms, label=label, linewidth=1.1, markersize=4, **look)
         lowest = min(lowest, float(bands.rms.min()))
         highest = max(highest, float(bands.rms.max()), float(bands.high.max()))
         _scores(bottom, fit, look)
-    _axis(top, lowest, highest)
+    rms_axis(top, lowest, highest)
     style.legend(top, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.1)
     everywhere = closed.base.fit.frequency_hz
     low, high = everywhere.min() / 1.05, everywhere.max() * 1.05
@@ -57,18 +58,6 @@ def draw(closed: Closed) -> Figure:
 def _sorted(fit: Fit) -> tuple[NDArray[Any], NDArray[Any]]:
     order = np.argsort(fit.frequency_hz)
     return fit.frequency_hz[order], fit.residual[order]
-
-
-def _noise(axes: Axes, bands: Any) -> None:
-    axes.fill_between(
-        bands.frequency_hz,
-        bands.low,
-        bands.high,
-        color="#bdbdbd",
-        alpha=0.45,
-        linewidth=0,
-        label="99 % of pure noise",
-    )
 
 
 def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> None:
@@ -88,16 +77,3 @@ def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> None:
         axes.yaxis.set_major_locator(FixedLocator([-2, 0, 2, *tens]))
         axes.yaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
-
-
-def _axis(axes: Axes, lowest: float, highest: float) -> None:
-    if highest > 6:
-        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-        axes.set_yscale("log")
-        axes.set_ylim(0.9 * lowest, 1.3 * highest)
-        axes.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-        axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-    else:
-        axes.set_ylim(0, 1.1 * highest)

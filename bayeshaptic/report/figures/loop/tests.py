@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.loop.tables import question
+from bayeshaptic.report.numbers.titles import question
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

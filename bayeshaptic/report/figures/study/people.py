@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.report.estimates import RISKS, decibel
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import percent, pretty_unit
-from bayeshaptic.report.study.tables import has_draws, raw_limits
+from bayeshaptic.report.figures.histogram import BINS, risk_lines, stacked
+from bayeshaptic.report.numbers.cases import has_draws, raw_limits
+from bayeshaptic.report.numbers.estimates import decibel
+from bayeshaptic.report.numbers.quantities import pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
     from bayeshaptic.study.analysis import StudyAnalysis
 
-BINS = 60
 _ROW_IN = 0.26
 _NARROWEST_DB = 0.2  # of the axis: a population that does not differ is not to look as if it did
 
@@ -50,30 +50,12 @@ def _histogram(axes: Axes, study: StudyAnalysis) -> None:
         return
     case = study.new_person[0]
     edges = _edges(study, in_db(case))
-    base = np.zeros(len(edges) - 1)
     samples = case.limit.samples
-    for number, crossing in enumerate(case.limit.crossings):
-        use = (case.limit.group == number) & np.isfinite(samples) & (samples > 0)
-        part = 20 * np.log10(samples[use])
-        height = np.histogram(part, edges)[0] / (len(samples) * np.diff(edges))
-        colour = style.CYCLE[number % len(style.CYCLE)]
-        axes.stairs(
-            base + height,
-            edges,
-            baseline=base,
-            fill=True,
-            facecolor=colour,
-            alpha=0.55,
-            edgecolor=style.DATA,
-            linewidth=0.0,
-            hatch=style.HATCHES[number % len(style.HATCHES)],
-            label=f"{crossing.label}: {percent(crossing.probability)}",
-        )
-        axes.stairs(base + height, edges, baseline=base, color=colour, linewidth=0.8)
-        base = base + height
+    positive = np.where(np.isfinite(samples) & (samples > 0), samples, np.nan)
+    stacked(axes, case.limit, 20 * np.log10(positive), edges)
     axes.set_xlim(edges[0], edges[-1])
     axes.set_ylim(0, 1.25 * axes.get_ylim()[1])
-    _safe(axes, case)
+    risk_lines(axes, case.limit, decibel, "for such a person")
     _references(axes, study)
     axes.set_title("a person not yet seen", fontsize=style.FONT, loc="left", fontweight="bold")
     style.legend(axes, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4)
@@ -88,19 +70,6 @@ def _edges(study: StudyAnalysis, values: NDArray[Any]) -> NDArray[Any]:
     low, high = min([low, *inside]), max([high, *inside])
     margin = max(0.04 * (high - low), 0.5 * (_NARROWEST_DB - (high - low)))
     return np.linspace(low - margin, high + margin, BINS + 1)
-
-
-def _safe(axes: Axes, case: Case) -> None:
-    for number, risk in enumerate(RISKS):
-        safe = case.limit.safe(risk)
-        if safe:
-            axes.axvline(
-                decibel(safe),
-                color=style.DATA,
-                linewidth=1.0,
-                linestyle=style.DASHES[1:][number],
-                label=f"{percent(risk)} risk for such a person",
-            )
 
 
 def _references(axes: Axes, study: StudyAnalysis) -> None:

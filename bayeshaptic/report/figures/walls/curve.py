@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import percent, scale
+from bayeshaptic.report.numbers.quantities import percent, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.quantities import percent, scale
+from bayeshaptic.report.numbers.quantities import percent, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bayeshaptic.report.walls.rules import Rules
+    from bayeshaptic.report.numbers.rules import Rules
     from bayeshaptic.stability.walls.limit_table import FilterLimits, LimitTable
 
 # Stable with at least these probabilities, from the surest on.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.report.figures.style import Drawn, drawn
-from bayeshaptic.report.html import embedded, template
+from bayeshaptic.report.page.frame import embedded, template
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,8 +8,8 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.misfit import misfit_is_clear
-from bayeshaptic.report.result import families_of, is_unexplained
+from bayeshaptic.report.numbers.misfit import misfit_is_clear
+from bayeshaptic.report.numbers.result import families_of, is_unexplained
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from bayeshaptic.inference.least_squares import MISFIT
-from bayeshaptic.report.quantities import pure
+from bayeshaptic.report.numbers.quantities import pure
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.result import families_of
+from bayeshaptic.report.numbers.result import families_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
+QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 RISKS = (0.05, 0.01, 0.001)
 RULE_DRAWS = 4000
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.report.estimates import RULE_DRAWS
+from bayeshaptic.report.numbers.estimates import RULE_DRAWS
 from bayeshaptic.stability.rules import (
     ground_damping,
     passivity_limit,

@@ -1,0 +1,103 @@
+"""What every page has: templates, style, script, contents, figures inside of the page."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic.version import __version__
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+    from bayeshaptic.errors import Notice
+    from bayeshaptic.report.figures.style import Drawn
+
+TEMPLATES = Path(__file__).parents[1] / "templates"
+LABELS = {
+    "safe": "Recommendation",
+    "caution": "Recommendation, with caution",
+    "untrusted": "No recommendation",
+}
+
+
+@dataclass(frozen=True)
+class EmbeddedPicture:
+    """A figure inside of the page: as SVG, or as PNG where that is smaller."""
+
+    name: str
+    alternative: str
+    source: str
+    width: int
+    height: int
+    svg: str | None = None
+
+
+def frame() -> dict[str, Any]:
+    """What every page has: style, script and its hash, version, the moment."""
+    script = (TEMPLATES / "page.js").read_text(encoding="utf-8")
+    digest = hashlib.sha256(script.encode()).digest()
+    return {
+        "style": style(),
+        "script": script,
+        "script_hash": base64.b64encode(digest).decode("ascii"),
+        "version": __version__,
+        "written": written(),
+    }
+
+
+def with_contents(page: str, contents: Sequence[tuple[str, str]]) -> str:
+    """The page with links to those of the sections that it has."""
+    links = "".join(
+        f'<a href="#{key}">{name}</a>\n' for key, name in contents if f'<section id="{key}"' in page
+    )
+    place = page.index("</nav>")
+    return page[:place] + links + page[place:]
+
+
+def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+    """Warnings first, without repetitions."""
+    once = tuple(dict.fromkeys(notices))
+    return tuple(sorted(once, key=lambda notice: notice.level != "warning"))
+
+
+def embedded(name: str, drawn: Drawn, words: str) -> EmbeddedPicture:
+    """A figure as a part of the page, with the words that stand for it."""
+    width, height = struct.unpack(">II", drawn.png[16:24])  # of the PNG's header
+    if drawn.svg is not None:
+        label = f'role="img" aria-label="{html.escape(words)}"'
+        svg = drawn.svg.replace("<svg", f"<svg {label}", 1)
+        return EmbeddedPicture(name, words, "", width, height, svg)
+    source = "data:image/png;base64," + base64.b64encode(drawn.png).decode("ascii")
+    return EmbeddedPicture(name, words, source, width, height)
+
+
+def template(name: str) -> Template:
+    """A template of the folder `templates`."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES, encoding="utf-8"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(name)
+
+
+def style() -> str:
+    """The style sheet of every page."""
+    return (TEMPLATES / "report.css").read_text(encoding="utf-8")
+
+
+def written() -> str:
+    """The moment, for a person."""
+    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
