@@ -22,6 +22,9 @@ from .diagnosis.closed import (
 from .diagnosis.closed import (
     close_loop as close_loop,
 )
+from .diagnosis.options import (
+    Options as Options,
+)
 from .errors import (
     BayeshapticWarning as BayeshapticWarning,
 )

@@ -81,7 +81,8 @@ def test_attributes_are_documented(name: str, value: type) -> None:
     assert value.__doc__ and not value.__doc__.startswith(f"{name}("), f"{name} has no docstring"
     if dataclasses.is_dataclass(value):
         fields = [field.name for field in dataclasses.fields(value) if field.name[0] != "_"]
-        missing = [field for field in fields if field not in mentioned(value.__doc__)]
+        said = {name for kind in value.__mro__[:-1] for name in mentioned(kind.__doc__ or "")}
+        missing = [field for field in fields if field not in said]
         assert not missing, f"{name}: undocumented attributes {missing}"
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
-from bayeshaptic.numerics.spending import BUDGET_S
-
-if TYPE_CHECKING:
-    from bayeshaptic.jobs.job import Settings
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.jobs.job import Settings
 
 MODELS = ("auto", "rigid", "free", "grasped")
 
@@ -57,6 +58,13 @@ def band(text: str) -> tuple[float, float]:
     return low, high
 
 
+def yes_or_no(text: str) -> bool:
+    """``yes`` or ``no``."""
+    if text not in ("yes", "no"):
+        raise argparse.ArgumentTypeError(f"{text!r} must be yes or no")
+    return text == "yes"
+
+
 def span(text: str) -> tuple[float | None, float | None]:
     """``A:B`` with 0 <= A < B, either of which may be left out."""
     parts = text.split(":")
@@ -68,105 +76,84 @@ def span(text: str) -> tuple[float | None, float | None]:
     return low, high
 
 
+@dataclass(frozen=True)
+class Flag:
+    """One option of the command line, which sets a field of `Settings` and has its description.
+
+    Attributes
+    ----------
+    name : str
+    field : str
+    how : mapping
+        For `argparse`.
+    """
+
+    name: str
+    field: str
+    how: Mapping[str, Any]
+
+
+READING = (
+    Flag("--columns", "columns", {"metavar": "MAP"}),
+    Flag("--period-s", "period_s", {"type": positive, "metavar": "T"}),
+    Flag("--encoder-resolution", "encoder_resolution", {"type": positive, "metavar": "Q"}),
+    Flag("--rows", "rows", {"type": span, "metavar": "A:B"}),
+    Flag("--seconds", "seconds", {"type": span, "metavar": "A:B"}),
+    Flag("--allow-outside", "allow_outside", {"action": "store_true"}),
+)
+ANALYSIS = (
+    Flag("--model", "model", {"choices": MODELS}),
+    Flag("--device", "device", {"metavar": "NAME"}),
+    Flag("--delay-s", "delay_s", {"type": non_negative, "metavar": "SECONDS"}),
+    Flag("--delay-sd-s", "delay_sd_s", {"type": non_negative, "metavar": "SECONDS"}),
+    Flag("--band", "band_hz", {"type": band, "metavar": "LOW,HIGH"}),
+    Flag("--held", "held", {"type": yes_or_no, "metavar": "yes|no"}),
+    Flag("--loop", "close_loop", {"action": argparse.BooleanOptionalAction}),
+    Flag("--budget", "budget_s", {"type": positive, "metavar": "SECONDS"}),
+    Flag("--seed", "seed", {"type": seed, "metavar": "N"}),
+)
+_NOT_BOTH = ("rows", "seconds")
+
+
 def add_analysis_options(parser: argparse.ArgumentParser) -> None:
     """The options that say how recordings are read and analysed."""
-    reading = parser.add_argument_group("how the recording is read")
-    reading.add_argument(
-        "--columns",
-        metavar="MAP",
-        help="which columns, variables or datasets hold time, force and position, with scale "
-        "factors and units (N, Nm, A; m, rad), where they are not called as above; "
-        "for example time=t*1e-6,force=u[A],position=q[rad]",
-    )
-    reading.add_argument(
-        "--period-s",
-        type=positive,
-        metavar="T",
-        help="sampling period in seconds (default: from the time stamps)",
-    )
-    reading.add_argument(
-        "--encoder-resolution",
-        type=positive,
-        metavar="Q",
-        help="one encoder count, in m or rad (default: from the device, or from the data)",
-    )
-    part = reading.add_mutually_exclusive_group()
-    part.add_argument(
-        "--rows",
-        type=span,
-        metavar="A:B",
-        help="read rows A to B only, counted from 1; either may be left out",
-    )
-    part.add_argument(
-        "--seconds",
-        type=span,
-        metavar="A:B",
-        help="read from A to B seconds after the first row only; either may be left out",
-    )
-    reading.add_argument(
-        "--allow-outside",
-        action="store_true",
-        help="let a study read files outside its own folder",
-    )
-    analysis = parser.add_argument_group("how it is analysed")
-    analysis.add_argument(
-        "--model",
-        choices=MODELS,
-        default="auto",
-        help="mechanism to fit: one mass, two masses, or three with a user's hand (default: auto, "
-        "chosen from the data, and the report says why)",
-    )
-    analysis.add_argument(
-        "--device",
-        metavar="NAME",
-        help="device file with priors and delay: lhifam, phantom, or the path of a TOML file "
-        "(default: what the recording or the study names, or no device)",
-    )
-    analysis.add_argument(
-        "--delay-s",
-        type=non_negative,
-        metavar="SECONDS",
-        help="loop delay, beyond the hold (default: the device's, or inferred)",
-    )
-    analysis.add_argument(
-        "--delay-sd-s",
-        type=non_negative,
-        metavar="SECONDS",
-        help="standard deviation of --delay-s (default: the device's; 0 means known exactly)",
-    )
-    analysis.add_argument(
-        "--band",
-        type=band,
-        metavar="LOW,HIGH",
-        help="frequencies used, in Hz (default: chosen from the data)",
-    )
-    analysis.add_argument(
-        "--held",
-        choices=("yes", "no"),
-        help="whether somebody held the device: then the base model is chosen among those of held, "
-        "or of free, devices (default: from the data; of a study, from its users)",
-    )
-    analysis.add_argument(
-        "--no-loop",
-        action="store_true",
-        help="take the model as it is, without looking for what it lacks: quicker, and the limit "
-        "may be far off where something is missing",
-    )
-    analysis.add_argument(
-        "--budget",
-        type=positive,
-        default=BUDGET_S,
-        metavar="SECONDS",
-        help="what looking for what the model lacks may cost, in nominal seconds: evaluations are "
-        "counted, so that the verdict is the same on every machine (default: %(default)g)",
-    )
-    analysis.add_argument(
-        "--seed",
-        type=seed,
-        default=0,
-        metavar="N",
-        help="seed of the sampler: the same seed gives the same report (default: 0)",
-    )
+    said = descriptions(Options) | descriptions(Settings)
+    for title, flags in (("read", READING), ("analysed", ANALYSIS)):
+        group = parser.add_argument_group(f"how the recording is {title}")
+        part = group.add_mutually_exclusive_group() if flags is READING else group
+        for flag in flags:
+            (part if flag.field in _NOT_BOTH else group).add_argument(
+                flag.name,
+                dest=flag.field,
+                default=argparse.SUPPRESS,
+                help=said.get(flag.field),
+                **flag.how,
+            )
+
+
+def settings_from(arguments: argparse.Namespace) -> Settings:
+    """What `add_analysis_options` understood, as one thing."""
+    given = (flag.field for flag in (*READING, *ANALYSIS) if hasattr(arguments, flag.field))
+    return Settings(**{field: getattr(arguments, field) for field in given})
+
+
+def descriptions(kind: type) -> dict[str, str]:
+    """What the docstring of a class says of each attribute, as help: lower case, no full stop."""
+    _, _, attributes = inspect.cleandoc(kind.__doc__ or "").partition("Attributes\n----------\n")
+    found: dict[str, list[str]] = {}
+    names: list[str] = []
+    for line in attributes.splitlines():
+        if line.startswith(" "):
+            for name in names:
+                found[name].append(line.strip())
+        else:
+            names = line.partition(" :")[0].split(", ")
+            found |= {name: [] for name in names}
+    return {name: _as_help(" ".join(lines)) for name, lines in found.items()}
+
+
+def _as_help(text: str) -> str:
+    return text[:1].lower() + text[1:].rstrip(".").replace("%", "%%")
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
@@ -184,29 +171,6 @@ def workers_from(arguments: argparse.Namespace) -> int:
     from bayeshaptic.jobs.executors import usable_cores
 
     return arguments.workers or usable_cores()
-
-
-def settings_from(arguments: argparse.Namespace) -> Settings:
-    """What `add_analysis_options` understood, as one thing."""
-    from bayeshaptic.jobs.job import Settings
-
-    return Settings(
-        columns=arguments.columns,
-        period_s=arguments.period_s,
-        encoder_resolution=arguments.encoder_resolution,
-        model=arguments.model,
-        device=arguments.device,
-        delay_s=arguments.delay_s,
-        delay_sd_s=arguments.delay_sd_s,
-        band_hz=arguments.band,
-        seed=arguments.seed,
-        budget_s=arguments.budget,
-        close_loop=not arguments.no_loop,
-        held=None if arguments.held is None else arguments.held == "yes",
-        allow_outside=arguments.allow_outside,
-        rows=arguments.rows,
-        seconds=arguments.seconds,
-    )
 
 
 def command_line() -> str:

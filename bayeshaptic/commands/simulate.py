@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.commands.options import add_quiet, band, non_negative, positive, seed
 from bayeshaptic.errors import InputError
@@ -27,6 +27,70 @@ EXAMPLES = """\
   bayeshaptic simulate lhifam --effect coulomb_friction=force:1.5 -o rubbing.csv"""
 
 
+OPTIONS: dict[str, dict[str, Any]] = {
+    "--seconds": {
+        "type": positive,
+        "default": 30.0,
+        "metavar": "S",
+        "help": "duration (default: 30)",
+    },
+    "--period-s": {
+        "type": positive,
+        "metavar": "T",
+        "help": "sampling period (default: the device's)",
+    },
+    "--delay-s": {
+        "type": non_negative,
+        "metavar": "SECONDS",
+        "help": "loop delay (default: the device's)",
+    },
+    "--encoder-resolution": {
+        "type": positive,
+        "metavar": "Q",
+        "help": "one encoder count, in m or rad (default: the device's)",
+    },
+    "--excitation": {
+        "choices": ("noise", "multisine", "chirp", "prbs", "step", "relay"),
+        "default": "noise",
+        "help": "white noise in the band, a multisine with lines 1 Hz apart, a chirp through the "
+        "band, a pseudo-random binary sequence, steps twice a second, or a relay experiment, force "
+        "= -F sign(position) (default: noise)",
+    },
+    "--hysteresis": {
+        "type": non_negative,
+        "default": 0.0,
+        "metavar": "Q",
+        "help": "of the relay: it switches where the position has passed zero by so much, in m or "
+        "rad (default: 0)",
+    },
+    "--force-rms": {
+        "type": positive,
+        "metavar": "F",
+        "help": "root mean square of the excitation, N or N m; of a relay that is its F (default: "
+        "what is usual for the device, three times that for a relay)",
+    },
+    "--band": {
+        "type": band,
+        "metavar": "LOW,HIGH",
+        "help": "of the excitation, in Hz (default: the device's)",
+    },
+    "--effect": {
+        "action": "append",
+        "default": [],
+        "metavar": "NAME[=FIELD:VALUE,...]",
+        "help": "something that the plain model lacks, at a typical strength or with the fields "
+        "given; may come more than once. An unknown name or field lists the known ones",
+    },
+    "--seed": {
+        "type": seed,
+        "default": 0,
+        "metavar": "N",
+        "help": "the same seed gives the same recording (default: 0)",
+    },
+    "--force": {"action": "store_true", "help": "overwrite FILE where it exists"},
+}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The device, the file, and what is simulated."""
     parser.add_argument(
@@ -45,66 +109,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     hand.add_argument(
         "--free", dest="held", action="store_false", help="nobody holds it (the default)"
     )
-    parser.add_argument(
-        "--seconds", type=positive, default=30.0, metavar="S", help="duration (default: 30)"
-    )
-    parser.add_argument(
-        "--period-s", type=positive, metavar="T", help="sampling period (default: the device's)"
-    )
-    parser.add_argument(
-        "--delay-s", type=non_negative, metavar="SECONDS", help="loop delay (default: the device's)"
-    )
-    parser.add_argument(
-        "--encoder-resolution",
-        type=positive,
-        metavar="Q",
-        help="one encoder count, in m or rad (default: the device's)",
-    )
-    parser.add_argument(
-        "--excitation",
-        choices=("noise", "multisine", "chirp", "prbs", "step", "relay"),
-        default="noise",
-        help="white noise in the band, a multisine with lines 1 Hz apart, a chirp through the "
-        "band, a pseudo-random binary sequence, steps twice a second, or a relay experiment, force "
-        "= -F sign(position) (default: noise)",
-    )
-    parser.add_argument(
-        "--hysteresis",
-        type=non_negative,
-        default=0.0,
-        metavar="Q",
-        help="of the relay: it switches where the position has passed zero by so much, in m or rad "
-        "(default: 0)",
-    )
-    parser.add_argument(
-        "--force-rms",
-        type=positive,
-        metavar="F",
-        help="root mean square of the excitation, N or N m; of a relay that is its F (default: "
-        "what is usual for the device, three times that for a relay)",
-    )
-    parser.add_argument(
-        "--band",
-        type=band,
-        metavar="LOW,HIGH",
-        help="of the excitation, in Hz (default: the device's)",
-    )
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME[=FIELD:VALUE,...]",
-        help="something that the plain model lacks, at a typical strength or with the fields "
-        "given; may come more than once. An unknown name or field lists the known ones",
-    )
-    parser.add_argument(
-        "--seed",
-        type=seed,
-        default=0,
-        metavar="N",
-        help="the same seed gives the same recording (default: 0)",
-    )
-    parser.add_argument("--force", action="store_true", help="overwrite FILE where it exists")
+    for name, how in OPTIONS.items():
+        parser.add_argument(name, **how)
     add_quiet(parser)
 
 

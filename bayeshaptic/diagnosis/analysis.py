@@ -13,7 +13,8 @@ from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.feedback.in_loop import InLoop
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
-from bayeshaptic.diagnosis.options import Options, measurement_of
+from bayeshaptic.diagnosis.measured import device_of, measurement_of
+from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.choose import Choice, choose_model
 from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
@@ -140,7 +141,7 @@ def analyse(
     InputError
         Where the measurement cannot be used, or the model does not fit it in kind.
     """
-    chosen = (options or Options()).with_changes(changes)
+    chosen = options_from(options, changes)
     begun = begin(measurement_of(measurement, model, chosen), model, chosen)
     done = finish(begun, begun.etfe, begun.fit, chosen)
     return replace(done, notices=done.notices + _residual_notice(begun))
@@ -166,7 +167,7 @@ class Begun:
 def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -> Begun:
     """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
     clock = _Clock()
-    device = options.device_of(model)
+    device = device_of(options, model)
     notices: tuple[Notice, ...] = ()
     if isinstance(measurement, Recording):
         with clock.stage("checks"):

@@ -22,7 +22,8 @@ from bayeshaptic.diagnosis.feedback.explain import (
     explain_force,
     trace_force,
 )
-from bayeshaptic.diagnosis.options import Options, measurement_of
+from bayeshaptic.diagnosis.measured import measurement_of
+from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
@@ -129,7 +130,7 @@ def close_loop(
     InputError
         Where the measurement cannot be used.
     """
-    chosen = (options or Options()).with_changes(changes)
+    chosen = options_from(options, changes)
     begun = begin(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
     began = time.perf_counter()
     force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None

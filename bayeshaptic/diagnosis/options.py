@@ -1,4 +1,8 @@
-"""How a measurement is analysed: the options of `analyse`, of `close_loop` and of studies."""
+"""How a measurement is analysed: the options of `analyse`, of `close_loop`, of studies and jobs.
+
+Each option is described here and nowhere else: the command line takes its help from the docstring
+of the class.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,17 @@ import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
-from bayeshaptic.devices import Device, load_device
+from bayeshaptic.arguments import band, instance, mapping, number, whole
+from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError
-from bayeshaptic.models import Model, Prior
 from bayeshaptic.numerics.spending import BUDGET_S
-from bayeshaptic.recordings.read import read_measurement
-from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.types import Progress
+from bayeshaptic.progress import told
+
+if TYPE_CHECKING:
+    from bayeshaptic.models.prior import Prior
+    from bayeshaptic.types import Progress
 
 
 @dataclass(frozen=True)
@@ -25,26 +30,32 @@ class Options:
     Attributes
     ----------
     device : str, Path, Device or None
-        By default the model's, if it has one.
-    delay_s, delay_sd_s : float or None
-        Loop delay and its standard deviation, s; by default the device's, else free.
+        Device file with priors and delay: lhifam, phantom, or the path of a TOML file; by default
+        what the model, the recording or the study names, or no device.
+    delay_s : float or None
+        Loop delay in seconds, beyond the hold; by default the device's, or inferred.
+    delay_sd_s : float or None
+        Standard deviation of the delay in seconds, 0 where it is known exactly; by default the
+        device's.
     band_hz : (float, float) or None
-        Lowest and highest frequency used; by default chosen from the data.
+        Lowest and highest frequency used, in Hz; by default chosen from the data.
     prior : mapping
         Your own priors by parameter name.
     held : bool or None
-        Whether somebody held the device; unknown by default.
+        Whether somebody held the device: the base model is then chosen among those of held, or of
+        free, devices; by default from the data, in a study from its users.
     lever_m : float or None
-        From the axis to the tip; by default the device's.
+        From the axis to the tip, in metres; by default the device's.
     ess : float or None
         Effective draws of every parameter; by default what the limit wants
         (`bayeshaptic.diagnosis.limit_known`).
     seed : int
+        Of the sampler: the same seed gives the same report; by default 0.
     budget_s : float
-        What the search for effects may cost, in nominal seconds: evaluations are counted, so that
-        the verdict is the same on every machine (`bayeshaptic.numerics.spending`).
-    progress : callable or None
-        Called with the share done, 0 to 1, and a word about it.
+        What looking for what the model lacks may cost, in nominal seconds: evaluations are counted,
+        so that the verdict is the same on every machine; by default 60.
+    progress : callable, bool or None
+        Called with the share done, 0 to 1, and a word about it; True draws a bar.
     """
 
     device: str | Path | Device | None = None
@@ -57,10 +68,28 @@ class Options:
     ess: float | None = None
     seed: int = 0
     budget_s: float = BUDGET_S
-    progress: Progress | None = field(default=None, compare=False)
+    progress: Progress | bool | None = field(default=None, compare=False)
 
-    def with_changes(self, changes: Mapping[str, Any]) -> Options:
-        """The same with some of them changed.
+    def __post_init__(self) -> None:
+        if self.device is not None:
+            instance("device", self.device, (str, Path, Device), "its name, a path or a Device")
+        for name in ("delay_s", "delay_sd_s"):
+            if getattr(self, name) is not None and getattr(self, name) != float("inf"):
+                number(name, getattr(self, name), least=0.0)
+        for name in ("lever_m", "ess"):
+            if getattr(self, name) is not None:
+                number(name, getattr(self, name), above=0.0)
+        if self.band_hz is not None:
+            band("band_hz", self.band_hz)
+        if self.held is not None:
+            instance("held", self.held, bool, "True, False or None")
+        number("budget_s", self.budget_s, above=0.0)
+        whole("seed", self.seed)
+        object.__setattr__(self, "prior", _priors(self.prior))
+        object.__setattr__(self, "progress", told(self.progress))
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Self:
+        """The same with some of them changed: `changes` by name.
 
         Raises
         ------
@@ -73,57 +102,37 @@ class Options:
                 near = difflib.get_close_matches(name, known, 1)
                 hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
                 raise InputError(f"there is no option {name!r}; {hint}")
-        given = dict(changes)
-        if given.get("prior", {}) is None:
-            given["prior"] = {}
-        return replace(self, **given)
+        return replace(self, **changes)
 
     def report(self, share: float, word: str) -> None:
-        """Tell whoever waits."""
-        if self.progress is not None:
+        """Tell whoever waits that a `share` (0 to 1) is done, and a `word` about it."""
+        if callable(self.progress):
             self.progress(share, word)
 
-    def within(self, begin: float, end: float) -> Options:
+    def within(self, begin: float, end: float) -> Self:
         """The same for one stage, whose progress goes from `begin` to `end` of the whole."""
         whole = self.report
         return replace(
             self, progress=lambda share, word: whole(begin + (end - begin) * share, word)
         )
 
-    def device_of(self, model: str | Model) -> Device | None:
-        """The device, loaded; by default that of `model`."""
-        if isinstance(self.device, str | Path):
-            return load_device(self.device)
-        if self.device is None and isinstance(model, Model):
-            return model.device
-        return self.device
 
-
-def measurement_of(
-    measurement: Recording | Etfe | str | Path, model: str | Model, options: Options
-) -> Recording | Etfe:
-    """The measurement, read where a path was given.
+def options_from(options: Options | None, changes: Mapping[str, Any]) -> Options:
+    """The options that a caller gave, as one thing and by name.
 
     Raises
     ------
     InputError
-        Where it is none, or cannot be read.
+        Where one of them cannot be.
     """
-    if isinstance(model, Recording | Etfe):
-        raise InputError("the measurement comes first: close_loop(recording, model).")
-    if isinstance(measurement, str | Path):
-        device = options.device_of(model)
-        if device is None:
-            return read_measurement(Path(measurement))
-        return read_measurement(
-            Path(measurement),
-            encoder_resolution=device.encoder_resolution,
-            kind=device.kind,
-            default_period_s=device.period_s,
-        )
-    if not isinstance(measurement, Recording | Etfe):
-        raise InputError(
-            f"a measurement is a recording, an ETFE or a path, not {type(measurement).__name__}; "
-            "see bayeshaptic.read_recording."
-        )
-    return measurement
+    if options is not None:
+        instance("options", options, Options, "single options by name, as in delay_s=1e-4")
+    return (options or Options()).with_changes(changes)
+
+
+def _priors(prior: Any) -> dict[str, Prior]:
+    if not prior and (prior is None or isinstance(prior, Mapping)):
+        return {}
+    from bayeshaptic.models.prior import Prior
+
+    return mapping("prior", prior, Prior, "a prior, as in bayeshaptic.LogNormal(0.1, 0.2)")

@@ -10,7 +10,7 @@ import concurrent.futures
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from bayeshaptic.errors import InputError
@@ -225,7 +225,7 @@ class _Batch:
 
     def write(self) -> None:
         """Manifest and index."""
-        write_manifest(self.folder, self.entries, self.command, asdict(self.settings))
+        write_manifest(self.folder, self.entries, self.command, self.settings.facts())
         write_index(self.folder, [row for entry in self.entries.values() for row in entry.rows])
         self._written = time.monotonic()
 

@@ -3,56 +3,80 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
+from bayeshaptic.arguments import instance, number
+from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
-from bayeshaptic.numerics.spending import BUDGET_S
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How recordings are read and analysed: the options of the command ``report``.
+class Settings(Options):
+    """How recordings are read and analysed: what the command ``report`` can be asked for.
+
+    Besides the options of `analyse` (`bayeshaptic.diagnosis.options`):
 
     Attributes
     ----------
-    columns : str or None
-        Mapping of the file's columns.
-    period_s, encoder_resolution : float or None
     model : str
-        "auto", "rigid", "free" or "grasped".
-    device : str or None
-        Name or path of a device file; for a study, instead of the study's own.
-    delay_s, delay_sd_s : float or None
-    band_hz : (float, float) or None
-    seed : int
-    budget_s : float
-        What looking for it may cost, in nominal seconds.
-    held : bool or None
-        Whether somebody held the device; of a study its users say so.
+        Mechanism to fit: one mass (rigid), two masses (free), or three with a user's hand
+        (grasped); by default auto, chosen from the data, and the report says why.
     close_loop : bool
-        Whether to look for what the model lacks.
+        Whether to look for what the model lacks, as by default. Without, it is quicker, and the
+        limit may be far off where something is missing.
+    columns : str or None
+        Which columns, variables or datasets hold time, force and position, with scale factors and
+        units (N, Nm, A; m, rad), where they are not called as above; for example
+        time=t*1e-6,force=u[A],position=q[rad].
+    period_s : float or None
+        Sampling period in seconds; by default from the time stamps.
+    encoder_resolution : float or None
+        One encoder count, in m or rad; by default from the device, or from the data.
+    rows : (float or None, float or None), or None
+        Read rows A to B only, counted from 1; either may be left out.
+    seconds : (float or None, float or None), or None
+        Read from A to B seconds after the first row only; either may be left out.
     allow_outside : bool
-        Whether a study may read files outside its folder.
-    rows, seconds : (float or None, float or None), or None
-        The part of a recording that is read.
+        Let a study read files outside its own folder.
     """
 
+    model: str = "auto"
+    close_loop: bool = True
     columns: str | None = None
     period_s: float | None = None
     encoder_resolution: float | None = None
-    model: str = "auto"
-    device: str | None = None
-    delay_s: float | None = None
-    delay_sd_s: float | None = None
-    band_hz: tuple[float, float] | None = None
-    seed: int = 0
-    budget_s: float = BUDGET_S
-    close_loop: bool = True
-    held: bool | None = None
-    allow_outside: bool = False
     rows: tuple[float | None, float | None] | None = None
     seconds: tuple[float | None, float | None] | None = None
+    allow_outside: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        instance("model", self.model, str, "its name, as in 'auto' or 'free'")
+        if self.columns is not None:
+            instance("columns", self.columns, str, "a text such as 'force=u[N],position=q[rad]'")
+        for name in ("period_s", "encoder_resolution"):
+            if getattr(self, name) is not None:
+                number(name, getattr(self, name), above=0.0)
+        for name in ("rows", "seconds"):
+            ends = getattr(self, name)
+            if ends is not None and not (isinstance(ends, tuple) and len(ends) == 2):
+                raise InputError(f"{name} is {ends!r}; give two numbers, as in (2, 30)")
+        for name in ("close_loop", "allow_outside"):
+            instance(name, getattr(self, name), bool, "True or False")
+
+    def facts(self) -> dict[str, Any]:
+        """All of it as plain JSON types, for manifests and reports."""
+        found = {each.name: getattr(self, each.name) for each in fields(self)}
+        del found["progress"]
+        found["prior"] = {name: repr(prior) for name, prior in self.prior.items()}
+        if isinstance(self.device, Device):
+            found["device"] = asdict(self.device)
+        elif self.device is not None:
+            found["device"] = str(self.device)
+        return found
 
 
 @dataclass(frozen=True)

@@ -57,10 +57,11 @@ def entry_of(job: Job) -> Entry:
             files += [entry.path for entry in study.entries]
         except InputError:  # said when it is its turn
             pass
-    if job.settings.device is not None and Path(job.settings.device).is_file():
-        files.append(Path(job.settings.device))
+    device = job.settings.device
+    if isinstance(device, str | Path) and Path(device).is_file():
+        files.append(Path(device))
     inputs = {str(file): sha256(file) for file in files}
-    about = [inputs, asdict(job.settings), versions()]
+    about = [inputs, job.settings.facts(), versions()]
     key = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
     return Entry(str(job.source), str(job.folder), inputs, key)
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device, load_device
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.closed import close_loop
-from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.jobs.job import Job
 from bayeshaptic.recordings.read import read_measurement, recording_name
@@ -59,20 +58,11 @@ def _report(
     """Analyse one measurement and write its report."""
     settings = job.settings
     began = time.perf_counter()
-    options = Options(
-        device=device,
-        delay_s=settings.delay_s,
-        delay_sd_s=settings.delay_sd_s,
-        band_hz=settings.band_hz,
-        seed=settings.seed,
-        budget_s=settings.budget_s,
-        held=settings.held,
-        progress=progress,
-    )
     run = close_loop if settings.close_loop else analyse
+    options = replace(settings, device=device, progress=progress)
     result = run(measurement, settings.model, options)
     seconds = {"read": seconds_of_reading, "analyse": time.perf_counter() - began}
-    origin = provenance(job.command, asdict(settings), settings.seed, job.source, seconds)
+    origin = provenance(job.command, settings.facts(), settings.seed, job.source, seconds)
     return reported(recording_name(job.source), result, job.folder, origin)
 
 

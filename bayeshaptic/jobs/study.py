@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
@@ -135,7 +134,7 @@ def analyse_and_report(
     result = analyse(task, part)
     origin = provenance(
         job.command,
-        asdict(job.settings),
+        job.settings.facts(),
         job.settings.seed,
         task.entry.path,
         {"analyse": time.perf_counter() - began},
@@ -183,15 +182,7 @@ def _analysed(
         study,
         settings.model,
         settings.close_loop,
-        Options(
-            device=settings.device,
-            delay_s=settings.delay_s,
-            delay_sd_s=settings.delay_sd_s,
-            band_hz=settings.band_hz,
-            seed=settings.seed,
-            budget_s=settings.budget_s,
-            progress=None if progress is None else _scaled(progress, _WRITING),
-        ),
+        replace(settings, progress=None if progress is None else _scaled(progress, _WRITING)),
         executor,
     )
 

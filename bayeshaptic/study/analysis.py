@@ -10,7 +10,8 @@ from typing import Any
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.closed import close_loop
-from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.measured import device_of
+from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, describe
 from bayeshaptic.inference.population.infer import Population
@@ -138,8 +139,8 @@ def analyse_study(
         Where a prior of the study cannot be understood.
     """
     prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
-    chosen = (options or Options()).with_changes(changes)
-    device = chosen.device_of(model) or study.device
+    chosen = options_from(options, changes)
+    device = device_of(chosen, model) or study.device
     chosen = replace(chosen, device=device, prior=prior | dict(chosen.prior))
     tasks = [
         Task(number, study, entry, model, close_loop, replace(chosen, progress=None))
