@@ -1,14 +1,18 @@
 """Closing the loop on recordings it has never seen: names, classes, and the truth of K_CR.
 
     python benchmarks/blind.py [--each N] [--others N] [--clean N] [--pairs N] [--seed S]
+        [--known file|delay|nothing] [--drawn]
 
 Recordings come from the virtual bench, which shares no code with the models.  The base model is
 the device as declared, without the effect.  Strengths are the bench's typical ones, fixed by the
-device's motion.  Printed for every effect: "clear", the largest test of the base model's residual
-over its threshold, in the recording where that is least (of clean ones: where it is most; an effect
-is clear from three times that on); how often the class and the name (or a declared tie that holds
-it) are right; the error of K_CR's median in dB; how often its 90 % interval covers the truth before
-and after the loop is closed; and the largest error of the effect's own size.
+device's motion; with --drawn devices, sizes and lengths are random.  --known says what the analysis
+is told: the device's file; or the model, the delay and the encoder alone; or nothing but the
+encoder (then it chooses the model itself).  Printed for every effect: "clear", the largest test of
+the base model's residual over its threshold, in the recording where that is least (of clean ones:
+where it is most; an effect is clear from three times that on); how often the class and the name (or
+a declared tie that holds it) are right; the error of K_CR's median in dB; how often its 90 %
+interval covers the truth before and after the loop is closed; and the largest error of the effect's
+own size.
 """
 
 from __future__ import annotations
@@ -17,7 +21,8 @@ import argparse
 import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from blind_recordings import (
@@ -29,14 +34,15 @@ from blind_recordings import (
     UNKNOWN,
     Job,
     bench_of,
+    excitation_of,
     jobs_for,
     pair_jobs,
     single_jobs,
 )
 
 from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
-from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.rig import Bench, simulate
 
@@ -61,12 +67,12 @@ class Outcome:
     size_error: float | None
 
 
-def run(job: Job) -> Outcome:
+def run(job: Job, known: str) -> Outcome:
     """Simulate, close the loop, compare."""
     warnings.simplefilter("ignore")
     device, held = CASES[job.case]
     bench = bench_of(job)
-    simulated = simulate(bench, seed=job.seed)
+    simulated = simulate(bench, excitation_of(job, bench), seed=job.seed)
     recording = recording_from_arrays(
         simulated.force,
         simulated.position,
@@ -76,9 +82,15 @@ def run(job: Job) -> Outcome:
         encoder_resolution=bench.encoder_resolution,
     )
     truth = bench.true_critical_stiffness()
-    model = build_model("grasped" if held else "free", device)
+    declared = "grasped" if held else "free"
+    told = {
+        "file": (declared, Options(device=device)),
+        "delay": (declared, Options(delay_s=bench.delay_s)),
+        "nothing": ("auto", Options()),
+    }
+    model, options = told[known]
     began = time.process_time()
-    closed = close_loop(recording, model, ess=1000, seed=job.seed)
+    closed = close_loop(recording, model, options, seed=job.seed)
     took = time.process_time() - began
     before, after = (e["critical_stiffness"] for e in (closed.before, closed.after))
     return Outcome(
@@ -113,10 +125,10 @@ def _db(value: float, truth: float) -> float:
     return float(20 * np.log10(max(value, 1e-12) / truth))
 
 
-def attempt(job: Job) -> Outcome | str:
+def attempt(job: Job, known: str) -> Outcome | str:
     """The outcome, or why the recording was refused."""
     try:
-        return run(job)
+        return run(job, known)
     except InputError as error:
         return f"  {job.case}, {', '.join(job.effects)}, seed {job.seed}: refused: {error}"
 
@@ -128,6 +140,8 @@ def main() -> None:
     for effect in SINGLE if chosen.only is None else chosen.only:
         groups[effect] = single_jobs(effect, chosen.each, chosen.others, chosen.seed)
     groups |= pair_jobs(chosen.pairs, chosen.seed)
+    if chosen.drawn:
+        groups = {n: [replace(job, drawn=True) for job in jobs] for n, jobs in groups.items()}
     print(
         f"{'effect':36s} {'n':>3s} {'clear':>6s} {'class':>6s} {'name':>6s} {'expl.':>6s} "
         f"{'K dB, worst':>12s} {'covers before':>14s} {'after':>6s} {'held-out':>9s} {'size':>7s} "
@@ -137,7 +151,8 @@ def main() -> None:
     sums: dict[str, list[Outcome]] = {"listed": [], "others": [], "pairs": []}
     with ProcessPoolExecutor(chosen.workers) as pool:
         flat = [job for jobs in groups.values() for job in jobs]
-        results = iter(pool.map(attempt, flat))  # rows are printed as their recordings are done
+        tell = partial(attempt, known=chosen.known)
+        results = iter(pool.map(tell, flat))  # rows are printed as their recordings are done
         for name, jobs in groups.items():
             answers = [next(results) for _ in jobs]
             refused += [answer for answer in answers if isinstance(answer, str)]
@@ -161,6 +176,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--pairs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=90_000)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--known", choices=("file", "delay", "nothing"), default="file")
+    parser.add_argument("--drawn", action="store_true", help="random devices, sizes and lengths")
     return parser.parse_args()
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import foreign
+import numpy as np
 
-from bayeshaptic.rig import Bench
+from bayeshaptic.rig import Bench, Effect, WhiteNoise
 
 CASES = {
     "LHIfAM free": ("lhifam", False),
@@ -79,11 +80,21 @@ SIZES = {
 
 @dataclass(frozen=True)
 class Job:
-    """One recording: which device, which effects, which seed."""
+    """One recording: which device, which effects, which seed.
+
+    `drawn`: not the table's device, its typical effects and 30 s, but a device, sizes and a length
+    drawn at random: see `SCATTER`, `SIZE`, `SECONDS`.
+    """
 
     case: str
     effects: tuple[str, ...]
     seed: int
+    drawn: bool = False
+
+
+SCATTER = 0.3  # log sd of a drawn device's parameters around the table's
+SIZE = 2.0  # sizes of an effect are multiplied by up to this, or divided, evenly in the logarithm
+SECONDS = (10.0, 60.0)  # evenly in the logarithm
 
 
 def jobs_for(effects: tuple[str, ...], count: int, seed: int) -> list[Job]:
@@ -97,13 +108,42 @@ def jobs_for(effects: tuple[str, ...], count: int, seed: int) -> list[Job]:
 
 
 def bench_of(job: Job) -> Bench:
-    """The bench with the job's effects at their typical strengths."""
+    """The bench with the job's effects, at their typical strengths or drawn ones."""
     device, held = CASES[job.case]
     bench = Bench.from_device(device, held=held)
+    rng = np.random.default_rng(job.seed)
+    if job.drawn:
+        drawn = {k: v * np.exp(SCATTER * rng.normal()) for k, v in bench.values.items()}
+        bench = replace(bench, values=drawn)
     for effect in job.effects:
         unheard_of = foreign.EFFECTS.get(effect)
         bench = bench.with_effect(unheard_of.typical(bench.scales()) if unheard_of else effect)
+        if job.drawn:
+            last = resized(bench.effects[-1], rng)
+            bench = replace(bench, effects=(*bench.effects[:-1], last))
     return bench
+
+
+def resized(effect: Effect, rng: np.random.Generator) -> Effect:
+    """The effect with every size of its own multiplied by a random factor."""
+    sizes = {f.name: getattr(effect, f.name) for f in fields(effect)}
+    return replace(
+        effect,
+        **{
+            name: value * SIZE ** rng.uniform(-1, 1)
+            for name, value in sizes.items()
+            if isinstance(value, float)
+        },
+    )
+
+
+def excitation_of(job: Job, bench: Bench) -> WhiteNoise | None:
+    """The bench's usual one, or noise of a drawn length."""
+    if not job.drawn:
+        return None
+    low, high = bench.band_hz
+    seconds = float(np.exp(np.random.default_rng(job.seed + 1).uniform(*np.log(SECONDS))))
+    return WhiteNoise(bench.force_rms, high, low, seconds)
 
 
 def single_jobs(effect: str, each: int, others: int, seed: int) -> list[Job]:
