@@ -12,7 +12,7 @@ from bayeshaptic.diagnosis import base_model
 from bayeshaptic.diagnosis.base_model import traced_from_best_base
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
-from bayeshaptic.inference.choose import Candidate, Choice
+from bayeshaptic.inference.choose import Choice, ScoredFit
 
 SIZES = {"rigid": 2, "free": 6, "grasped": 11}
 
@@ -46,7 +46,7 @@ def chosen_of(
     monkeypatch.setattr(base_model, "trace", trace)
     monkeypatch.setattr(base_model, "replace", lambda old, **new: _changed(old, new))
     fits = {name: fit(name, value) for name, value in misfits.items()}
-    choice = Choice(fits[chosen], "", {name: Candidate(f, 0.0) for name, f in fits.items()})
+    choice = Choice(fits[chosen], "", {name: ScoredFit(f, 0.0) for name, f in fits.items()})
     begun: Any = SimpleNamespace(etfe=None, fit=fits[chosen], choice=choice)
     return traced_from_best_base(begun, Options())[0].fit.model.name, seen
 

@@ -23,7 +23,7 @@ _WORDS = {
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ScoredFit:
     """A base model that was tried.
 
     Attributes
@@ -52,7 +52,7 @@ class Choice:
 
     fit: Fit
     reason: str
-    candidates: Mapping[str, Candidate]
+    candidates: Mapping[str, ScoredFit]
 
 
 @single_threaded
@@ -91,13 +91,13 @@ def choose_model(
         fits[name] = least_squares(model.with_prior(own), etfe, seed=seed)
     noise = max(1.0, min(fit.reduced_chi_square for fit in fits.values()))
     candidates = {
-        name: Candidate(fit, information_criterion(fit, noise)) for name, fit in fits.items()
+        name: ScoredFit(fit, information_criterion(fit, noise)) for name, fit in fits.items()
     }
     best = _best(candidates, noise)
     return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
 
 
-def _best(candidates: Mapping[str, Candidate], noise: float) -> str:
+def _best(candidates: Mapping[str, ScoredFit], noise: float) -> str:
     """The simplest model that no richer one beats.
 
     Where no candidate reaches the noise, more parameters always help a little, by standing in for
@@ -129,7 +129,7 @@ def information_criterion(fit: Fit, noise: float, further: int = 0) -> float:
     return deviance + (fit.model.size + further) * float(np.log(numbers))
 
 
-def _reason(best: str, candidates: Mapping[str, Candidate], noise: float, held: bool | None) -> str:
+def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: bool | None) -> str:
     chosen = candidates[best].fit
     said = ""
     if held is not None:

@@ -34,7 +34,7 @@ _WORTH = 0.02  # a term must lower the held-out error by so much, in both halves
 
 
 @dataclass(frozen=True)
-class Path:
+class SmoothMotion:
     """A motion without what the encoder adds: position, velocity, acceleration, jerk, (N,)."""
 
     position: Floats = field(repr=False)
@@ -52,17 +52,17 @@ class Term:
     name, title : str
     unit : str
     column : callable
-        From `Path` to the force for a coefficient of one, shape (N,).
+        From `SmoothMotion` to the force for a coefficient of one, shape (N,).
     """
 
     name: str
     title: str
     unit: str
-    column: Callable[[Path], Floats] = field(repr=False)
+    column: Callable[[SmoothMotion], Floats] = field(repr=False)
 
 
 @dataclass(frozen=True)
-class Step:
+class Addition:
     """One round: the term that was added and the held-out rms error of the force with it."""
 
     term: str
@@ -78,15 +78,15 @@ class InverseDynamics:
     terms : tuple of Term
     value, sd : ndarray, shape (J,)
         Coefficients; standard deviations allow for the residual's correlation within a second.
-    steps : tuple of Step
+    steps : tuple of Addition
         From the linear model on, each error that of one half with the coefficients of the other.
-    tried : tuple of Step
+    tried : tuple of Addition
         Terms that did not earn their place, and what they would have brought.
     relative_error : float
         Norm of the residual over the norm of the force, all of it fitted.
     time_s, force, explained : ndarray, shape (N,)
         Filtered and decimated.
-    path : Path
+    path : SmoothMotion
         At the same times.
     cutoff_hz : float
     """
@@ -94,13 +94,13 @@ class InverseDynamics:
     terms: tuple[Term, ...]
     value: Floats
     sd: Floats
-    steps: tuple[Step, ...]
-    tried: tuple[Step, ...]
+    steps: tuple[Addition, ...]
+    tried: tuple[Addition, ...]
     relative_error: float
     time_s: Floats = field(repr=False)
     force: Floats = field(repr=False)
     explained: Floats = field(repr=False)
-    path: Path = field(repr=False)
+    path: SmoothMotion = field(repr=False)
     cutoff_hz: float
 
     def __getitem__(self, name: str) -> tuple[float, float]:
@@ -164,13 +164,13 @@ def inverse_dynamics(
     known = {term.name: term for term in (*start, *library)}
     columns = {name: thin(term.column(path)) for name, term in known.items()}
     chosen = [term.name for term in start]
-    steps, tried = [Step("linear", _held_out(columns, chosen, force)[0])], []
+    steps, tried = [Addition("linear", _held_out(columns, chosen, force)[0])], []
     if terms is not None:
         unknown = sorted(set(terms) - set(known))
         if unknown:
             raise InputError(f"no term {', '.join(unknown)}; there are {', '.join(known)}")
         chosen += [name for name in terms if name not in chosen]
-        steps.append(Step(" + ".join(terms), _held_out(columns, chosen, force)[0]))
+        steps.append(Addition(" + ".join(terms), _held_out(columns, chosen, force)[0]))
     else:
         tried = _grow(columns, chosen, force, steps)
     design = np.stack([columns[name] for name in chosen], axis=1)
@@ -186,22 +186,24 @@ def inverse_dynamics(
         np.asarray(time_s * recording.period_s, dtype=np.float64),
         force,
         np.asarray(design @ value, dtype=np.float64),
-        Path(*(thin(a) for a in (path.position, path.velocity, path.acceleration, path.jerk))),
+        SmoothMotion(
+            *(thin(a) for a in (path.position, path.velocity, path.acceleration, path.jerk))
+        ),
         cutoff_hz,
     )
 
 
-def _path(recording: Recording, cutoff_hz: float) -> Path:
+def _path(recording: Recording, cutoff_hz: float) -> SmoothMotion:
     """Zero-phase low-pass and central differences."""
     low = butter(4, cutoff_hz, fs=1 / recording.period_s, output="sos")
     x = sosfiltfilt(low, recording.position)
     v = np.gradient(x, recording.period_s)
     a = np.zeros_like(x)
     a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / recording.period_s**2
-    return Path(x, v, a, np.gradient(a, recording.period_s))
+    return SmoothMotion(x, v, a, np.gradient(a, recording.period_s))
 
 
-def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
+def _terms(recording: Recording, path: SmoothMotion) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
     """Those of the linear model, and those that may join it."""
     middle = float(np.mean(path.position))
 
@@ -244,7 +246,7 @@ def _terms(recording: Recording, path: Path) -> tuple[tuple[Term, ...], tuple[Te
 def _term(shape: Shape, force: str, x: str, middle: float) -> Term:
     """A law's force, as the command must make up for it."""
 
-    def column(path: Path) -> Floats:
+    def column(path: SmoothMotion) -> Floats:
         return -shape.force(path.velocity if shape.over == VELOCITY else path.position - middle)
 
     title = shape.title.replace(" {where}", "")
@@ -252,8 +254,8 @@ def _term(shape: Shape, force: str, x: str, middle: float) -> Term:
 
 
 def _grow(
-    columns: dict[str, Floats], chosen: list[str], force: Floats, steps: list[Step]
-) -> list[Step]:
+    columns: dict[str, Floats], chosen: list[str], force: Floats, steps: list[Addition]
+) -> list[Addition]:
     """Add terms to `chosen` while both halves gain; what is left over comes back."""
     while True:
         _, halves = _held_out(columns, chosen, force)
@@ -264,9 +266,9 @@ def _grow(
         }
         order = sorted(found, key=lambda name: found[name][0])
         if not order or np.any(found[order[0]][1] > (1 - _WORTH) * halves):
-            return [Step(name, found[name][0]) for name in order]
+            return [Addition(name, found[name][0]) for name in order]
         chosen.append(order[0])
-        steps.append(Step(order[0], found[order[0]][0]))
+        steps.append(Addition(order[0], found[order[0]][0]))
 
 
 def _held_out(columns: dict[str, Floats], names: list[str], force: Floats) -> tuple[float, Floats]:
