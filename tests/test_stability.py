@@ -11,7 +11,6 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.models import Model, build_model, draw
 from bayeshaptic.models.response.mechanism import Link, Mechanism
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.roots import bracketed_roots
 from bayeshaptic.rig import Bench, critical_limit
 from bayeshaptic.stability import (
     confirms,
@@ -261,18 +260,6 @@ def test_two_crossings_that_are_about_to_merge_are_both_found():
 
 
 # ---------------------------------------------------------------- pieces
-
-
-def test_bracketed_roots():
-    target = np.array([1e-9, 0.3, 2.0, 1e6])
-
-    def cubic(index, x):
-        return x**3 - target[index] ** 3
-
-    low, high = target / 7, target * 9
-    every = np.arange(4)
-    roots = bracketed_roots(cubic, low, high, cubic(every, low), cubic(every, high))
-    np.testing.assert_allclose(roots, target, rtol=1e-12)
 
 
 def test_effective_draws():

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import elementwise
 
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.roots import bracketed_roots
 from bayeshaptic.stability.responses.evaluated import EvaluableSystem, EvaluatedResponse
 from bayeshaptic.stability.responses.grid import search_grid
 from bayeshaptic.stability.responses.linked import linked_response
@@ -16,6 +16,7 @@ from bayeshaptic.stability.responses.response import PoleResponse, Response, pol
 from bayeshaptic.types import Floats, Ints
 
 _CHUNK = 64  # rows at a time: the arrays of one chunk stay in the cache
+_TOLERANCE = 1e-13  # of a crossing's angle
 _DIP_POINTS = 17
 _DIP_ROUNDS = 5
 
@@ -146,12 +147,13 @@ def plain_search(response: Response) -> tuple[Ints, Floats, Floats]:
         _scan(response, slice(start, min(start + _CHUNK, batch)))
         for start in range(0, batch, _CHUNK)
     ]
-    row, low, high, s_low, s_high = (np.concatenate(part) for part in zip(*scans, strict=True))
+    row, low, high = (np.concatenate(part) for part in zip(*scans, strict=True))
 
-    def value(index: Ints, theta: Floats) -> Floats:
-        return _sine(response.at(row[index], theta[:, None])[:, 0])
+    def value(theta: Floats, row: Ints) -> Floats:
+        return _sine(response.at(row, theta[:, None])[:, 0])
 
-    theta = bracketed_roots(value, low, high, s_low, s_high)
+    found = elementwise.find_root(value, (low, high), args=(row,), tolerances={"xrtol": _TOLERANCE})
+    theta = np.asarray(found.x)
     return row, theta, response.at(row, theta[:, None])[:, 0].real
 
 
@@ -164,8 +166,8 @@ def _sine(response: NDArray[np.complex128]) -> Floats:
     return np.divide(-response.imag, size, out=np.zeros_like(size), where=size > 0)
 
 
-def _scan(response: Response, rows: slice) -> tuple[Ints, Floats, Floats, Floats, Floats]:
-    """Brackets (row, low, high, values there) of the sign changes of one chunk."""
+def _scan(response: Response, rows: slice) -> tuple[Ints, Floats, Floats]:
+    """Brackets (row, low, high) of the sign changes of one chunk."""
     theta = search_grid(response, rows)
     index = np.arange(rows.start, rows.stop)
     value = response.at(index, theta)
@@ -173,7 +175,7 @@ def _scan(response: Response, rows: slice) -> tuple[Ints, Floats, Floats, Floats
     change = np.signbit(sine[:, 1:]) != np.signbit(sine[:, :-1])
     change &= negative[:, 1:] | negative[:, :-1]
     i, k = np.nonzero(change)
-    found = (index[i], theta[i, k], theta[i, k + 1], sine[i, k], sine[i, k + 1])
+    found = (index[i], theta[i, k], theta[i, k + 1])
     size = np.abs(sine)
     dip = (size[:, 1:-1] <= size[:, :-2]) & (size[:, 1:-1] < size[:, 2:])
     dip &= negative[:, 1:-1] & ~change[:, 1:] & ~change[:, :-1]
@@ -184,9 +186,7 @@ def _scan(response: Response, rows: slice) -> tuple[Ints, Floats, Floats, Floats
     return tuple(np.concatenate(pair) for pair in zip(found, deeper, strict=True))  # type: ignore[return-value]
 
 
-def _dips(
-    response: Response, row: Ints, low: Floats, high: Floats
-) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+def _dips(response: Response, row: Ints, low: Floats, high: Floats) -> tuple[Ints, Floats, Floats]:
     """Pairs of sign changes hidden between grid points: zoom in where |sine| has a minimum."""
     steps = np.linspace(0.0, 1.0, _DIP_POINTS)
     found = []
@@ -195,7 +195,7 @@ def _dips(
         sine = _sine(response.at(row, theta))
         change = np.signbit(sine[:, 1:]) != np.signbit(sine[:, :-1])
         i, k = np.nonzero(change)
-        found.append((row[i], theta[i, k], theta[i, k + 1], sine[i, k], sine[i, k + 1]))
+        found.append((row[i], theta[i, k], theta[i, k + 1]))
         left = ~change.any(axis=1)
         if not left.any():
             break

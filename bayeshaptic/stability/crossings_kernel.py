@@ -230,7 +230,7 @@ def _dip(
 
 @kernel(inline=True)
 def _root(loops: Poles, row: int, low: float, high: float, f_low: float, f_high: float) -> float:
-    """Chandrupatla's method, as in `numerics/roots.py`."""
+    """Chandrupatla's method, as in `scipy.optimize.elementwise.find_root`."""
     a, b, fa, fb, t = low, high, f_low, f_high, 0.5
     best = a
     for _ in range(100):

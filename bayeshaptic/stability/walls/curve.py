@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import elementwise
 
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.polynomial import roots
-from bayeshaptic.numerics.roots import bracketed_roots
 from bayeshaptic.stability.crossings import response_of
 from bayeshaptic.stability.responses.evaluated import EvaluableSystem
 from bayeshaptic.stability.responses.grid import search_grid
@@ -235,7 +235,13 @@ def _roots(
     """The angle in each segment where a function changes its sign."""
     every = np.arange(len(row))
     low, high = theta[row, segment], theta[row, segment + 1]
-    return bracketed_roots(off, low, high, off(every, low), off(every, high), _TOLERANCE)
+    found = elementwise.find_root(
+        lambda place, index: off(index, place),
+        (low, high),
+        args=(every,),
+        tolerances={"xrtol": _TOLERANCE},
+    )
+    return np.asarray(found.x)
 
 
 def _with_line(
