@@ -11,6 +11,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int_]
 Bools = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
 
 Progress = Callable[[float, str], None]
 """Called with the share of the work done, 0 to 1, and a word about it."""

@@ -128,6 +128,11 @@ def test_a_saved_posterior_is_as_good(held_phantom, tmp_path):
     import arviz as az
 
     assert float(az.ess(data["posterior"]["kc"].values)) > 1000
+    file = az.from_netcdf(path)
+    for name in groups - {"/"}:
+        there, here = file[name], data[name]
+        assert there.equals(here) and sorted(there.coords) == sorted(here.coords)
+        assert there.attrs == here.attrs
 
 
 def test_what_is_no_posterior_is_refused(tmp_path):

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.inference.arviz_statistics import split_rhat
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
 from bayeshaptic.inference.posterior import prior_dominated
+from bayeshaptic.inference.rank_statistics import split_rhat
 from bayeshaptic.inference.stopping import Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness, most_draws

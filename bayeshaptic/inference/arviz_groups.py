@@ -6,18 +6,16 @@ takes a dictionary of groups.  Given the other's form, 0.x fails silently.
 
 from __future__ import annotations
 
-import errno
 import json
-import os
-import shutil
+import warnings
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from bayeshaptic.inference.archive import model_to_dict
-from bayeshaptic.inference.arviz_statistics import arviz
 from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.netcdf import Group, Variable, dataset, write
 from bayeshaptic.models import Model, draw
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
@@ -64,11 +62,8 @@ def to_arviz(posterior: Sampled) -> Any:
     -------
     arviz.InferenceData (0.x) or xarray.DataTree (1.x)
     """
-    return _joined(_groups(posterior))
-
-
-def _joined(groups: dict[str, Any]) -> Any:
-    az = arviz()
+    az = _arviz()
+    groups = {name: dataset(group) for name, group in _groups(posterior).items()}
     if int(az.__version__.split(".")[0]) < 1:  # 1.x has the old name too, but not the old thing
         return az.InferenceData(**groups)
     import xarray
@@ -76,19 +71,18 @@ def _joined(groups: dict[str, Any]) -> Any:
     return xarray.DataTree.from_dict(groups)
 
 
+def _arviz() -> Any:
+    """The arviz module, without its once-a-day advertisement of the next version."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        import arviz
+
+    return arviz
+
+
 def save_posterior(posterior: Sampled, path: Path) -> Path:
-    """Write `posterior` as netCDF, first beside `path` and then in its place."""
-    groups = _groups(posterior)
-    # The HDF5 library does not survive a disk that fills up while it writes.
-    needed = sum(group.nbytes for group in groups.values()) + (1 << 20)
-    if shutil.disk_usage(path.absolute().parent).free < needed:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        _joined(groups).to_netcdf(str(temporary), engine="h5netcdf")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    """Write `posterior` as netCDF."""
+    write(_groups(posterior), path)
     return path
 
 
@@ -98,43 +92,45 @@ def _by_walker(values: Floats) -> Floats:
     return moved.reshape(-1, *moved.shape[2:])
 
 
-def _groups(posterior: Sampled) -> dict[str, Any]:
-    """The groups as xarray datasets, for both versions alike."""
-    import xarray
-
+def _groups(posterior: Sampled) -> dict[str, Group]:
+    """The groups, alike for the file and for both versions."""
     model = posterior.model
     by_walker = _by_walker(posterior.chains)
-    chain = {"chain": np.arange(by_walker.shape[0])}
-    draws = chain | {"draw": np.arange(by_walker.shape[1])}
-
-    def dataset(values: Floats, coords: dict[str, Any]) -> Any:
-        variables = {
-            name: (("chain", "draw"), values[..., i], _attributes(posterior, name))
-            for i, name in enumerate(model.names)
-        }
-        return xarray.Dataset(variables, coords)
-
-    main = dataset(by_walker, draws)
-    main.attrs |= _about(posterior)
+    draws = _numbered(by_walker)
     rng = np.random.default_rng(posterior.seed)
-    prior = np.stack([draw(model.prior(n), rng, _PRIOR_DRAWS) for n in model.names], axis=-1)
+    prior = np.stack([draw(model.prior(n), rng, _PRIOR_DRAWS) for n in model.names], axis=-1)[None]
+    level = Variable(("chain", "draw"), _by_walker(posterior.log_likelihood))
     groups = {
-        "posterior": main,
-        "sample_stats": xarray.Dataset(
-            {"log_likelihood": (("chain", "draw"), _by_walker(posterior.log_likelihood))}, draws
-        ),
-        "prior": dataset(prior[None], {"chain": [0], "draw": np.arange(_PRIOR_DRAWS)}),
+        "posterior": Group(_parameters(posterior, by_walker), draws, _about(posterior)),
+        "sample_stats": Group({"log_likelihood": level}, draws),
+        "prior": Group(_parameters(posterior, prior), _numbered(prior)),
     }
     if posterior.windows is not None:
-        groups["log_likelihood"] = _pointwise(posterior, by_walker, chain)
+        groups["log_likelihood"] = _pointwise(posterior, by_walker)
     if posterior.etfe is not None:
-        groups |= _predictive(posterior, by_walker, chain, rng)
+        groups |= _predictive(posterior, by_walker, rng)
     return groups
 
 
-def _attributes(posterior: Sampled, name: str) -> dict[str, str]:
-    parameter = posterior.model.parameter(name)
-    return {"units": posterior.model.unit(name), "long_name": parameter.title}
+def _numbered(values: Floats) -> dict[str, Variable]:
+    """Numbers of the chains and draws of values of shape (chain, draw, ...)."""
+    return {
+        name: Variable((name,), np.arange(size))
+        for name, size in zip(("chain", "draw"), values.shape[:2], strict=True)
+    }
+
+
+def _parameters(posterior: Sampled, values: Floats) -> dict[str, Variable]:
+    """A variable a parameter, of values of shape (chain, draw, P)."""
+    model = posterior.model
+    return {
+        name: Variable(
+            ("chain", "draw"),
+            values[..., i],
+            {"units": model.unit(name), "long_name": model.parameter(name).title},
+        )
+        for i, name in enumerate(model.names)
+    }
 
 
 def _about(posterior: Sampled) -> dict[str, Any]:
@@ -154,29 +150,24 @@ def _thinned(by_walker: Floats, count: int) -> Floats:
     return by_walker[:, step - 1 :: step][:, :count]
 
 
-def _pointwise(posterior: Sampled, by_walker: Floats, chain: dict[str, Any]) -> Any:
-    import xarray
-
-    assert posterior.windows is not None
+def _pointwise(posterior: Sampled, by_walker: Floats) -> Group:
+    windows = posterior.windows
+    assert windows is not None
     some = _thinned(by_walker, _LIKELIHOOD_DRAWS)
-    values = Likelihood(posterior.model, posterior.windows).pointwise(
-        some.reshape(-1, some.shape[2])
-    )
+    values = Likelihood(posterior.model, windows).pointwise(some.reshape(-1, some.shape[2]))
     values = values.reshape(*some.shape[:2], -1)
-    coords = chain | {
-        "draw": np.arange(some.shape[1]),
-        "window": np.arange(values.shape[2]),
-        "frequency_hz": ("window", posterior.windows.frequency_hz.mean(axis=1)),
+    along = {
+        "window": Variable(("window",), np.arange(values.shape[2])),
+        "frequency_hz": Variable(("window",), windows.frequency_hz.mean(axis=1)),
     }
-    return xarray.Dataset({"response": (("chain", "draw", "window"), values)}, coords)
+    response = Variable(("chain", "draw", "window"), values)
+    return Group({"response": response}, _numbered(some) | along)
 
 
 def _predictive(
-    posterior: Sampled, by_walker: Floats, chain: dict[str, Any], rng: np.random.Generator
-) -> dict[str, Any]:
+    posterior: Sampled, by_walker: Floats, rng: np.random.Generator
+) -> dict[str, Group]:
     """The measured response, and what the posterior predicts of it with its noise."""
-    import xarray
-
     etfe = posterior.etfe
     assert etfe is not None
     some = _thinned(by_walker, _PREDICTIVE_DRAWS)
@@ -185,18 +176,17 @@ def _predictive(
     shape = (*some.shape[:2], -1)
     unit = {"units": f"{etfe.position_unit}/{etfe.force_unit}"}
     dims = ("chain", "draw", "frequency")
-    where = {"frequency": etfe.frequency_hz}
+    where = {"frequency": Variable(("frequency",), etfe.frequency_hz)}
     predicted = {
-        "response_real": (dims, (response.real + noise[0]).reshape(shape), unit),
-        "response_imag": (dims, (response.imag + noise[1]).reshape(shape), unit),
+        "response_real": Variable(dims, (response.real + noise[0]).reshape(shape), unit),
+        "response_imag": Variable(dims, (response.imag + noise[1]).reshape(shape), unit),
     }
     observed = {
-        "response_real": (("frequency",), etfe.value.real, unit),
-        "response_imag": (("frequency",), etfe.value.imag, unit),
-        "sd": (("frequency",), np.sqrt(etfe.variance), unit),
+        "response_real": Variable(("frequency",), etfe.value.real, unit),
+        "response_imag": Variable(("frequency",), etfe.value.imag, unit),
+        "sd": Variable(("frequency",), np.sqrt(etfe.variance), unit),
     }
-    draws = chain | {"draw": np.arange(some.shape[1])}
     return {
-        "posterior_predictive": xarray.Dataset(predicted, draws | where),
-        "observed_data": xarray.Dataset(observed, where),
+        "posterior_predictive": Group(predicted, _numbered(some) | where),
+        "observed_data": Group(observed, where),
     }

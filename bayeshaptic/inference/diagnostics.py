@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.inference.arviz_statistics import effective_sample_size, split_rhat
+from bayeshaptic.inference.rank_statistics import bulk_size, split_rhat, tail_size
 from bayeshaptic.types import Floats
 
 RHAT_LIMIT = 1.01
@@ -49,7 +49,7 @@ def diagnose(chains: Floats, ess: float | None = None) -> Diagnostics:
     """Diagnostics of chains of shape (ensembles, steps, walkers, P).
 
     A. Vehtari, A. Gelman, D. Simpson, B. Carpenter, P.-C. Buerkner, "Rank-normalization, folding,
-    and localization: an improved R-hat", Bayesian Analysis 16 (2021); computed by ArviZ.
+    and localization: an improved R-hat", Bayesian Analysis 16 (2021).
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def diagnose(chains: Floats, ess: float | None = None) -> Diagnostics:
     as_walkers = counted.transpose(0, 2, 1, 3).reshape(ensembles * walkers, -1, size)
     return Diagnostics(
         np.array([split_rhat(as_ensembles[..., p]) for p in range(size)]),
-        np.array([effective_sample_size(as_walkers[..., p], "bulk") for p in range(size)]),
-        np.array([effective_sample_size(as_walkers[..., p], "tail") for p in range(size)]),
+        np.array([bulk_size(as_walkers[..., p]) for p in range(size)]),
+        np.array([tail_size(as_walkers[..., p]) for p in range(size)]),
     )
 
 

@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.types import Bytes
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -125,30 +127,33 @@ class Drawn:
 
 
 def drawn(figure: Figure, name: str) -> Drawn:
-    """The figure as PNG, and as SVG where that is small; `name` tells its parts from others'."""
-    figure.draw_without_rendering()  # lays it out, once for both formats
-    figure.set_layout_engine("none")
-    vector = svg(figure, name)
-    return Drawn(png(figure), vector if len(vector) <= MOST_SVG else None)
+    """The figure as PNG, and as SVG where that is small; `name` tells its parts from others'.
+
+    The same figure gives the same bytes.
+    """
+    from bayeshaptic.report.figures.canvas import draw_both
+
+    pixels, text = draw_both(figure)
+    vector = for_a_page(text, name)
+    return Drawn(png(pixels), vector if len(vector) <= MOST_SVG else None)
 
 
-def png(figure: Figure) -> bytes:
-    """The figure as PNG; the same figure gives the same bytes."""
+def png(pixels: Bytes) -> bytes:
+    """Pixels of shape (height, width, 3) as PNG."""
+    from PIL import Image
+
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    Image.fromarray(pixels).save(buffer, format="png", dpi=(DPI, DPI))
     return buffer.getvalue()
 
 
-def svg(figure: Figure, name: str) -> str:
-    """The figure as an SVG element for a page; the same figure gives the same text.
+def for_a_page(svg: str, name: str) -> str:
+    """An SVG file as an element of a page.
 
     Without what a page does not need; hundredths of a point are enough, and parts are named after
     the figure, so that those of several figures do not meet.
     """
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
+    text = svg[svg.index("<svg") :]
     text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r' d="([^"]*)"', lambda found: f' d="{_rounded(found[1])}"', text)
     used = set(re.findall(r'href="#([^"]+)"', text)) | set(re.findall(r"url\(#([^)]+)\)", text))

@@ -1,0 +1,51 @@
+"""A figure drawn once is what matplotlib draws in two goes, one a format."""
+
+from __future__ import annotations
+
+import io
+import re
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.canvas import draw_both
+
+
+def _figure() -> Figure:
+    """One of each thing that figures are made of."""
+    rng = np.random.default_rng(0)
+    figure = style.new_figure(3.3)
+    left, right = figure.subplots(1, 2)
+    x = np.linspace(0, 1, 30)
+    left.plot(x, x**2, "o--", label="line", markersize=3)
+    left.fill_between(x, x, x + 0.2, alpha=0.3)
+    left.plot(rng.random(50), rng.random(50), ".", rasterized=True)
+    left.stairs([1, 2], [0, 0.5, 1], fill=True, hatch="//", label="stairs")
+    style.legend(style.panel(left, "x, ms", "y"))
+    right.imshow(rng.random((4, 4)))
+    right.scatter(range(4), range(4), c=range(4))
+    right.set_yscale("log")
+    return figure
+
+
+def _numbers(svg: str) -> list[float]:
+    """Coordinates of paths and of what is put somewhere, in the order of the file."""
+    texts = re.findall(r'(?: d| x| y| transform)="([^"]*)"', svg)
+    return [float(n) for text in texts for n in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)]
+
+
+def test_both_formats_are_those_of_matplotlib() -> None:
+    pixels, svg = draw_both(_figure())
+    png, other = io.BytesIO(), io.StringIO()
+    figure = _figure()
+    figure.savefig(png, format="png", dpi=style.DPI)
+    figure.savefig(other, format="svg", dpi=style.DPI, metadata={"Date": None, "Creator": None})
+    assert np.array_equal(pixels, np.asarray(Image.open(png).convert("RGB")))
+    ours, theirs = _numbers(svg), _numbers(other.getvalue())
+    assert len(ours) == len(theirs) > 1000
+    # Texts are measured and images placed in whole pixels here, in points there.
+    assert ours == pytest.approx(theirs, abs=1.01 * 72 / style.DPI)
+    assert svg.count("<image") == other.getvalue().count("<image") == 2
