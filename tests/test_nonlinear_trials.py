@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
@@ -158,7 +159,12 @@ def best_of(effect: BenchEffect | str, raised: str) -> Trial:
 
 
 def test_friction_on_the_other_mass_is_put_there() -> None:
-    best = best_of(LoadFriction(0.5), "sign(v)")
+    """Also where the motor moves on: then the load's velocity shows it, or noise alone."""
+    state = state_of(LHIFAM.with_effect(LoadFriction(0.5)))
+    tests = {test.name: test for test in nonlinear_tests(state.fit, state.etfe)}
+    assert tests["sign(v2)"].statistic > 3 * tests["sign(v2)"].threshold
+    assert not tests["sign(v)"].flagged
+    best = best_of(LoadFriction(0.5), "excess noise")
     assert best.accepted.title.endswith("at the load")
     assert best.accepted.estimates["friction_force"].mean == pytest.approx(0.5, rel=0.1)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.effects.laws import variables
-from bayeshaptic.effects.nonlinear.shapes import VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models.structures import GROUND_DAMPERS
@@ -107,7 +107,9 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
         if trial.accepted.family == family
     ]
     raised = {test.name for test in traced.after if test.flagged}
-    if VELOCITY in variables(raised):
+    # Noise that nothing else goes with may be friction that holds a mass most of the time.
+    nameless = {t.name for t in traced.after if t.flagged and t.family == family} == {EXCESS_NOISE}
+    if nameless or {VELOCITY, LOAD_VELOCITY} & variables(raised):
         damped = np.array([n in GROUND_DAMPERS for n in fit.model.names])
         less = np.where(damped, _DAMPING_LEFT * fit.theta, fit.theta)
         others.append(critical_stiffness(fit.model, less).value)

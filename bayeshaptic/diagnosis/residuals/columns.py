@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.effects.laws import tested
-from bayeshaptic.effects.nonlinear.shapes import COMMAND, POSITION, STRETCH, VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import COMMAND, LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomial import evaluate
@@ -81,8 +81,9 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
     force = recording.force - recording.force.mean()
     system = fit.model.system(fit.theta)
     if len(system.mechanism.masses) > 1:
-        ends = linear_motions(system, force, recording.period_s, (0, 1))[:, 0]
-        found[STRETCH] = ends[0] - ends[1]
+        motor, load = linear_motions(system, force, recording.period_s, (0, 1))
+        found[STRETCH] = motor[0] - load[0]
+        found[LOAD_VELOCITY] = load[1] + velocity - motor[1]  # what is slow moves both
     found[COMMAND] = force
     return found
 
@@ -93,6 +94,8 @@ def response_to(fit: Fit, over: str, s: Complexes) -> Complexes:
         return pair_response(fit, s)
     if over == COMMAND:
         return np.asarray(fit.response(s.imag / (2 * np.pi)))
+    if over == LOAD_VELOCITY:
+        return load_response(fit, s)
     return fit.model.system(fit.theta).continuous_response(s)[0]
 
 
@@ -121,6 +124,13 @@ def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped
         return np.fft.rfft(signal - signal.mean())[lines] / np.sqrt(recording.samples)
 
     return transform
+
+
+def load_response(fit: Fit, s: Complexes) -> Complexes:
+    """Position of the motor over a force at the load, at points s."""
+    numerator, denominator = fit.model.system(fit.theta).mechanism.transfer_to(1)
+    points = s[:, None]
+    return np.asarray((evaluate(numerator, points) / evaluate(denominator, points))[:, 0])
 
 
 def pair_response(fit: Fit, s: Complexes) -> Complexes:

@@ -6,6 +6,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.least_squares import Fit
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, RandomSpectra
@@ -46,9 +47,7 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     worst = int(np.argmax(rise))
     where = float(centre[driven][worst + _TOGETHER // 2])
     text = f"the noise around {where:.3g} Hz is {rise[worst]:.1f} dB above that beyond the band"
-    return (
-        Test("excess noise", "nonlinear", float(rise[worst]), thresholds.EXCESS_DB, where, text),
-    )
+    return (Test(EXCESS_NOISE, "nonlinear", float(rise[worst]), thresholds.EXCESS_DB, where, text),)
 
 
 def _counts_a_sample(recording: Recording) -> float:

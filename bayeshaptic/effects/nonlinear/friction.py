@@ -10,7 +10,15 @@ import numpy as np
 
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
-from bayeshaptic.effects.nonlinear.shapes import POSITION, STRETCH, VELOCITY, Shape, Usual
+from bayeshaptic.effects.nonlinear.shapes import (
+    EXCESS_NOISE,
+    LOAD_VELOCITY,
+    POSITION,
+    STRETCH,
+    VELOCITY,
+    Shape,
+    Usual,
+)
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
 
@@ -24,6 +32,10 @@ def _force_scale(model: Model, theta: Floats, motion: Motion) -> float:
     return float(mass * motion.velocity.std() * 2 * np.pi * 3.0)
 
 
+def _against(v: Floats) -> Floats:
+    return -np.sign(v)
+
+
 @register
 class CoulombFriction(NonlinearEffect):
     """A force of constant size against the motion; it sticks where that holds the mass still."""
@@ -31,9 +43,11 @@ class CoulombFriction(NonlinearEffect):
     name = "coulomb_friction"
     title = "dry (Coulomb) friction"
     tests = (
-        Shape("sign(v)", "a force like sign(v), as dry friction", VELOCITY, lambda v: -np.sign(v)),
+        Shape("sign(v)", "a force like sign(v), as dry friction", VELOCITY, _against),
+        Shape("sign(v2)", "dry friction at the load", LOAD_VELOCITY, _against),
     )
-    over = (VELOCITY,)
+    # Where it holds the mass most of the time, all that is left of it is noise.
+    over = (VELOCITY, LOAD_VELOCITY, EXCESS_NOISE)
     strength = ("friction_force", "force")
 
     @classmethod
@@ -127,7 +141,7 @@ class DahlFriction(NonlinearEffect):
     name = "dahl_friction"
     title = "dry friction that begins as a spring (Dahl)"
     # It may look like a spring, or like nothing but noise.
-    over = (VELOCITY, POSITION, STRETCH, "excess noise")
+    over = (VELOCITY, POSITION, STRETCH, EXCESS_NOISE)
     strength = ("friction_force", "force")
     dimensions = {"presliding_distance": "position"}
     tuned = ("presliding_distance",)

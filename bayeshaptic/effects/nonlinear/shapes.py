@@ -15,6 +15,8 @@ from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.types import Floats
 
 VELOCITY, POSITION, STRETCH, COMMAND = "velocity", "position", "stretch", "command"
+LOAD_VELOCITY = "load velocity"
+EXCESS_NOISE = "excess noise"  # a test that is of no shape
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class Shape:
     title : str
         In words; "{where}" stands for the place.
     over : str
-        The variable: "velocity", "position", "stretch" of the connection, or "command".
+        The variable: "velocity" or "position" of the motor, "load velocity", "stretch" of the
+        connection, or "command".
     force : callable
         From the variable to the force on the mass, shapes (N,).
     dimension : str
