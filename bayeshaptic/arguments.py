@@ -1,68 +1,106 @@
-"""What callers hand in, checked at the door: a wrong type or value is one line that names it."""
+"""What callers hand in, checked at the door: a wrong type or value is one line that names it.
+
+A public function stands `at_the_door`: its annotations say what each argument may be, and `BOUNDS`
+what numbers of that name may be, wherever it occurs. Annotations that are not known here (the
+user's own protocols) are left to the function.
+"""
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
-from collections.abc import Mapping
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar
 
 from bayeshaptic.errors import InputError
 
+F = TypeVar("F", bound=Callable[..., Any])
+Names = Mapping[str, Any]
 
-def number(
-    name: str,
-    value: Any,
-    least: float = -math.inf,
-    above: float = -math.inf,
-    most: float = math.inf,
-) -> float:
-    """A finite number that is at least `least`, above `above` and at most `most`.
+BOUNDS: dict[str, tuple[float, float, str]] = {
+    "seed": (0, math.inf, "of at least 0"),
+    "draws": (1, math.inf, "of at least 1"),
+    "max_draws": (1, math.inf, "of at least 1"),
+    "count": (2, math.inf, "of at least 2"),
+    "minimum_lines": (1, math.inf, "of at least 1"),
+    "most_evaluations": (1, math.inf, "of at least 1"),
+    "ess": (1e-9, math.inf, "above zero"),
+    "budget_s": (1e-9, math.inf, "above zero"),
+    "period_s": (1e-12, 1e12, "above zero, in seconds"),
+    "default_period_s": (1e-12, 1e12, "above zero, in seconds"),
+    "encoder_resolution": (1e-300, 1e300, "above zero, in m or rad"),
+    "lever_m": (1e-300, 1e300, "above zero, in metres"),
+    "cutoff_hz": (1e-300, 1e300, "above zero, in Hz"),
+    "delay_s": (0, 1e12, "of at least 0, in seconds"),
+    "delay_sd_s": (0, math.inf, "of at least 0, in seconds"),
+    "risk": (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01"),
+    "risks": (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01"),
+    "p": (0, 1, "between 0 and 1, as in 0.05"),
+}
+"""Lowest and highest value of numbers by their name, and how to say it."""
+
+_ALIAS = re.compile(r"(?<![\w.])(collections\.abc|typing)\.")
+_MAY_BE_INFINITE = ("delay_sd_s", "low")
+
+_OFFERED = {
+    "source": (("model", "structure"), "a Model, Fit, Posterior, Case or Analysis"),
+    "result": (("analysis",), "what bayeshaptic.analyse or close_loop returned"),
+    "StudyAnalysis": (("new_person",), "a StudyAnalysis (see bayeshaptic.analyse_study)"),
+    "Damping": (("smoothing",), "a Backward or a LowPass"),
+}
+"""Attributes of which a value has one, where several classes will do: by argument or annotation."""
+
+_MAKERS = {
+    "Recording": "bayeshaptic.read_recording",
+    "Etfe": "bayeshaptic.estimate_etfe",
+    "Model": "bayeshaptic.grasped",
+    "Fit": "bayeshaptic.least_squares",
+    "Posterior": "bayeshaptic.sample",
+    "CriticalStiffness": "bayeshaptic.critical_stiffness",
+    "Study": "bayeshaptic.read_study",
+    "Device": "bayeshaptic.load_device",
+    "Prior": "bayeshaptic.LogNormal",
+}
+
+
+def at_the_door(function: F) -> F:
+    """Refuse arguments that cannot be what the annotations say, in one line, before any work."""
+    signature = inspect.signature(function)
+    names = inspect.unwrap(function).__globals__
+
+    @functools.wraps(function)
+    def door(*args: Any, **kwargs: Any) -> Any:
+        bound = signature.bind(*args, **kwargs)
+        for name, value in bound.arguments.items():
+            parameter = signature.parameters[name]
+            if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+                _check(name, value, str(parameter.annotation), names)
+        return function(*args, **kwargs)
+
+    return door  # type: ignore[return-value]
+
+
+def check_fields(thing: Any, names: Names) -> None:
+    """The same for the fields of a dataclass, in its ``__post_init__``.
+
+    Parameters
+    ----------
+    thing : dataclass
+    names : mapping
+        What its annotations mean: ``globals()``.
 
     Raises
     ------
     InputError
-        Where it is none; the message says what is asked for.
+        Where a field cannot be; the message names it.
     """
-    is_number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    if is_number and least <= value <= most and value > above:
-        return float(value)
-    bounds = [
-        f"{word} {bound:g}"
-        for word, bound in (("of at least", least), ("above", above), ("of at most", most))
-        if math.isfinite(bound)
-    ]
-    raise InputError(f"{name} is {shown(value)}; give a number {' and '.join(bounds)}".rstrip())
-
-
-def whole(name: str, value: Any, least: int = 0) -> int:
-    """A whole number of at least `least`.
-
-    Raises
-    ------
-    InputError
-        Where it is none.
-    """
-    if isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= least:
-        return int(value)
-    raise InputError(f"{name} is {shown(value)}; give a whole number of at least {least}")
-
-
-def band(name: str, value: Any) -> tuple[float, float]:
-    """Two frequencies in Hz, of which the first is the lower.
-
-    Raises
-    ------
-    InputError
-        Where they are none.
-    """
-    try:
-        low, high = (number(name, end, least=0.0) for end in value)
-    except (TypeError, ValueError):  # an InputError is a ValueError
-        low, high = 1.0, 0.0
-    if low < high:
-        return low, high
-    raise InputError(f"{name} is {shown(value)}; give two frequencies in Hz, as in (0.7, 200)")
+    for field in fields(thing):
+        _check(field.name, getattr(thing, field.name), str(field.type), names)
 
 
 def instance(name: str, value: Any, kinds: type | tuple[type, ...], hint: str) -> Any:
@@ -74,7 +112,7 @@ def instance(name: str, value: Any, kinds: type | tuple[type, ...], hint: str) -
     value : object
     kinds : type or tuple of type
     hint : str
-        What to give instead, as in "an Etfe; see bayeshaptic.estimate_etfe".
+        What to give instead, as in "an Etfe (see bayeshaptic.estimate_etfe)".
 
     Raises
     ------
@@ -86,23 +124,150 @@ def instance(name: str, value: Any, kinds: type | tuple[type, ...], hint: str) -
     raise InputError(f"{name} is {shown(value)}; give {hint}")
 
 
-def mapping(name: str, value: Any, kinds: type | tuple[type, ...], hint: str) -> dict[str, Any]:
-    """A mapping of names to things of these classes.
-
-    Raises
-    ------
-    InputError
-        Where it is none; the message names the entry.
-    """
-    instance(name, value, Mapping, f"a mapping of names to {hint}")
-    for key, entry in value.items():
-        instance(f"{name}[{key!r}]", entry, kinds, hint)
-    return dict(value)
-
-
 def shown(value: Any) -> str:
     """A value in a few words, for a message: short, and its type where that is the point."""
-    if isinstance(value, str | Real | None) or isinstance(value, tuple) and len(value) < 4:
-        text = repr(value)
+    if isinstance(value, str | Real | None) or isinstance(value, tuple | list) and len(value) < 4:
+        text = " ".join(repr(value).split())
         return text if len(text) <= 60 else f"{text[:57]}..."
     return f"of type {type(value).__name__}"
+
+
+def _check(name: str, value: Any, annotation: str, names: Names) -> None:
+    parts = _split(annotation, " | ")
+    if name in _OFFERED and annotation in ("Any", "Result"):
+        parts = [name]
+    endless = isinstance(value, float) and math.isinf(value) and name not in _MAY_BE_INFINITE
+    if any(_is(value, part, names) for part in parts) and not endless:
+        if name in BOUNDS and value is not None:
+            _check_bounds(name, value)
+        return
+    hints = [hint for part in parts if (hint := _hint(part))]
+    raise InputError(f"{name} is {shown(value)}; give {' or '.join(dict.fromkeys(hints))}")
+
+
+def _check_bounds(name: str, value: Any) -> None:
+    low, high, words = BOUNDS[name]
+    many = isinstance(value, Iterable)
+    if not all(low <= one <= high for one in _flat(value)):
+        raise InputError(
+            f"{name} is {shown(value)}; give {'numbers' if many else 'a number'} {words}"
+        )
+
+
+def _flat(value: Any) -> Iterable[Any]:
+    if not isinstance(value, Iterable):
+        return (value,)
+    import numpy as np
+
+    return np.asarray(value, float).ravel()
+
+
+def _is(value: Any, part: str, names: Names) -> bool:
+    """Whether a value is what one part of an annotation says."""
+    if part in _PLAIN:
+        return _PLAIN[part](value)
+    if part in _OFFERED:
+        return any(hasattr(value, name) for name in _OFFERED[part][0])
+    kind, _, inside = part.partition("[")
+    if inside:
+        within = _split(inside[:-1], ", ")
+        if kind == "Mapping":
+            return isinstance(value, Mapping) and all(
+                _any(one, within[1], names) for one in value.values()
+            )
+        if kind in ("Sequence", "tuple"):
+            if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+                return False
+            if kind == "tuple" and within[-1] != "...":
+                return len(within) == len(list(value)) and all(
+                    _any(one, part, names) for one, part in zip(value, within, strict=True)
+                )
+            return len(list(value)) > 0 and all(_any(one, within[0], names) for one in value)
+        if kind == "Iterable":
+            return isinstance(value, Iterable) and not isinstance(value, str | Mapping)
+        return kind != "Callable" or callable(value)
+    if kind in ("Progress", "Executor", "Rule"):
+        return callable(value)
+    first, *others = kind.split(".")
+    found = functools.reduce(lambda part, name: getattr(part, name, None), others, names.get(first))
+    if found is None or isinstance(found, type):
+        return found is None or isinstance(value, found)
+    return _any(value, _ALIAS.sub("", str(found)), names)  # a name for a union or a tuple
+
+
+def _any(value: Any, annotation: str, names: Names) -> bool:
+    return any(_is(value, part, names) for part in _split(annotation, " | "))
+
+
+def _numbers(value: Any) -> bool:
+    import numpy as np
+
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return False
+    return array.dtype.kind in "iuf" and array.size > 0 and not np.isnan(array).any()
+
+
+_PLAIN: dict[str, Callable[[Any], bool]] = {
+    "Any": lambda value: True,
+    "None": lambda value: value is None,
+    "bool": lambda value: isinstance(value, bool),
+    "int": lambda value: isinstance(value, Integral) and not isinstance(value, bool),
+    "float": lambda value: (
+        isinstance(value, Real) and not isinstance(value, bool) and not math.isnan(value)
+    ),
+    "str": lambda value: isinstance(value, str),
+    "Path": lambda value: isinstance(value, os.PathLike),
+    "os.PathLike[str]": lambda value: isinstance(value, os.PathLike),
+    "ArrayLike": _numbers,
+    "Floats": _numbers,
+}
+_SAID = {
+    "bool": "True or False",
+    "int": "a whole number",
+    "float": "a number",
+    "str": "a text",
+    "Path": "a path",
+    "os.PathLike[str]": "a path",
+    "ArrayLike": "numbers",
+    "Floats": "an array of numbers",
+    "Progress": "a function of the share done and a word",
+}
+
+
+def _hint(part: str) -> str:
+    """What a part of an annotation asks for, in words; empty for None."""
+    if part in _SAID:
+        return _SAID[part]
+    if part in _OFFERED:
+        return _OFFERED[part][1]
+    kind, _, inside = part.partition("[")
+    if kind in ("Sequence", "Iterable", "tuple"):
+        within = [one for one in _split(inside[:-1], ", ") if one != "..."]
+        each = [f"{len(within)} numbers"] if set(within) == {"float"} and len(within) > 1 else None
+        return f"a sequence of {' or '.join(each or map(_plain_word, within[:1]))}"
+    if kind == "Mapping":
+        return f"a mapping of names to {_plain_word(_split(inside[:-1], ', ')[1])}"
+    if part == "None":
+        return ""
+    article = "an" if kind[:1] in "AEIOU" else "a"
+    return f"{article} {kind}" + (f" (see {_MAKERS[kind]})" if kind in _MAKERS else "")
+
+
+def _plain_word(annotation: str) -> str:
+    return " or ".join(filter(None, map(_hint, _split(annotation, " | "))))
+
+
+def _split(text: str, by: str) -> list[str]:
+    """`text` split at `by`, but not within brackets."""
+    parts, depth, last = [], 0, 0
+    for match in re.finditer(rf"[\[\]]|{re.escape(by)}", text):
+        if match[0] == "[":
+            depth += 1
+        elif match[0] == "]":
+            depth -= 1
+        elif depth == 0:
+            parts.append(text[last : match.start()])
+            last = match.end()
+    return [*parts, text[last:]]

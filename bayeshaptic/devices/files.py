@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices.device import KINDS, STRUCTURES, Device
 from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError
@@ -35,6 +36,7 @@ def device_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _folder().glob("*.toml")))
 
 
+@at_the_door
 def load_device(name_or_path: str | os.PathLike[str] | Device) -> Device:
     """A device by its name, or from a device file.
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from bayeshaptic.arguments import band, instance, mapping, number, whole
+from bayeshaptic.arguments import check_fields, instance, shown
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError
 from bayeshaptic.numerics.spending import BUDGET_S
@@ -71,21 +71,13 @@ class Options:
     progress: Progress | bool | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        if self.device is not None:
-            instance("device", self.device, (str, Path, Device), "its name, a path or a Device")
-        for name in ("delay_s", "delay_sd_s"):
-            if getattr(self, name) is not None and getattr(self, name) != float("inf"):
-                number(name, getattr(self, name), least=0.0)
-        for name in ("lever_m", "ess"):
-            if getattr(self, name) is not None:
-                number(name, getattr(self, name), above=0.0)
-        if self.band_hz is not None:
-            band("band_hz", self.band_hz)
-        if self.held is not None:
-            instance("held", self.held, bool, "True, False or None")
-        number("budget_s", self.budget_s, above=0.0)
-        whole("seed", self.seed)
-        object.__setattr__(self, "prior", _priors(self.prior))
+        if self.prior is None:
+            object.__setattr__(self, "prior", {})
+        check_fields(self, _names() if self.prior else globals())
+        if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:
+            raise InputError(
+                f"band_hz is {shown(self.band_hz)}; give the lower one first, as in (0.7, 200)"
+            )
         object.__setattr__(self, "progress", told(self.progress))
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
@@ -130,9 +122,8 @@ def options_from(options: Options | None, changes: Mapping[str, Any]) -> Options
     return (options or Options()).with_changes(changes)
 
 
-def _priors(prior: Any) -> dict[str, Prior]:
-    if not prior and (prior is None or isinstance(prior, Mapping)):
-        return {}
+def _names() -> dict[str, Any]:
+    """What the annotations mean, of priors too: they load NumPy."""
     from bayeshaptic.models.prior import Prior
 
-    return mapping("prior", prior, Prior, "a prior, as in bayeshaptic.LogNormal(0.1, 0.2)")
+    return globals() | {"Prior": Prior}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
 from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.models import Prior, build_model
@@ -55,6 +56,7 @@ class Choice:
     candidates: Mapping[str, ScoredFit]
 
 
+@at_the_door
 @single_threaded
 def choose_model(
     etfe: Etfe,

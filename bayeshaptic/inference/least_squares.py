@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
@@ -98,6 +99,7 @@ class Fit:
         return self.model.response(self.theta, frequency_hz)
 
 
+@at_the_door
 @single_threaded
 def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None = None) -> Fit:
     """Fit `model` to `etfe` by weighted least squares from several starts.

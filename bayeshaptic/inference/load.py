@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.archive import model_from_dict
 from bayeshaptic.inference.arviz_groups import MARK
@@ -16,6 +17,7 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.types import Floats
 
 
+@at_the_door
 def load_posterior(path: str | Path) -> Posterior:
     """Read a posterior that `Posterior.save` or a report wrote.
 

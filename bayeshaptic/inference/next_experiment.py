@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.least_squares import Fit, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
@@ -104,6 +105,7 @@ def information(fit: Fit, noise_scale: float = 1.0) -> Information:
     return _information(fit.model, fit, fit.theta, noise_scale)
 
 
+@at_the_door
 def next_experiment(
     fit: Fit,
     slopes: Sequence[tuple[Mapping[str, float], float]],

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.inference.arviz_groups import save_posterior, to_arviz
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.models import Model
@@ -81,6 +82,7 @@ class Posterior:
     def ess_tail(self) -> Floats:
         return self.diagnostics.ess_tail
 
+    @at_the_door
     def quantile(self, p: float | Floats) -> Floats:
         """Quantiles of every parameter at the probabilities `p`, shape (..., P)."""
         return np.quantile(self.draws, p, axis=0)
@@ -116,6 +118,7 @@ class Posterior:
         """An ArviZ InferenceData (0.x) or DataTree (1.x): see `arviz_groups`."""
         return to_arviz(self)
 
+    @at_the_door
     def save(self, path: str | Path) -> Path:
         """Write it to `path` as netCDF for `load_posterior`; never leaves half a file."""
         return save_posterior(self, Path(path))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.coordinates import reach, sampling_coordinates
 from bayeshaptic.inference.least_squares import (
@@ -58,6 +59,7 @@ class _Counted:
         return self.density(phi)
 
 
+@at_the_door
 @single_threaded
 def sample(
     model: Model,

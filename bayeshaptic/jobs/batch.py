@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
@@ -91,6 +92,7 @@ def jobs(
     return tuple(by_name.values())
 
 
+@at_the_door
 def run_batch(
     sources: Iterable[str | Path],
     out_dir: str | Path,

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.arguments import instance, number
+from bayeshaptic.arguments import check_fields
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
@@ -54,18 +54,7 @@ class Settings(Options):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        instance("model", self.model, str, "its name, as in 'auto' or 'free'")
-        if self.columns is not None:
-            instance("columns", self.columns, str, "a text such as 'force=u[N],position=q[rad]'")
-        for name in ("period_s", "encoder_resolution"):
-            if getattr(self, name) is not None:
-                number(name, getattr(self, name), above=0.0)
-        for name in ("rows", "seconds"):
-            ends = getattr(self, name)
-            if ends is not None and not (isinstance(ends, tuple) and len(ends) == 2):
-                raise InputError(f"{name} is {ends!r}; give two numbers, as in (2, 30)")
-        for name in ("close_loop", "allow_outside"):
-            instance(name, getattr(self, name), bool, "True or False")
+        check_fields(self, globals())
 
     def facts(self) -> dict[str, Any]:
         """All of it as plain JSON types, for manifests and reports."""

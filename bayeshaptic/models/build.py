@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from bayeshaptic.arguments import at_the_door
+from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.parameter import Parameter
@@ -21,9 +22,6 @@ from bayeshaptic.models.structures import (
     Structure,
 )
 
-if TYPE_CHECKING:
-    from bayeshaptic.devices import Device
-
 # How well a device file is believed, as log standard deviations: configurations, assembly and
 # above all people differ.
 DEVICE_LOG_SD = 0.5
@@ -36,6 +34,7 @@ DAMPER_FLOOR = 1e-6
 FREE_DELAY_PERIODS = 2.0
 
 
+@at_the_door
 def rigid(
     device: str | Device | None = None,
     delay_s: float | None = None,
@@ -47,6 +46,7 @@ def rigid(
     return _build(RIGID, device, delay_s, delay_sd_s, period_s, prior)
 
 
+@at_the_door
 def free(
     device: str | Device | None = None,
     delay_s: float | None = None,
@@ -58,6 +58,7 @@ def free(
     return _build(FREE, device, delay_s, delay_sd_s, period_s, prior)
 
 
+@at_the_door
 def grasped(
     device: str | Device | None = None,
     delay_s: float | None = None,

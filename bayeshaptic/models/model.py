@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.joint_prior import JointPrior, joint_prior
 from bayeshaptic.models.parameter import Parameter, unit_of
@@ -173,10 +174,12 @@ class Model:
     def _joint_prior(self) -> JointPrior:
         return joint_prior([self.prior(name) for name in self.names])
 
+    @at_the_door
     def with_period(self, period_s: float) -> Model:
         """With the sampling period `period_s`, in seconds."""
         return replace(self, period_s=period_s)
 
+    @at_the_door
     def with_prior(self, priors: Mapping[str, Prior]) -> Model:
         """With other priors for the named parameters.
 
@@ -194,6 +197,7 @@ class Model:
         parameters = tuple(replace(p, prior=priors.get(p.name, p.prior)) for p in self.parameters)
         return replace(self, parameters=parameters)
 
+    @at_the_door
     def with_known(self, values: Mapping[str, float]) -> Model:
         """With some parameters known, no longer inferred.
 

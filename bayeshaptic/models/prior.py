@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
+from bayeshaptic.arguments import check_fields
 from bayeshaptic.errors import InputError
 from bayeshaptic.types import Floats
 
@@ -77,6 +78,7 @@ class LogNormal(Prior):
     support = (0.0, np.inf)
 
     def __post_init__(self) -> None:
+        check_fields(self, globals())
         if not (self.median > 0 and self.log_sd > 0):
             raise InputError(f"LogNormal needs median > 0 and log_sd > 0, got {self}.")
 
@@ -111,6 +113,7 @@ class HalfNormal(Prior):
     support = (0.0, np.inf)
 
     def __post_init__(self) -> None:
+        check_fields(self, globals())
         if not self.scale > 0:
             raise InputError(f"HalfNormal needs scale > 0, got {self}.")
 
@@ -146,6 +149,7 @@ class NearZero(Prior):
     support = (0.0, np.inf)
 
     def __post_init__(self) -> None:
+        check_fields(self, globals())
         if not 1e-12 * self.scale <= self.floor < self.scale:
             raise InputError(
                 f"NearZero needs a floor below its scale, by a factor of 1e12 at most; got {self}."
@@ -197,6 +201,7 @@ class Normal(Prior):
     coordinate = "linear"
 
     def __post_init__(self) -> None:
+        check_fields(self, globals())
         if not self.sd > 0:
             raise InputError(f"Normal needs sd > 0, got {self}.")
 
@@ -237,6 +242,7 @@ class Uniform(Prior):
     coordinate = "linear"
 
     def __post_init__(self) -> None:
+        check_fields(self, globals())
         if not self.high > self.low:
             raise InputError(f"Uniform needs low < high, got {self}.")
 
@@ -269,6 +275,7 @@ class LogUniform(Prior):
     coordinate = "log"
 
     def __post_init__(self) -> None:
+        check_fields(self, globals())
         if not 0 < self.low < self.high:
             raise InputError(f"LogUniform needs 0 < low < high, got {self}.")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import (
     Column,
@@ -29,6 +30,7 @@ Columns = str | Mapping[str, str] | None
 Span = tuple[float | None, float | None]
 
 
+@at_the_door
 def read_recording(
     path: str | os.PathLike[str],
     columns: Columns = None,
@@ -83,6 +85,7 @@ def read_recording(
     return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
 
 
+@at_the_door
 def read_measurement(
     path: str | os.PathLike[str],
     columns: Columns = None,
@@ -126,6 +129,7 @@ def read_measurement(
     return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
 
 
+@at_the_door
 def recording_from_arrays(
     force: ArrayLike,
     position: ArrayLike,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device, device_from_table, device_names, load_device
 from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError, Notice
@@ -126,6 +127,7 @@ class Study:
         return tuple(self.read(entry) for entry in self.entries)
 
 
+@at_the_door
 def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Study:
     """A study from its TOML file.
 

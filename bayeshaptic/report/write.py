@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
@@ -28,6 +29,7 @@ _LAST = "summary.json"
 _MAY_BE_MISSING = tuple(f"{p.name}.png" for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES))
 
 
+@at_the_door
 @single_threaded
 def write_report(
     result: Result, out_dir: str | Path, origin: Mapping[str, Any] | None = None

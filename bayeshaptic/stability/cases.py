@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.critical import MOST_DRAWS, CriticalStiffness
@@ -146,6 +147,7 @@ class DeviceLimit:
         return risk / (above * variance)
 
 
+@at_the_door
 def device_limit(cases: Sequence[Case], seed: int = 0) -> DeviceLimit:
     """The limit of a device over all its cases.
 

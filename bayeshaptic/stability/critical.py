@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
@@ -70,22 +71,26 @@ class CriticalStiffness:
         ranks = np.unique(self.samples, return_inverse=True)[1]
         return effective_draws(ranks.reshape(self.chains, -1))
 
+    @at_the_door
     def quantile(self, p: ArrayLike) -> Any:
         """The stiffness that K_CR is below with probability `p`; a float, or an array as `p`."""
         levels = np.asarray(p, float)
         found = quantiles(self.samples, levels)
         return float(found) if levels.ndim == 0 else found
 
+    @at_the_door
     def db(self, p: ArrayLike = 0.5) -> Any:
         """`quantile` of `p` in decibels, 20 log10 of the number in `unit`."""
         with np.errstate(divide="ignore"):
             return 20 * np.log10(self.quantile(p))
 
+    @at_the_door
     def probability_unstable(self, stiffness: ArrayLike) -> Any:
         """P(K_CR < stiffness), a float, or an array as `stiffness`."""
         below = np.searchsorted(np.sort(self.samples), stiffness, side="left")
         return below / len(self.samples)
 
+    @at_the_door
     def safe(self, risk: float) -> float | None:
         """The stiffness that is unstable with probability `risk`.
 
@@ -96,6 +101,7 @@ class CriticalStiffness:
         found = self.low_quantile(risk)
         return None if found is None else found.value
 
+    @at_the_door
     def low_quantile(self, risk: float) -> LowQuantile | None:
         """What `safe` says, with its Monte-Carlo error.
 
@@ -105,6 +111,7 @@ class CriticalStiffness:
         """
         return low_quantile(self.samples, risk, self.effective_at)
 
+    @at_the_door
     def effective_at(self, stiffness: float) -> float:
         """Effective number of draws that the share below a stiffness is counted from.
 
@@ -114,10 +121,12 @@ class CriticalStiffness:
         """
         return effective_draws((self.samples < stiffness).reshape(self.chains, -1))
 
+    @at_the_door
     def effective_below(self, risk: float) -> float:
         """Effective number of draws below the stiffness of probability `risk`."""
         return self.effective_at(self.quantile(risk)) * risk
 
+    @at_the_door
     def tip(self, lever_m: float) -> CriticalStiffness:
         """The same at the tip of a rotational device's lever arm `lever_m`: K / lever^2, in N/m.
 
@@ -136,6 +145,7 @@ class CriticalStiffness:
         return replace(self, samples=self.samples / lever_m**2, unit="N/m")
 
 
+@at_the_door
 @single_threaded
 def critical_stiffness(
     source: Any,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.closed import close_loop
@@ -102,6 +103,7 @@ class _Outcome:
     error: str | None = None
 
 
+@at_the_door
 def analyse_study(
     study: Study,
     model: str = "auto",

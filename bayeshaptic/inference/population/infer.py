@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.population.below import Below, draw_below
@@ -123,6 +124,7 @@ class Population:
         return self._here.natural(inside(x.reshape(-1, self.model.size), self._here))
 
 
+@at_the_door
 @single_threaded
 def infer_population(
     posteriors: Sequence[Posterior],

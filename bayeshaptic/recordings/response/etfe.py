@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.periodic_excitation import estimate_periodic
@@ -104,6 +105,7 @@ class Etfe:
         return np.degrees(np.unwrap(np.angle(self.value)))
 
 
+@at_the_door
 @single_threaded
 def estimate_etfe(
     recording: Recording,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import FRF_ROLES, Column, parse_columns, pick
 from bayeshaptic.recordings.readers import Arrays, read_arrays
@@ -20,6 +21,7 @@ from bayeshaptic.recordings.units import base_unit, choose_units
 FEWEST_ROWS = 10
 
 
+@at_the_door
 def read_frf(
     path: str | os.PathLike[str],
     period_s: float | None = None,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
 from bayeshaptic.report.guidance.section import guidance_section
@@ -31,6 +32,7 @@ _MAY_BE_MISSING = (
 )
 
 
+@at_the_door
 def write_study_report(
     study: StudyAnalysis,
     out_dir: str | Path,

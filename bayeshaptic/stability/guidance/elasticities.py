@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.parameter import Parameter
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
@@ -65,6 +66,7 @@ class Elasticities:
         return float(low), float(high)
 
 
+@at_the_door
 def elasticities(source: Any, draws: int = DRAWS) -> tuple[Elasticities, ...]:
     """Elasticities of K_CR at each crossing that may bind, the most probable first.
 

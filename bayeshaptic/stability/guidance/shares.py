@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import legendre
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.stability.crossings import find_crossings
 from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.types import Floats
@@ -65,6 +66,7 @@ class VarianceShares:
         return sum(share.share for share in self.shares) + self.beyond
 
 
+@at_the_door
 def variance_shares(source: Any, draws: int = DRAWS) -> VarianceShares:
     """Shares of the variance of ln K_CR over a posterior.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.stability.binding import TITLES, binding_kinds
 from bayeshaptic.stability.crossings import find_crossings
@@ -78,6 +79,7 @@ class Sweep:
     added: bool = False
 
 
+@at_the_door
 def sweep(
     source: Any,
     name: str,

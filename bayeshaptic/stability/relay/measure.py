@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.recording import Recording
@@ -130,6 +131,7 @@ def _refuse_no_relay(force: Floats, position: Floats, name: str) -> None:
         )
 
 
+@at_the_door
 def measure_relay(recording: Recording) -> RelayMeasurement:
     """Gain margin and frequency of a relay experiment.
 

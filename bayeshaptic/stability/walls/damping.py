@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from bayeshaptic.arguments import check_fields
 from bayeshaptic.errors import InputError
 from bayeshaptic.types import Complexes, Floats
 
@@ -62,6 +63,7 @@ class LowPass:
     cutoff_hz: float
 
     def __post_init__(self) -> None:
+        check_fields(self, globals())
         if not self.cutoff_hz > 0:
             raise InputError(f"a low-pass cut-off of {self.cutoff_hz} Hz; give one above zero.")
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.walls.damping import Damping
@@ -190,6 +191,7 @@ class LimitTable:
                 writer.writerow([part["damping_filter"], cutoff, part["smoothing"], level, *values])
         return text.getvalue()
 
+    @at_the_door
     def write(
         self,
         folder: str | Path,
@@ -229,6 +231,7 @@ class LimitTable:
         }
 
 
+@at_the_door
 def limit_table(
     cases: Sequence[Case],
     dampings: Sequence[Damping] | None = None,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.tail import ENOUGH_BELOW
@@ -68,6 +69,7 @@ class KbRegion:
         force, position = self.unit.split("/")
         return f"{force} s/{position}"
 
+    @at_the_door
     def limits(self, damping: ArrayLike) -> Floats:
         """The stiffness up to which each loop is stable at dampings (J,), shape (n, J).
 
@@ -94,6 +96,7 @@ class KbRegion:
         np.minimum.at(largest, events.row[above], events.place[above])
         return np.where(np.isnan(self.start), 0.0, largest)
 
+    @at_the_door
     def probability(self, stiffness: ArrayLike, damping: ArrayLike) -> Any:
         """P(stable | K, B) of pairs that broadcast against each other; a float, or an array.
 
@@ -148,6 +151,7 @@ class KbRegion:
             return np.sum([part.sum(axis=0) for part in parts], axis=0) / count
         return np.concatenate(parts)
 
+    @at_the_door
     def quantile(self, risk: float, damping: ArrayLike) -> Floats:
         """The stiffness that is unstable with probability `risk`, shape (J,).
 
@@ -158,6 +162,7 @@ class KbRegion:
         """
         return np.quantile(self.limits(damping), risk, axis=0, method="inverted_cdf")
 
+    @at_the_door
     def says(self, risk: float) -> bool:
         """Whether 20 effective draws lie below a stiffness of that `risk`."""
         return self.effective * risk >= ENOUGH_BELOW
@@ -167,6 +172,7 @@ class KbRegion:
         top = float(np.quantile(self.largest_damping(), 0.05, method="inverted_cdf"))
         return np.linspace(0.0, _INSIDE * top if np.isfinite(top) else 1.0, count)
 
+    @at_the_door
     def boundaries(self, risks: tuple[float, ...], damping: ArrayLike) -> tuple[Boundary, ...]:
         """The boundary at each risk, with one evaluation of the loops.
 
@@ -180,6 +186,7 @@ class KbRegion:
         place = [max(int(np.ceil(risk * len(limits))) - 1, 0) for risk in risks]
         return tuple(Boundary(r, levels, limits[p]) for r, p in zip(risks, place, strict=True))
 
+    @at_the_door
     def z_width(self, risk: float, count: int = LEVELS) -> ZWidth:
         """The range of walls that are each unstable with at most the probability `risk`.
 
@@ -196,6 +203,7 @@ class KbRegion:
         return width_of(boundary)
 
 
+@at_the_door
 def kb_region(
     source: Any,
     damping: Damping | None = None,

@@ -1,0 +1,138 @@
+"""Whatever is handed to a public function, a wrong type or number is one line that names it."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bayeshaptic as bh
+
+CLASSES = {name: getattr(bh, name) for name in dir(bh) if inspect.isclass(getattr(bh, name))}
+# Arguments for which anything may be given, or which the function itself looks at.
+FREE = {("analyse", "options"), ("close_loop", "options")}
+
+
+def blank(kind: type) -> Any:
+    """An instance of a class, with nothing in it: a door looks at no more than the class."""
+    return object.__new__(kind)
+
+
+def good(annotation: str) -> Any:
+    """Something that an annotation allows."""
+    first = annotation.split(" | ")[0]
+    plain = {"int": 5, "float": 0.5, "bool": True, "str": "x", "Path": Path("x"), "Columns": "x"}
+    plain |= {"StudyAnalysis": SimpleNamespace(new_person=1)}
+    plain |= {"Any": SimpleNamespace(model=1), "Result": SimpleNamespace(analysis=1)}
+    if "None" in annotation or first in plain:
+        return None if "None" in annotation else plain[first]
+    if first.startswith("os.PathLike"):
+        return "x"
+    if first.startswith("Sequence[tuple"):
+        return [({}, 0.5)]
+    if match := re.match(r"(?:Sequence|Iterable|tuple)\[(\w+)", first):
+        return [good(match[1])]
+    if first in ("ArrayLike", "Floats", "Span"):
+        return [0.5, 0.6]
+    return blank(CLASSES[first])
+
+
+def doors() -> Iterator[tuple[str, Callable[..., Any]]]:
+    for name in dir(bh):
+        value = getattr(bh, name)
+        if inspect.isfunction(value):
+            yield name, value
+
+
+def cases() -> Iterator[Any]:
+    for name, function in doors():
+        for argument in inspect.signature(function).parameters.values():
+            variable = argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD)
+            if not variable and (name, argument.name) not in FREE:
+                yield pytest.param(function, argument.name, id=f"{name}-{argument.name}")
+
+
+@pytest.mark.parametrize(("function", "wrong"), list(cases()))
+def test_an_argument_of_a_wrong_type(function: Callable[..., Any], wrong: str) -> None:
+    parameters = inspect.signature(function).parameters.values()
+    given = {
+        one.name: good(str(one.annotation))
+        for one in parameters
+        if one.default is one.empty or one.name == wrong
+    }
+    given = {name: value for name, value in given.items() if name not in ("options", "changes")}
+    with pytest.raises(bh.InputError) as caught:
+        function(**given | {wrong: object()})
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 250
+    assert wrong in str(caught.value)
+
+
+LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, int))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: bh.Options(prior={"m1": (0.1, 0.2)}), "prior is of type dict; give a mapping"),
+        (lambda: bh.free(prior={"m1": (0.1, 0.2)}), "a mapping of names to a Prior"),
+        (lambda: bh.Options(prior=[1]), "prior is"),
+        (lambda: bh.Normal(np.nan, 1), "mean is nan; give a number"),
+        (lambda: bh.Normal("0", 1), "mean is '0'; give a number"),
+        (lambda: bh.LogNormal(np.inf, 1), "median is inf"),
+        (lambda: bh.HalfNormal(None), "scale is None"),
+        (lambda: bh.LowPass("30 Hz"), "cutoff_hz is '30 Hz'"),
+        (lambda: bh.LowPass(-30), "cutoff_hz is -30; give a number above zero"),
+        (lambda: LIMIT.safe(2), "risk is 2; give a number between 0 and 1"),
+        (lambda: LIMIT.safe("1 %"), "risk is '1 %'"),
+        (lambda: LIMIT.quantile([0.1, 1.1]), "p is"),
+        (lambda: LIMIT.tip(0), "lever_m is 0; give a number above zero"),
+        (lambda: LIMIT.probability_unstable("x"), "stiffness is 'x'; give numbers"),
+        (lambda: bh.Options(seed=-1), "seed is -1; give a number of at least 0"),
+        (lambda: bh.Options(seed=1.5), "seed is 1.5; give a whole number"),
+        (lambda: bh.Options(band_hz=(200, 1)), "give the lower one first"),
+        (lambda: bh.Options(band_hz=200), "band_hz is 200; give a sequence of 2 numbers"),
+        (lambda: bh.Options(held="yes"), "held is 'yes'; give True or False"),
+        (
+            lambda: bh.Options(progress=3),
+            "progress is 3; give a function of the share done and a word or True",
+        ),
+        (lambda: bh.Options(delay_s=-1e-4), "delay_s is -0.0001; give a number of at least 0"),
+        (lambda: bh.Settings(rows=3), "rows is 3; give a sequence"),
+        (lambda: bh.Settings(model=3), "model is 3; give a text"),
+        (lambda: bh.read_recording(None), "path is None; give a text or a path"),
+        (lambda: bh.read_recording("a.csv", rows=(1, "2")), "rows is"),
+        (lambda: bh.recording_from_arrays("xy", [1, 2]), "force is 'xy'; give numbers"),
+        (lambda: bh.estimate_etfe("a.csv"), "give a Recording (see bayeshaptic.read_recording)"),
+        (lambda: bh.sample(blank(bh.Model), None), "etfe is None; give an Etfe"),
+        (lambda: bh.elasticities(3), "source is 3; give a Model, Fit, Posterior"),
+        (lambda: bh.write_report(3, "out"), "result is 3; give what bayeshaptic.analyse"),
+        (lambda: bh.device_limit([]), "cases is []; give a sequence of a Case"),
+        (lambda: bh.run_batch("a.csv", "out"), "sources is 'a.csv'; give a sequence of a text"),
+    ],
+)
+def test_the_line_says_what_to_give(call: Callable[[], Any], words: str) -> None:
+    with pytest.raises(bh.InputError, match=re.escape(words)) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        partial(bh.Normal, np.float64(1), np.float32(2)),
+        partial(bh.Options, seed=np.int64(3), band_hz=[1, 200], delay_sd_s=float("inf")),
+        partial(bh.Options, progress=True, prior=None),
+        partial(LIMIT.quantile, np.array([0.1, 0.9])),
+        partial(LIMIT.probability_unstable, 3),
+        partial(bh.recording_from_arrays, [1, 2] * 9, [3, 4] * 9, 1e-3),
+    ],
+)
+def test_what_is_alike_will_do(call: Callable[[], Any]) -> None:
+    call()
