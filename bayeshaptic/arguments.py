@@ -29,13 +29,13 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "count": (2, math.inf, "of at least 2"),
     "minimum_lines": (1, math.inf, "of at least 1"),
     "most_evaluations": (1, math.inf, "of at least 1"),
-    "ess": (1e-9, math.inf, "above zero"),
-    "budget_s": (1e-9, math.inf, "above zero"),
-    "period_s": (1e-12, 1e12, "above zero, in seconds"),
-    "default_period_s": (1e-12, 1e12, "above zero, in seconds"),
-    "encoder_resolution": (1e-300, 1e300, "above zero, in m or rad"),
-    "lever_m": (1e-300, 1e300, "above zero, in metres"),
-    "cutoff_hz": (1e-300, 1e300, "above zero, in Hz"),
+    "ess": (1e-9, math.inf, "above 0"),
+    "budget_s": (1e-9, math.inf, "above 0"),
+    "period_s": (1e-12, 1e12, "above 0, in seconds"),
+    "default_period_s": (1e-12, 1e12, "above 0, in seconds"),
+    "encoder_resolution": (1e-300, 1e300, "above 0, in m or rad"),
+    "lever_m": (1e-300, 1e300, "above 0, in metres"),
+    "cutoff_hz": (1e-300, 1e300, "above 0, in Hz"),
     "delay_s": (0, 1e12, "of at least 0, in seconds"),
     "delay_sd_s": (0, math.inf, "of at least 0, in seconds"),
     "risk": (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01"),
@@ -45,7 +45,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
 """Lowest and highest value of numbers by their name, and how to say it."""
 
 _ALIAS = re.compile(r"(?<![\w.])(collections\.abc|typing)\.")
-_MAY_BE_INFINITE = ("delay_sd_s", "low")
+_MAY_BE_INFINITE = ("delay_sd_s", "low", "stiffness")
 
 _OFFERED = {
     "source": (("model", "structure"), "a Model, Fit, Posterior, Case or Analysis"),
@@ -136,7 +136,12 @@ def _check(name: str, value: Any, annotation: str, names: Names) -> None:
     parts = _split(annotation, " | ")
     if name in _OFFERED and annotation in ("Any", "Result"):
         parts = [name]
-    endless = isinstance(value, float) and math.isinf(value) and name not in _MAY_BE_INFINITE
+    endless = (
+        "float" in parts
+        and isinstance(value, Real)
+        and math.isinf(value)
+        and name not in _MAY_BE_INFINITE
+    )
     if any(_is(value, part, names) for part in parts) and not endless:
         if name in BOUNDS and value is not None:
             _check_bounds(name, value)
@@ -182,7 +187,9 @@ def _is(value: Any, part: str, names: Names) -> bool:
                 return len(within) == len(list(value)) and all(
                     _any(one, part, names) for one, part in zip(value, within, strict=True)
                 )
-            return len(list(value)) > 0 and all(_any(one, within[0], names) for one in value)
+            if kind == "tuple" and not len(list(value)):
+                return False
+            return all(_any(one, within[0], names) for one in value)
         if kind == "Iterable":
             return isinstance(value, Iterable) and not isinstance(value, str | Mapping)
         return kind != "Callable" or callable(value)
@@ -206,7 +213,7 @@ def _numbers(value: Any) -> bool:
         array = np.asarray(value)
     except ValueError:
         return False
-    return array.dtype.kind in "iuf" and array.size > 0 and not np.isnan(array).any()
+    return array.dtype.kind in "iuf" or array.size == 0
 
 
 _PLAIN: dict[str, Callable[[Any], bool]] = {

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bayeshaptic.report.draft import draft_in, move_all, write_whole
+from bayeshaptic.report.draft import draft_in, move_all, remove_dead_drafts, write_whole
 
 
 def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
@@ -100,3 +100,19 @@ def _wait_for(found: object) -> object:
             return result
         time.sleep(0.1)
     raise AssertionError("never happened")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be asked whether it lives")
+def test_half_written_files_of_the_dead_are_removed(tmp_path: Path) -> None:
+    code = f"""
+import os, sys
+from pathlib import Path
+from bayeshaptic.report import draft
+os.replace = lambda *_: os.kill(os.getpid(), 9)
+draft.write_whole(Path({str(tmp_path / "index.html")!r}), "half")
+"""
+    subprocess.run([sys.executable, "-c", code], check=False)
+    (left,) = os.listdir(tmp_path)
+    assert left.startswith(".index.html.part-")
+    remove_dead_drafts(tmp_path)
+    assert not os.listdir(tmp_path)

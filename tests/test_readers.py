@@ -449,10 +449,13 @@ def test_arrays_in_memory() -> None:
         ({"force": FORCE[1:], "period_s": 1e-3}, "force has 49, position has 50"),
         ({"force": [], "period_s": 1e-3}, r"not an array of shape \(0,\)"),
         ({"force": np.ones((2, N)), "period_s": 1e-3}, r"not an array of shape \(2, 50\)"),
-        ({"period_s": 0.0}, "the period must be a number of seconds above 0"),
+        ({"period_s": 0.0}, "period_s is 0.0; give a number above 0, in seconds"),
         ({}, "no time and no period"),
         ({"period_s": 1e-3, "force_unit": "lbf"}, "force_unit is 'lbf'; use N, Nm, A"),
-        ({"period_s": 1e-3, "encoder_resolution": -1.0}, "encoder_resolution must be above 0"),
+        (
+            {"period_s": 1e-3, "encoder_resolution": -1.0},
+            "encoder_resolution is -1.0; give a number above 0",
+        ),
     ):
         with pytest.raises(InputError, match=message):
             recording_from_arrays(**{"force": FORCE, "position": POSITION, **arguments})

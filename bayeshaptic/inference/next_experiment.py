@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.arguments import at_the_door
+from bayeshaptic.errors import InputError
 from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.least_squares import Fit, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
@@ -138,6 +139,8 @@ def next_experiment(
     """
     known = information(fit, noise_scale)
     fisher, prior = known.fisher(), known.prior_precision()
+    if not slopes:
+        raise InputError("slopes is empty; give at least one pair of slopes and their share")
     gradients = [(known.gradient(slope), share) for slope, share in slopes]
 
     def spread(total: Floats) -> float:

@@ -24,6 +24,7 @@ from bayeshaptic.jobs.recording import report_recording
 from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.jobs.study import report_study
 from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.report.draft import remove_dead_drafts
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.types import Progress
 
@@ -142,6 +143,8 @@ def run_batch(
     settings = settings or Settings()
     work = jobs([Path(source).absolute() for source in sources], folder, settings, command)
     folder.mkdir(parents=True, exist_ok=True)
+    for place in (folder, *(job.folder for job in work)):
+        remove_dead_drafts(place)
     batch = _Batch(folder, settings, command, tell, {str(job.source): job for job in work})
     old = read_manifest(folder) if resume else {}
     todo = [job for job in work if not batch.is_done(old.get(str(job.source)), job)]

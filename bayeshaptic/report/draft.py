@@ -13,7 +13,7 @@ from pathlib import Path
 
 from bayeshaptic.errors import InputError
 
-_NAME = re.compile(r"\.report-(?P<host>[\w-]*)-(?P<pid>\d+)-[0-9a-f]{12}")
+_DRAFT = re.compile(r"\.(?:report|.+\.part)-(?P<host>[\w-]*)-(?P<pid>\d+)-[0-9a-f]{12}")
 
 
 @contextmanager
@@ -23,7 +23,7 @@ def draft_in(folder: Path) -> Iterator[Path]:
     Drafts that processes of this machine left when they died are removed first.
     """
     remove_dead_drafts(folder)
-    draft = folder / f".report-{_host()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
+    draft = folder / f".report-{_owner()}"
     draft.mkdir(parents=True)
     try:
         yield draft
@@ -87,7 +87,7 @@ def move_all(draft: Path, folder: Path, last: str) -> None:
 
 def write_whole(path: Path, text: str) -> None:
     """Write a text file; it is complete, or what was there before."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    partial = path.with_name(f".{path.name}.part-{_owner()}")
     try:
         with partial.open("w", encoding="utf-8", newline="\n") as file:
             file.write(text)
@@ -103,9 +103,17 @@ def remove_dead_drafts(folder: Path) -> None:
     if not folder.is_dir():
         return
     for path in folder.iterdir():
-        match = _NAME.fullmatch(path.name)
+        match = _DRAFT.fullmatch(path.name)
         if match and match["host"] == _host() and not _is_alive(int(match["pid"])):
-            shutil.rmtree(path, ignore_errors=True)
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+
+
+def _owner() -> str:
+    """The end of a draft's name, by which others know whether its process is alive."""
+    return f"{_host()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
 
 
 def _host() -> str:

@@ -71,7 +71,7 @@ def convergence(analysis: Analysis) -> str:
     )
 
 
-def at_the_door(analysis: Analysis) -> str:
+def checked(analysis: Analysis) -> str:
     """What the spectral radius said about the limits."""
     limit = analysis.limit
     if not limit.checked:
