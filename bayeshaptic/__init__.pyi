@@ -110,6 +110,9 @@ from .recordings import (
     Study as Study,
 )
 from .recordings import (
+    join_recordings as join_recordings,
+)
+from .recordings import (
     read_frf as read_frf,
 )
 from .recordings import (

@@ -23,6 +23,7 @@ from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
+from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.sufficiency import refuse_too_little
@@ -172,9 +173,10 @@ def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -
     if isinstance(measurement, Recording):
         with clock.stage("checks"):
             options.report(0.0, "checking the recording")
-            notices = told(measurement.feedback, check_recording(measurement, device))
+            whole = unbroken(measurement)
+            notices = told(measurement.feedback, check_recording(whole, device))
             if not any(notice.topic == "feedback" for notice in notices):
-                refuse_too_little(measurement)
+                refuse_too_little(whole)
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
             etfe = _response(measurement, options.band_hz, has_feedback(notices))
@@ -253,7 +255,8 @@ def _response(recording: Recording, band_hz: tuple[float, float] | None, biased:
     except InputError:
         if not biased or band_hz is not None:
             raise
-    widest = (1 / recording.duration_s, _WIDEST / recording.period_s)
+    longest = max(piece.duration_s for piece in recording.pieces)
+    widest = (1 / longest, _WIDEST / recording.period_s)
     return estimate_etfe(recording, widest)
 
 

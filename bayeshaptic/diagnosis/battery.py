@@ -20,7 +20,7 @@ from bayeshaptic.recordings.response.spectra import PeriodicSpectra
 
 def is_periodic(etfe: Etfe) -> bool:
     """Whether the residual repeats from period to period, and there is the motion of one."""
-    return isinstance(etfe.spectra, PeriodicSpectra) and etfe.recording is not None
+    return isinstance(etfe.spectra, PeriodicSpectra) and etfe.unbroken is not None
 
 
 def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tuple[Test, ...]:

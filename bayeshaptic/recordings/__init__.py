@@ -1,6 +1,7 @@
 """What was measured: recordings, studies, their readers and checks."""
 
 from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.read import read_measurement, read_recording, recording_from_arrays
 from bayeshaptic.recordings.readers import Reader, register_reader
 from bayeshaptic.recordings.recording import Recording
@@ -24,6 +25,7 @@ __all__ = [
     "check_recording",
     "clipping",
     "increment_unit",
+    "join_recordings",
     "read_frf",
     "read_measurement",
     "read_recording",

@@ -52,6 +52,9 @@ class Recording:
         What was found and assumed when it was read.
     feedback : Feedback or None
         The controller that was in the loop, where somebody said which.
+    joints : tuple of int
+        Samples at which a further piece begins, where several recordings are joined
+        (`bayeshaptic.join_recordings`); nothing is known of the time between them.
     """
 
     force: NDArray[np.float64] = field(repr=False)
@@ -70,6 +73,7 @@ class Recording:
     source: Path | None = None
     notices: tuple[Notice, ...] = ()
     feedback: Feedback | None = None
+    joints: tuple[int, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -88,6 +92,16 @@ class Recording:
     def stiffness_unit(self) -> str:
         return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
 
+    @property
+    def pieces(self) -> tuple[Recording, ...]:
+        """Its pieces, each a recording of its own; itself where it is one."""
+        if not self.joints:
+            return (self,)
+        edges = (0, *self.joints, self.samples)
+        return tuple(self.part(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True))
+
     def part(self, start: int, stop: int) -> Recording:
         """The samples from `start` up to but without `stop`, as a recording of its own."""
-        return replace(self, force=self.force[start:stop], position=self.position[start:stop])
+        joints = tuple(joint - start for joint in self.joints if start < joint < stop)
+        force, position = self.force[start:stop], self.position[start:stop]
+        return replace(self, force=force, position=position, joints=joints)

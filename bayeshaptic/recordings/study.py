@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,12 +13,13 @@ from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import parse_columns
 from bayeshaptic.recordings.feedback import Feedback, read_feedback
+from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.known_limits import Reference, read_references
 from bayeshaptic.recordings.read import Columns, Span, read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 
-STUDY_KEYS = ("device", "prior", "feedback", "recording", "reference")
+STUDY_KEYS = ("device", "pool", "prior", "feedback", "recording", "reference")
 ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns", "rows", "seconds")
 PRIOR_KEYS = ("median", "log_sd", "scale", "floor", "mean", "sd", "low", "high", "log")
 
@@ -41,6 +42,8 @@ class StudyEntry:
         This file's own mapping; None means the device's.
     rows, seconds : (float, float) or None
         The part to read; see `read_recording`.
+    more : tuple of StudyEntry
+        Further recordings of the same: they count together with this one, as its pieces.
     """
 
     path: Path
@@ -51,6 +54,7 @@ class StudyEntry:
     columns: Columns = None
     rows: Span | None = None
     seconds: Span | None = None
+    more: tuple[StudyEntry, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,13 +97,26 @@ class Study:
     def read(self, entry: StudyEntry) -> Recording | Etfe:
         """The measurement of one `entry`, with what the study declares about it.
 
-        Time stamps come before the device's period, which serves where a file has none.
+        Time stamps come before the device's period, which serves where a file has none. What
+        counts together is joined (`join_recordings`).
 
         Raises
         ------
         InputError
-            See `read_measurement`.
+            See `read_measurement` and `join_recordings`.
         """
+        if not entry.more:
+            return self._read_one(entry)
+        found = [self._read_one(one) for one in (entry, *entry.more)]
+        recordings = [one for one in found if isinstance(one, Recording)]
+        if len(recordings) < len(found):
+            raise InputError(
+                f"{self.path}: {entry.path.name} and what counts together with it are tables of a "
+                "response, which cannot be joined; write pool = false at the top of the study"
+            )
+        return join_recordings(recordings)
+
+    def _read_one(self, entry: StudyEntry) -> Recording | Etfe:
         columns = entry.columns if entry.columns is not None else self.columns
         measurement = read_measurement(
             entry.path,
@@ -139,7 +156,9 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
     in the logarithm). Each ``[[recording]]`` table has a `file`, relative to the study, and where
     they apply `user`, `configuration` (a number or a name), `trial`, `level`, `rows` or
     `seconds` (the part to read) and `columns` of its own. Recordings are
-    looked for but not read; `Study.read` does that. Optional ``[[reference]]`` tables hold limits
+    looked for but not read; `Study.read` does that. Recordings that nothing tells apart count
+    together as one; ``pool = true`` at the top joins trials and levels, too, and ``pool = false``
+    nothing. Optional ``[[reference]]`` tables hold limits
     known from elsewhere: `label`, `held`, and `critical_stiffness` or `critical_stiffness_db`. An
     optional ``[feedback]`` table says which controller was in the loop.
 
@@ -173,20 +192,43 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
         raise InputError(
             f"{path}: no recordings; add a [[recording]] table with file = '...' for each"
         )
+    read = [
+        _entry(entry, f"{path}, recording {number}", path.parent, home)
+        for number, entry in enumerate(entries, start=1)
+    ]
     return Study(
         name=path.stem,
         path=path,
         device=device,
-        entries=tuple(
-            _entry(entry, f"{path}, recording {number}", path.parent, home)
-            for number, entry in enumerate(entries, start=1)
-        ),
+        entries=_pooled(read, _pool(table)),
         columns=columns,
         prior=_prior(table.content.get("prior", {}), f"{path}, [prior]"),
         notices=notices,
         references=read_references(table.content.get("reference", []), path),
         feedback=read_feedback(table.content.get("feedback"), f"{path}, [feedback]"),
     )
+
+
+def _pool(table: Table) -> bool | None:
+    value = table.content.get("pool")
+    if value is not None and not isinstance(value, bool):
+        raise table.wrong("pool", "true or false")
+    return value
+
+
+def _pooled(entries: Sequence[StudyEntry], pool: bool | None) -> tuple[StudyEntry, ...]:
+    """Those of the same user and configuration as one.
+
+    Where the study does not say whether to, only those that nothing tells apart, neither a trial
+    nor a level.
+    """
+    if pool is False:
+        return tuple(entries)
+    alike: dict[tuple[object, ...], list[StudyEntry]] = {}
+    for entry in entries:
+        said = () if pool else (entry.trial, entry.level)
+        alike.setdefault((entry.user, entry.configuration, *said), []).append(entry)
+    return tuple(replace(first, more=tuple(more)) for first, *more in alike.values())
 
 
 def _file(folder: Path, file: str, home: Path | None, where: str) -> Path:

@@ -12,6 +12,7 @@ from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.effects.library import effects
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 
@@ -43,6 +44,7 @@ def explain_force(recording: Recording | None) -> ForceExplained | None:
     """
     if recording is None:
         return None
+    recording = unbroken(recording)
     try:
         further = inverse_dynamics(recording)
     except InputError:

@@ -11,6 +11,7 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower, pid
 from bayeshaptic.models import HalfNormal
+from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.types import Floats
@@ -52,8 +53,7 @@ class InLoop:
 def follow_in_loop(recording: Recording) -> InLoop | None:
     """Fit the motion of one mass; None where none can be found beside the measured one."""
     follower = _declared(recording)
-    middle = recording.samples // 2
-    parts = (recording.part(0, middle), recording.part(middle, recording.samples))
+    parts = _halves(recording)
     try:
         motion = fit_motion(recording, follower)
     except (InputError, np.linalg.LinAlgError):
@@ -100,6 +100,15 @@ def open_questions(
     if not (low > 0 and 20 * np.log10(high / low) < _WIDEST_DB):
         reasons.append("the recording leaves the limit open within more than a factor of two")
     return tuple(reasons)
+
+
+def _halves(recording: Recording) -> tuple[Recording, Recording]:
+    """Its first and its second half; of pieces every other one."""
+    pieces = recording.pieces
+    if len(pieces) > 3:
+        return join_recordings(pieces[::2]), join_recordings(pieces[1::2])
+    middle = recording.samples // 2
+    return recording.part(0, middle), recording.part(middle, recording.samples)
 
 
 def _declared(recording: Recording) -> Follower | None:

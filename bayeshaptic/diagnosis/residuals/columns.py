@@ -28,7 +28,7 @@ _HAND_HZ = 20.0  # below it a hand moves the device, and the encoder sees it wel
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     """One test for each nonlinear function of command and motion; none without a recording."""
-    recording = etfe.recording
+    recording = etfe.unbroken
     if recording is None or etfe.period_lines is not None:
         return ()
     tests = []

@@ -22,7 +22,7 @@ def drift_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     of shape(t) u(t), beside what any constant response explains.  delta is complex and smooth over
     log frequency.
     """
-    recording = etfe.recording
+    recording = etfe.unbroken
     if recording is None or etfe.period_lines is not None:
         return ()
     at_lines = line_transform(etfe, recording)

@@ -29,7 +29,7 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     changes, or of a fault of the measurement.  None without frequencies that are not driven, or
     where the motion is too slow for its encoder.
     """
-    recording, spectra = etfe.recording, etfe.spectra
+    recording, spectra = etfe.unbroken, etfe.spectra
     if recording is None or not isinstance(spectra, RandomSpectra):
         return ()
     if _counts_a_sample(recording) < _ROUNDED:

@@ -38,9 +38,9 @@ def measurement_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> t
     look : SampleLook, optional
         What the samples showed, where they were looked at before.
     """
-    if etfe.recording is None:
+    if etfe.unbroken is None:
         return ()
-    return tuple(finding.test for finding in inspect(etfe.recording, fit, etfe, look).findings)
+    return tuple(finding.test for finding in inspect(etfe.unbroken, fit, etfe, look).findings)
 
 
 def repair_measurement(state: State, look: SampleLook | None = None) -> State:
@@ -54,7 +54,7 @@ def repair_measurement(state: State, look: SampleLook | None = None) -> State:
     State
         The very same where nothing was found.
     """
-    recording = state.etfe.recording
+    recording = state.etfe.unbroken
     if recording is None:
         return state
     found = inspect(recording, state.fit, state.etfe, look)

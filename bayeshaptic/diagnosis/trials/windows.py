@@ -33,7 +33,7 @@ class WindowTrials:
     """
 
     def __init__(self, state: State) -> None:
-        recording = state.etfe.recording
+        recording = state.etfe.unbroken
         self._look: SampleLook | None = None
         if recording is not None:
             self._look = look_at_samples(recording, state.etfe)

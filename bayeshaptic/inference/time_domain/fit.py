@@ -20,7 +20,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
-from bayeshaptic.inference.time_domain.loop import LOWEST, PLAIN, Loop
+from bayeshaptic.inference.time_domain.loop import Loop
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, Way, ridge
 from bayeshaptic.inference.time_domain.widths import covariance, mean_of_uneven
 from bayeshaptic.recordings.recording import Recording
@@ -79,8 +79,7 @@ class MotionFit:
     def error_on(self, recording: Recording) -> Floats:
         """Measured less simulated position of another recording, with these values; (N,)."""
         loop = replace(Loop.of(recording, self.bandwidth_hz, self.way), follower=self.follower)
-        start = np.append(self.inside, [recording.position[0], 0.0])
-        return loop.error(start, self.uneven)
+        return loop.error(loop.begun(self.inside), self.uneven)
 
 
 def fit_motion(recording: Recording, feedback: Follower | None = None) -> MotionFit:
@@ -102,10 +101,11 @@ def fit_motion(recording: Recording, feedback: Follower | None = None) -> Motion
     InputError
         Where no motion of one mass can be found beside the measured one.
     """
-    start = _inverse_dynamics(recording)
     width = bandwidth_hz(recording.force, recording.period_s)
     way = Way.of(recording.position)
-    loop = Loop.of(recording, width, way).led(feedback, start)
+    loop = Loop.of(recording, width, way)
+    start = loop.begun(_inverse_dynamics(recording))
+    loop = loop.led(feedback, start)
     first = _fit(loop, start, recording.name)
     second = _fit(loop.led(None, start, _OTHER), first.inside, recording.name)
     apart = (second.values - first.values)[: len(NAMES)]
@@ -130,7 +130,7 @@ def fit_motion(recording: Recording, feedback: Follower | None = None) -> Motion
 
 @dataclass(frozen=True)
 class _Found:
-    """A fit with one follower; shapes (7,), (7,), (2 WAVES,), (7, 7), (N,)."""
+    """A fit with one follower; shapes (V,), (V,), (2 WAVES,), (V, V), (N,)."""
 
     values: Floats
     inside: Floats
@@ -144,6 +144,7 @@ class _Found:
 def _fit(loop: Loop, start: Floats, name: str) -> _Found:
     """Gauss-Newton steps, first without the uneven force, then with it."""
     values, uneven = start, np.zeros(2 * WAVES)
+    plain = loop.plain
     for with_waves in (False, True):
         converged = False
         for _ in range(_STEPS):
@@ -157,9 +158,9 @@ def _fit(loop: Loop, start: Floats, name: str) -> _Found:
                 converged = True
                 break
     error, columns, solved = _linearised(loop, values, uneven, True, name)
-    left = error + columns[:, PLAIN:] @ uneven - columns @ solved.solution
-    spread = covariance(columns, left, solved, loop.independent)[:PLAIN, :PLAIN]
-    best = values + solved.solution[:PLAIN]
+    left = error + columns[:, plain:] @ uneven - columns @ solved.solution
+    spread = covariance(columns, left, solved, loop.independent)[:plain, :plain]
+    best = values + solved.solution[:plain]
     return _Found(best, values, uneven, spread, error, solved, converged)
 
 
@@ -167,28 +168,30 @@ def _linearised(
     loop: Loop, values: Floats, uneven: Floats, with_waves: bool, name: str
 ) -> tuple[Floats, Floats, Ridge]:
     """The error, its slopes, and the linear problem's solution for the step and all waves."""
+    plain = loop.plain
     error = loop.error(values, uneven)
     columns = loop.columns(values, uneven, error)
     if not (np.all(np.isfinite(error)) and np.all(np.isfinite(columns))):
         raise InputError(f"{name}: no motion of one mass stays near the measured one")
     if not with_waves:
-        columns[:, PLAIN:] = 0.0
+        columns[:, plain:] = 0.0
     size = float(np.std(loop.force))
-    target = error + columns[:, PLAIN:] @ uneven
-    return error, columns, ridge(columns, target, PLAIN, size, loop.independent)
+    target = error + columns[:, plain:] @ uneven
+    return error, columns, ridge(columns, target, plain, size, loop.independent)
 
 
 def _step(
     loop: Loop, values: Floats, uneven: Floats, error: Floats, solved: Ridge
 ) -> tuple[Floats, Floats, float] | None:
     """As much of the step as lowers the penalised error, and by which share; None where none."""
-    penalty = solved.share[PLAIN:]
+    plain, lowest = loop.plain, loop.lowest
+    penalty = solved.share[plain:]
     before = float(error @ error + penalty @ uneven**2)
     share = 1.0
     for _ in range(6):
-        trial = np.maximum(values + share * solved.solution[:PLAIN], LOWEST)
+        trial = np.maximum(values + share * solved.solution[:plain], lowest)
         trial[0] = np.clip(trial[0], 0.5 * values[0], 2 * values[0])
-        more = uneven + share * (solved.solution[PLAIN:] - uneven)
+        more = uneven + share * (solved.solution[plain:] - uneven)
         left = loop.error(trial, more)
         after = float(left @ left + penalty @ more**2)
         if after < before:
@@ -198,17 +201,22 @@ def _step(
 
 
 def _inverse_dynamics(recording: Recording) -> Floats:
-    """Where to begin, shape (7,): least squares of the force on the filtered motion."""
+    """Where to begin, shape (5,): least squares of the force on the filtered motion."""
     from scipy.signal import butter, sosfiltfilt
 
-    force, position, period_s = recording.force, recording.position, recording.period_s
-    low = butter(4, 2 * _BAND, output="sos")
-    x = sosfiltfilt(low, position)
-    v = np.gradient(x, period_s)
-    sign = np.tanh(v / (0.02 * np.std(v)))
-    columns = np.stack([np.gradient(v, period_s), v, sosfiltfilt(low, sign), np.ones_like(v)], 1)
-    mass, damping, dry, offset = np.linalg.lstsq(columns, sosfiltfilt(low, force), rcond=None)[0]
+    low, period_s = butter(4, 2 * _BAND, output="sos"), recording.period_s
+    speeds = [np.gradient(sosfiltfilt(low, p.position), period_s) for p in recording.pieces]
+    usual = float(np.std(np.concatenate(speeds)))
+    if not usual > 0:
+        raise InputError(f"{recording.name}: nothing moves in it")
+    columns, target = [], []
+    for piece, v in zip(recording.pieces, speeds, strict=True):
+        sign = sosfiltfilt(low, np.tanh(v / (0.02 * usual)))
+        columns.append(np.stack([np.gradient(v, period_s), v, sign, np.ones_like(v)], 1))
+        target.append(sosfiltfilt(low, piece.force))
+    design = np.concatenate(columns)
+    mass, damping, dry, offset = np.linalg.lstsq(design, np.concatenate(target), rcond=None)[0]
     if not mass > 0:
-        mass = np.std(force) / np.std(columns[:, 0])
-    start = [mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, 0.5 * period_s, position[0], 0]
+        mass = np.std(recording.force) / np.std(design[:, 0])
+    start = [mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, 0.5 * period_s]
     return np.array(start, dtype=np.float64)

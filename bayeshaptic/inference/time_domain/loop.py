@@ -11,8 +11,8 @@ from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
-PLAIN = 7  # mass, damping, dry friction, constant force, delay; position and velocity at the start
-LOWEST = np.array([0.0, 0.0, 0.0, -np.inf, 0.0, -np.inf, -np.inf])
+SHARED = 5  # mass, damping, dry friction, constant force, delay: the same in all pieces
+_LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
 _INDEPENDENT = 3.0  # samples that a second is worth, a hertz of bandwidth
 _FEWEST = 20  # independent samples
 _TRIALS = 10
@@ -23,6 +23,8 @@ _CALMER = 1.6  # the bandwidth is lowered by this until the start can be simulat
 class Loop:
     """A recording with a follower, and the motion of one mass beside it.
 
+    Values are the `SHARED` ones, then position and velocity at the beginning of every piece.
+
     Attributes
     ----------
     force, position : ndarray, shape (N,)
@@ -31,6 +33,8 @@ class Loop:
         Of the force that changes along the way.
     follower : Follower or None
         None until `led`.
+    joints : tuple of int
+        Where further pieces begin.
     """
 
     force: Floats = field(repr=False)
@@ -39,12 +43,40 @@ class Loop:
     bandwidth_hz: float
     shapes: Floats = field(repr=False)
     follower: Follower | None = None
+    joints: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, recording: Recording, bandwidth_hz: float, way: Way) -> Loop:
         """Of a recording, with the waves of a way."""
         force, position = np.array(recording.force), np.array(recording.position)
-        return cls(force, position, recording.period_s, bandwidth_hz, waves(position, way))
+        return cls(
+            force,
+            position,
+            recording.period_s,
+            bandwidth_hz,
+            waves(position, way),
+            joints=recording.joints,
+        )
+
+    @property
+    def plain(self) -> int:
+        """How many values there are."""
+        return SHARED + 2 * (len(self.joints) + 1)
+
+    @property
+    def lowest(self) -> Floats:
+        """Below which no value may go, shape (plain,)."""
+        return np.append(_LOWEST, np.full(self.plain - SHARED, -np.inf))
+
+    @property
+    def _pieces(self) -> list[slice]:
+        edges = (0, *self.joints, len(self.force))
+        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+    def begun(self, shared: Floats) -> Floats:
+        """Values with the pieces' beginnings as measured, at rest; shape (plain,)."""
+        first = self.position[[piece.start for piece in self._pieces]]
+        return np.append(shared, np.stack([first, np.zeros_like(first)], axis=1))
 
     @property
     def independent(self) -> float:
@@ -71,10 +103,21 @@ class Loop:
         assert self.follower is not None
         forward, backward = uneven.reshape(2, WAVES) @ self.shapes
         above, below = self.follower.above, self.follower.below
-        with np.errstate(all="ignore"):
-            return self.position - follow(
-                values, forward, backward, self.force, self.position, above, below, self.period_s
-            )
+        simulated = np.empty_like(self.position)
+        for number, piece in enumerate(self._pieces):
+            first = SHARED + 2 * number
+            with np.errstate(all="ignore"):
+                simulated[piece] = follow(
+                    np.append(values[:SHARED], values[first : first + 2]),
+                    forward[piece],
+                    backward[piece],
+                    self.force[piece],
+                    self.position[piece],
+                    above,
+                    below,
+                    self.period_s,
+                )
+        return self.position - simulated
 
     def columns(self, values: Floats, uneven: Floats, error: Floats) -> Floats:
         """How the simulated position moves with every value and wave, shape (N, C)."""
@@ -90,15 +133,22 @@ class Loop:
                 1e-4 * np.std(np.diff(self.position)) / self.period_s,
             ]
         )
-        out = np.empty((len(error), PLAIN + 2 * WAVES))
+        out = np.zeros((len(error), self.plain + 2 * WAVES))
         for i, step in enumerate(steps):
+            # Where the pieces begin moves in all of them at once: each answers to its own.
+            moved = [i] if i < SHARED else list(range(i, self.plain, 2))
             up, down = values.copy(), values.copy()
-            up[i] += step
-            down[i] = max(down[i] - step, LOWEST[i])
+            up[moved] += step
+            down[moved] = np.maximum(down[moved] - step, self.lowest[moved])
             span = up[i] - down[i]
-            out[:, i] = (self.error(down, uneven) - self.error(up, uneven)) / span
+            slope = (self.error(down, uneven) - self.error(up, uneven)) / span
+            if i < SHARED:
+                out[:, i] = slope
+                continue
+            for column, piece in zip(moved, self._pieces, strict=True):
+                out[piece, column] = slope[piece]
         for i in range(2 * WAVES):
             more = uneven.copy()
             more[i] += 1e-3 * size
-            out[:, PLAIN + i] = (error - self.error(values, more)) / (1e-3 * size)
+            out[:, self.plain + i] = (error - self.error(values, more)) / (1e-3 * size)
         return out

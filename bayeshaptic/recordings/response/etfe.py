@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.periodic_excitation import estimate_periodic
 from bayeshaptic.recordings.response.random_excitation import estimate_random
 from bayeshaptic.recordings.response.spectra import (
+    JoinedSpectra,
     PeriodicSpectra,
     RandomSpectra,
     Spectra,
@@ -53,7 +54,7 @@ class Etfe:
     band_hz : (float, float)
         Lowest and highest frequency used.
     force_unit, position_unit : str
-    spectra : RandomSpectra or PeriodicSpectra or TableSpectra
+    spectra : RandomSpectra or PeriodicSpectra or TableSpectra or JoinedSpectra
         What `compress` needs: the windows can be built from it with any reference.
     recording : Recording or None
         None for a table.
@@ -79,6 +80,11 @@ class Etfe:
     def lines(self) -> int:
         """Number of DFT lines (or rows of a table) behind the estimate."""
         return self.spectra.lines
+
+    @property
+    def unbroken(self) -> Recording | None:
+        """The recording, where its samples follow each other; None for a table and for pieces."""
+        return None if self.recording is None or self.recording.joints else self.recording
 
     @property
     def relative_sd(self) -> NDArray[Any]:
@@ -135,6 +141,8 @@ def estimate_etfe(
     InputError
         When the recording is too short, the force has no power, or the band makes no sense.
     """
+    if recording.joints:
+        return _joined(recording, band_hz, minimum_lines)
     _check(recording, band_hz)
     if minimum_lines is not None and minimum_lines < 10:
         raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
@@ -157,6 +165,59 @@ def estimate_etfe(
         recording=recording,
         period_lines=spectra.lines if found is not None else None,
         notices=notices,
+    )
+
+
+def _joined(
+    recording: Recording, band_hz: tuple[float, float] | None, minimum_lines: int | None
+) -> Etfe:
+    """That of all pieces: what a person sees is the mean of those as long as the longest.
+
+    Pieces whose force excites nothing by itself are left out, and so are the few whose excitation
+    is of another kind, periodic or not, than that of the most.
+    """
+    found, left_out, why = [], [], None
+    for number, piece in enumerate(recording.pieces, start=1):
+        try:
+            found.append((number, estimate_etfe(piece, band_hz, minimum_lines=minimum_lines)))
+        except InputError as error:
+            left_out.append(number)
+            why = why or error
+    if not found:
+        raise why or InputError(f"{recording.name}: there are no pieces")
+    periodic = [isinstance(part.spectra, PeriodicSpectra) for _, part in found]
+    most = sum(periodic) > len(periodic) / 2
+    left_out += [n for (n, _), own in zip(found, periodic, strict=True) if own != most]
+    parts = [part for (_, part), own in zip(found, periodic, strict=True) if own == most]
+    longest = max(parts, key=lambda part: len(part.frequency_hz))
+    alike = [
+        part
+        for part in parts
+        if part.frequency_hz.shape == longest.frequency_hz.shape
+        and np.allclose(part.frequency_hz, longest.frequency_hz)
+    ]
+    weight = 1 / np.array([part.variance for part in alike])
+    value = np.sum(weight * [part.value for part in alike], axis=0) / weight.sum(axis=0)
+    band = min(p.band_hz[0] for p in parts), max(p.band_hz[1] for p in parts)
+    text = f"Band {band[0]:.3g} to {band[1]:.4g} Hz; that of each piece was chosen by itself."
+    notices = {Notice("note", "band", text): None}
+    notices |= dict.fromkeys(n for part in parts for n in part.notices if n.topic != "band")
+    if left_out:
+        named = ", ".join(str(number) for number in sorted(left_out))
+        text = (
+            f"Of {len(recording.pieces)} pieces {len(left_out)} say nothing of the response and "
+            f"are left out (number {named})."
+        )
+        notices[Notice("warning", "pieces", text)] = None
+    return replace(
+        longest,
+        value=value,
+        variance=1 / weight.sum(axis=0),
+        coherence=np.mean([part.coherence for part in alike], axis=0),
+        band_hz=band,
+        spectra=JoinedSpectra(tuple(part.spectra for part in parts)),
+        recording=recording,
+        notices=tuple(notices),
     )
 
 

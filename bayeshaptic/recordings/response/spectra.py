@@ -212,6 +212,34 @@ class PeriodicSpectra:
 
 
 @dataclass(frozen=True)
+class JoinedSpectra:
+    """Spectra of the pieces of a recording, each with its own noise.
+
+    Attributes
+    ----------
+    parts : tuple of RandomSpectra, or of PeriodicSpectra
+    """
+
+    parts: tuple[Spectra, ...]
+
+    @property
+    def lines(self) -> int:
+        return sum(part.lines for part in self.parts)
+
+    def windows(
+        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
+    ) -> Windows:
+        """The windows of all parts, one part after the other; without further inputs."""
+        found = [part.windows(reference) for part in self.parts]
+        return Windows(
+            *(
+                np.concatenate([getattr(windows, name) for windows in found])
+                for name in ("frequency_hz", "design", "target", "scatter", "lines")
+            )
+        )
+
+
+@dataclass(frozen=True)
 class TableSpectra:
     """Rows of a frequency-response table.
 

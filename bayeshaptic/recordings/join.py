@@ -1,0 +1,92 @@
+"""Several recordings of one device as one: pieces that count together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.recording import Recording
+
+# Shorter than this, a piece has too few lines for windows of its own.
+FEWEST_SAMPLES = 250
+
+
+def join_recordings(recordings: Sequence[Recording], name: str | None = None) -> Recording:
+    """Recordings of one device, held alike, as one recording of several pieces.
+
+    All pieces say something of the same masses, springs, friction and delay; where each begins,
+    how it moves there, and its noise are its own.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        With the same period and units.
+    name : str, optional
+        That of the first, and how many more there are, by default.
+
+    Returns
+    -------
+    Recording
+        With the facts of the first, and `joints` where the others begin.
+
+    Raises
+    ------
+    InputError
+        Where there are none, where period or units differ, or where one is far too short.
+    """
+    if not recordings:
+        raise InputError("there are no recordings to join")
+    first = recordings[0]
+    for other in recordings:
+        if abs(other.period_s / first.period_s - 1) > 1e-3:
+            raise InputError(
+                f"{other.name} is sampled every {other.period_s:g} s and {first.name} every "
+                f"{first.period_s:g} s: they cannot be one; analyse them apart"
+            )
+        units = (other.force_unit, other.position_unit)
+        if units != (first.force_unit, first.position_unit):
+            raise InputError(
+                f"{other.name} is in {units[0]} and {units[1]}, {first.name} in "
+                f"{first.force_unit} and {first.position_unit}: give both in the same units"
+            )
+        if other.samples < FEWEST_SAMPLES:
+            raise InputError(
+                f"{other.name}: {other.samples} samples are too few even for a piece; leave it "
+                f"out, or record at least {FEWEST_SAMPLES}"
+            )
+    if len(recordings) == 1:
+        return first
+    pieces = [piece for recording in recordings for piece in recording.pieces]
+    ends = np.cumsum([piece.samples for piece in pieces])
+    notices = dict.fromkeys(notice for recording in recordings for notice in recording.notices)
+    text = (
+        f"{len(recordings)} recordings are taken as one: "
+        f"{', '.join(recording.name for recording in recordings)}. What says that they differ "
+        "(a user, a configuration, a trial or a level of their own) keeps them apart."
+    )
+    return replace(
+        first,
+        force=np.concatenate([piece.force for piece in pieces]),
+        position=np.concatenate([piece.position for piece in pieces]),
+        name=name or f"{first.name} and {len(recordings) - 1} more",
+        notices=(*notices, Notice("note", "pieces", text)),
+        joints=tuple(int(end) for end in ends[:-1]),
+    )
+
+
+def unbroken(recording: Recording) -> Recording:
+    """The recording with each piece moved to where the one before ended, for what looks at samples.
+
+    A position that jumps where nothing moved would be taken for motion.
+    """
+    if not recording.joints:
+        return recording
+    position, end = [], 0.0
+    for piece in recording.pieces:
+        moved = piece.position - piece.position[0] + end
+        end = float(moved[-1])
+        position.append(moved)
+    return replace(recording, position=np.concatenate(position), joints=())

@@ -1,0 +1,131 @@
+"""Several recordings of one device as one: pieces in open loop and under a controller."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bayeshaptic as bh
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings import Recording, recording_from_arrays
+from bayeshaptic.recordings.join import unbroken
+from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
+from bayeshaptic.report.headline import headline
+from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
+
+PERIOD_S = 1e-3
+TRUTH = {"m": 2.0, "b": 20.0, "coulomb": 1.2, "offset": 0.5, "delay_s": 0.8e-3}
+
+
+def steps(seconds: float, seed: int) -> Recording:
+    """Position steps of a rigid device with dry friction under a PD controller."""
+    bench = Bench("rigid", {"m": TRUTH["m"], "b": TRUTH["b"]}, delay_s=TRUTH["delay_s"])
+    bench = bench.with_effect("coulomb_friction", force=TRUTH["coulomb"])
+    goals = np.random.default_rng(seed).uniform(-0.04, 0.04, 10)
+    last = [0.0]
+
+    def controller(k: int, position: float) -> float:
+        rate, last[0] = (position - last[0]) / PERIOD_S if k else 0.0, position
+        return float(1500.0 * (goals[k // 450] - position) - 60.0 * rate)
+
+    done = run_loop(bench, controller, seconds, seed=seed)
+    position = np.round(done.position / 2e-6) * 2e-6
+    return recording_from_arrays(
+        done.force + TRUTH["offset"], position, PERIOD_S, force_unit="N", name=f"step {seed}"
+    )
+
+
+def noise(seconds: float, seed: int) -> Recording:
+    """White noise on a free Phantom."""
+    bench = Bench.from_device("phantom", False, "free")
+    done = simulate(bench, WhiteNoise(bench.force_rms, 400, 0.5, seconds), seed=seed)
+    return recording_from_arrays(
+        done.force, done.position, bench.period_s, force_unit="Nm", position_unit="rad"
+    )
+
+
+@pytest.fixture(scope="module")
+def series() -> list[Recording]:
+    return [steps(seconds, seed) for seed, seconds in enumerate((0.7, 1.3, 2.4, 1.0))]
+
+
+def test_a_joined_recording_falls_into_its_pieces(series: list[Recording]) -> None:
+    joined = bh.join_recordings(series)
+    assert joined.name == "step 0 and 3 more" and joined.samples == sum(r.samples for r in series)
+    for piece, one in zip(joined.pieces, series, strict=True):
+        assert np.array_equal(piece.position, one.position) and not piece.joints
+    assert joined.part(600, 2100).joints == (100, 1400)
+    assert np.abs(np.diff(unbroken(joined).position)).max() < 1e-3
+    assert bh.join_recordings(series[:1]) is series[0]
+
+
+def test_what_differs_in_period_or_unit_cannot_be_one(series: list[Recording]) -> None:
+    slow = recording_from_arrays(series[0].force, series[0].position, 2e-3, force_unit="N")
+    with pytest.raises(bh.InputError, match="sampled every 0.002 s"):
+        bh.join_recordings([series[0], slow])
+    with pytest.raises(bh.InputError, match="same units"):
+        bh.join_recordings([series[0], noise(1.0, 0)])
+    with pytest.raises(bh.InputError, match="too few even for a piece"):
+        bh.join_recordings([series[0], series[1].part(0, 100)])
+
+
+def test_short_steps_under_a_controller_count_together(series: list[Recording]) -> None:
+    found = fit_motion(bh.join_recordings(series))
+    apart = np.abs(found.values - np.array([TRUTH[name] for name in NAMES])) / found.sd
+    assert apart.max() < 3.4  # 99 % of a Student t with eight degrees of freedom
+    alone = fit_motion(series[2])
+    assert np.all(found.sd[:2] < alone.sd[:2])
+
+
+def test_short_steps_become_a_limit(series: list[Recording]) -> None:
+    closed = bh.close_loop(bh.join_recordings(series), "rigid", ess=300)
+    assert closed.analysis.in_loop is not None and headline(closed).stiffness is not None
+    found = closed.analysis.posterior.summary()
+    for name in ("m", "b", "coulomb"):
+        assert abs(found[name]["mean"] - TRUTH[name]) < 4 * found[name]["sd"]
+
+
+def test_pieces_in_open_loop_are_a_sum_of_likelihoods() -> None:
+    pieces = [noise(seconds, seed) for seed, seconds in enumerate((1.2, 2.3, 4.1, 3.0))]
+    etfe = estimate_etfe(bh.join_recordings(pieces))
+    assert etfe.unbroken is None and etfe.recording is not None
+    fit = least_squares(build_model("free", period_s=PERIOD_S), etfe)
+    assert fit.reduced_chi_square < 1.3
+    theta = fit.theta * np.array([[1.0], [1.01]])
+    parts = sum(
+        Likelihood(fit.model, compress(estimate_etfe(piece), fit.response))(theta)
+        for piece in pieces
+    )
+    whole = Likelihood(fit.model, compress(etfe, fit.response))(theta)
+    assert whole[1] - whole[0] == pytest.approx(parts[1] - parts[0], rel=1e-9)
+    truth = Bench.from_device("phantom", False, "free").values
+    for name in ("m1", "kc", "m2"):
+        index = fit.model.names.index(name)
+        assert abs(fit.theta[index] - truth[name]) < 4 * fit.sd[index]
+
+
+def test_a_study_joins_what_nothing_tells_apart(tmp_path: Path) -> None:
+    for number, seconds in enumerate((1.2, 1.5, 1.1)):
+        one = noise(seconds, number)
+        rows = np.stack([np.arange(one.samples) * PERIOD_S, one.force, one.position], axis=1)
+        header = "time_s,torque_nm,angle_rad"
+        np.savetxt(tmp_path / f"{number}.csv", rows, delimiter=",", header=header, comments="")
+    entries = "".join(f'[[recording]]\nfile = "{n}.csv"\ntrial = {n // 2}\n' for n in range(3))
+    device = '[device]\nname = "phantom"\n'
+    path = tmp_path / "study.toml"
+
+    def read(top: str) -> list[int]:
+        path.write_text(top + device + entries, encoding="utf-8")
+        study = bh.read_study(path)
+        return [len(one.pieces) for one in study.read_all() if isinstance(one, Recording)]
+
+    assert read("") == [2, 1]  # a trial of its own tells the third apart
+    assert read("pool = true\n") == [3]
+    assert read("pool = false\n") == [1, 1, 1]
+    with pytest.raises(bh.InputError, match="pool"):
+        read('pool = "yes"\n')
