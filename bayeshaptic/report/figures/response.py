@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import ResponseBand, response_band
+from bayeshaptic.report.figures.hover import Reading, note
 from bayeshaptic.report.numbers.estimates import correction
 from bayeshaptic.report.numbers.quantities import pretty_unit
 
@@ -50,11 +51,14 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     measured = _near(etfe.phase_deg, modelled)
     # Beyond 100 % the noise has taken over, and a symmetric bar in dB says nothing.
     error = 2 * np.clip(relative / np.sqrt(2), 0.0, 1.0)
-    _points(gain, etfe, etfe.gain_db, 20 / np.log(10) * error, "measured, ± 2 sd")
-    _points(phase, etfe, measured, np.degrees(error))
+    gain_error, phase_error = 20 / np.log(10) * error, np.degrees(error)
+    _points(gain, etfe, etfe.gain_db, gain_error, "measured, ± 2 sd")
+    _points(phase, etfe, measured, phase_error)
+    _note(gain, etfe, etfe.gain_db, gain_error, band, band.gain_db, "dB")
+    _note(phase, etfe, measured, phase_error, band, band.phase_deg, "\N{DEGREE SIGN}")
     for axes, quantiles in ((gain, band.gain_db), (phase, band.phase_deg)):
         low, middle, high = quantiles
-        axes.fill_between(
+        shade = axes.fill_between(
             band.frequency_hz,
             low,
             high,
@@ -64,7 +68,7 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
             zorder=3,
             label="model, 90 % band of the posterior",
         )
-        axes.plot(
+        line = axes.plot(
             band.frequency_hz,
             middle,
             color=style.MODEL,
@@ -72,6 +76,7 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
             zorder=3,
             label="model, posterior median",
         )
+        style.layer([shade, *line], "after")
     _before(gain, phase, result, modelled)
     style.legend(gain, loc="lower left")
     if len(panels) > 2:
@@ -96,8 +101,9 @@ def _before(gain: Axes, phase: Axes, result: Result, modelled: NDArray[Any]) -> 
         raw = base.etfe
         near = np.interp(raw.frequency_hz, frequency, modelled)
         look: dict[str, Any] = {"color": style.PRIOR, "markersize": 2.6, "zorder": 1}
-        gain.plot(raw.frequency_hz, raw.gain_db, "x", label="as measured", **look)
-        phase.plot(raw.frequency_hz, _near(raw.phase_deg, near), "x", **look)
+        crosses = gain.plot(raw.frequency_hz, raw.gain_db, "x", label="as measured", **look)
+        crosses += phase.plot(raw.frequency_hz, _near(raw.phase_deg, near), "x", **look)
+        style.layer(crosses, "before")
     declared = base.fit.response(frequency)
     dashed: dict[str, Any] = {
         "color": style.OTHER,
@@ -105,8 +111,30 @@ def _before(gain: Axes, phase: Axes, result: Result, modelled: NDArray[Any]) -> 
         "linestyle": "--",
         "zorder": 4,
     }
-    gain.plot(frequency, 20 * np.log10(np.abs(declared)), label="model as declared", **dashed)
-    phase.plot(frequency, _near(np.degrees(np.angle(declared)), modelled), **dashed)
+    level = 20 * np.log10(np.abs(declared))
+    lines = gain.plot(frequency, level, label="model as declared", **dashed)
+    lines += phase.plot(frequency, _near(np.degrees(np.angle(declared)), modelled), **dashed)
+    style.layer(lines, "before")
+
+
+def _note(
+    axes: Axes,
+    etfe: Etfe,
+    value: NDArray[Any],
+    error: NDArray[Any],
+    band: ResponseBand,
+    quantiles: tuple[NDArray[Any], ...],
+    unit: str,
+) -> None:
+    """What was measured at each line beside what the model says there."""
+    low, middle, high = (np.interp(etfe.frequency_hz, band.frequency_hz, q) for q in quantiles)
+    rows = {
+        "measured": (value, unit),
+        "± 2 sd": (error, unit),
+        "model": (middle, unit),
+        "90 %": (np.array([low, high]), unit),
+    }
+    note(axes, Reading("frequency", "Hz", etfe.frequency_hz, rows))
 
 
 def _difference(axes: Axes, etfe: Etfe, band: ResponseBand, error: NDArray[Any]) -> None:

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.report.figures.hover import panels
 from bayeshaptic.types import Bytes
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ WIDTH_IN = 7.4  # the text width of an A4 page
 FONT = 8.5
 SMALL = 7.0
 DPI = 140
+_LAYER = "layer-"
 MOST_SVG = 110_000  # characters: beyond, the PNG is the smaller one
 
 
@@ -120,10 +122,13 @@ class Drawn:
         For the file beside the page.
     svg : str or None
         For the page itself; None where it is too large for one.
+    readings : list
+        Values under the pointer; see `bayeshaptic.report.figures.hover`.
     """
 
     png: bytes = field(repr=False)
     svg: str | None = field(default=None, repr=False)
+    readings: Sequence[Mapping[str, Any]] = field(default=(), repr=False)
 
 
 def drawn(figure: Figure, name: str) -> Drawn:
@@ -135,7 +140,14 @@ def drawn(figure: Figure, name: str) -> Drawn:
 
     pixels, text = draw_both(figure)
     vector = for_a_page(text, name)
-    return Drawn(png(pixels), vector if len(vector) <= MOST_SVG else None)
+    return Drawn(png(pixels), vector if len(vector) <= MOST_SVG else None, panels(figure))
+
+
+def layer(artists: Iterable[Any], name: str) -> None:
+    """Put artists into a layer of the page, "before" or "after", which its reader may hide."""
+    for artist in artists:
+        artist.set_gid(f"{_LAYER}{name}")
+
 
 
 def png(pixels: Bytes) -> bytes:
@@ -155,6 +167,7 @@ def for_a_page(svg: str, name: str) -> str:
     """
     text = svg[svg.index("<svg") :]
     text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = text.replace(f'id="{_LAYER}', 'class="')
     text = re.sub(r' d="([^"]*)"', lambda found: f' d="{_rounded(found[1])}"', text)
     used = set(re.findall(r'href="#([^"]+)"', text)) | set(re.findall(r"url\(#([^)]+)\)", text))
     names = {key: f"{name}-{number}" for number, key in enumerate(_ids(text)) if key in used}

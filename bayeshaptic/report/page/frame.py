@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
+import json
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,6 +39,13 @@ class EmbeddedPicture:
     width: int
     height: int
     svg: str | None = None
+    readings: str = ""
+
+    @property
+    def switched(self) -> bool:
+        """Whether it shows before and after, each in a layer of its own."""
+        layers = ('class="before"', 'class="after"')
+        return self.svg is not None and all(layer in self.svg for layer in layers)
 
 
 def frame() -> dict[str, Any]:
@@ -70,13 +78,14 @@ def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
 
 def embedded(name: str, drawn: Drawn, words: str) -> EmbeddedPicture:
     """A figure as a part of the page, with the words that stand for it."""
+    readings = json.dumps(drawn.readings, separators=(",", ":")) if drawn.readings else ""
     width, height = struct.unpack(">II", drawn.png[16:24])  # of the PNG's header
     if drawn.svg is not None:
         label = f'role="img" aria-label="{html.escape(words)}"'
         svg = drawn.svg.replace("<svg", f"<svg {label}", 1)
-        return EmbeddedPicture(name, words, "", width, height, svg)
+        return EmbeddedPicture(name, words, "", width, height, svg, readings)
     source = "data:image/png;base64," + base64.b64encode(drawn.png).decode("ascii")
-    return EmbeddedPicture(name, words, source, width, height)
+    return EmbeddedPicture(name, words, source, width, height, None, readings)
 
 
 def template(name: str) -> Template:

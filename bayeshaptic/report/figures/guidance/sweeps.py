@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.numbers.quantities import scale
+from bayeshaptic.report.figures.hover import Reading, note
+from bayeshaptic.report.numbers.quantities import Scale, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,13 +25,14 @@ def draw(sweeps: tuple[Sweep, ...]) -> Figure:
     k = scale(float(np.median(every)) if len(every) else 1.0, sweeps[0].stiffness_unit)
     kinds = list(dict.fromkeys(kind for one in sweeps for kind in one.binds))
     for axes, one in zip(panels, sweeps, strict=True):
-        _panel(axes, one, k.factor, kinds)
+        _panel(axes, one, k, kinds)
     panels[0].set_ylabel(f"critical stiffness, {k.unit}", fontsize=style.FONT)
     _legend(figure, kinds, any(one.jumps for one in sweeps))
     return figure
 
 
-def _panel(axes: Axes, one: Sweep, factor: float, kinds: list[str]) -> None:
+def _panel(axes: Axes, one: Sweep, k: Scale, kinds: list[str]) -> None:
+    factor = k.factor
     x = scale(float(one.values[-1]), one.unit)
     values = one.values * x.factor
     name = f"{one.name} + what is added" if one.added else one.name
@@ -38,6 +40,11 @@ def _panel(axes: Axes, one: Sweep, factor: float, kinds: list[str]) -> None:
     axes.fill_between(
         values, one.low * factor, one.high * factor, color=style.MODEL, alpha=0.2, linewidth=0
     )
+    rows = {
+        "median": (one.middle * factor, k.unit),
+        "90 %": (np.array([one.low, one.high]) * factor, k.unit),
+    }
+    note(axes, Reading(name, x.unit, values, rows))
     start = 0
     cuts = [i + 1 for i in range(len(values) - 1) if _changes(one, i)]
     for stop in [*cuts, len(values)]:

@@ -122,7 +122,7 @@ def _panel(
     axes.axhline(0, color=style.PRIOR, linewidth=0.7)
     for curve, look in row:
         clear = curve.sd <= _VAGUE * np.median(curve.sd)
-        axes.errorbar(
+        bars = axes.errorbar(
             curve.motion[clear] * motion.factor,
             curve.force[clear] * factor,
             yerr=2 * curve.sd[clear] * factor,
@@ -132,3 +132,5 @@ def _panel(
             capsize=1.5,
             **look,
         )
+        if look is not _FORCE and len(row) > 1:
+            style.layer(bars.get_children(), "before" if look is _BEFORE else "after")

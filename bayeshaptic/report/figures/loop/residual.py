@@ -23,6 +23,8 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.MODEL, "marker": "o", "linestyle": "-"},
 )
 
+_LAYERS = ("before", "after")
+
 
 def draw(closed: Closed) -> Figure:
     """The rms in third octaves above, each window's score below; before and after."""
@@ -41,10 +43,16 @@ def draw(closed: Closed) -> Figure:
         if number == 0:
             noise_band(top, bands)
         label = list(fits)[number]
-        top.plot(bands.frequency_hz, bands.rms, label=label, linewidth=1.1, markersize=4, **look)
+        line = top.plot(
+            bands.frequency_hz, bands.rms, label=label, linewidth=1.1, markersize=4, **look
+        )
+        if closed.effects:
+            style.layer(line, _LAYERS[number])
         lowest = min(lowest, float(bands.rms.min()))
         highest = max(highest, float(bands.rms.max()), float(bands.high.max()))
-        _scores(bottom, fit, look)
+        points = _scores(bottom, fit, look)
+        if closed.effects:
+            style.layer(points, _LAYERS[number])
     rms_axis(top, lowest, highest)
     style.legend(top, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.1)
     everywhere = closed.base.fit.frequency_hz
@@ -60,16 +68,16 @@ def _sorted(fit: Fit) -> tuple[NDArray[Any], NDArray[Any]]:
     return fit.frequency_hz[order], fit.residual[order]
 
 
-def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> None:
+def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> list[Any]:
     """A point a window; those of a large misfit are pressed together."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
     from bayeshaptic.diagnosis.residuals.residual import window_scores
 
     if fit.windows is None:
-        return
+        return []
     centre = fit.windows.frequency_hz.mean(axis=1)
-    axes.plot(centre, window_scores(fit), **(look | {"linestyle": "none"}), markersize=2.6)
+    points = axes.plot(centre, window_scores(fit), **(look | {"linestyle": "none"}), markersize=2.6)
     low, high = axes.get_ylim()
     if high > 12:
         axes.set_yscale("symlog", linthresh=4.0, linscale=1.0)
@@ -77,3 +85,4 @@ def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> None:
         axes.yaxis.set_major_locator(FixedLocator([-2, 0, 2, *tens]))
         axes.yaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+    return points

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.hover import Reading, note
 from bayeshaptic.report.numbers.quantities import percent, scale
 
 if TYPE_CHECKING:
@@ -39,6 +40,10 @@ def draw(table: LimitTable) -> Figure:
         stiffness, below = _steps(samples)
         left.plot(stiffness * row.factor, 1 - below, label=label, **look)
         right.plot(stiffness * row.factor, below, **look)
+        if whole:
+            rows = {"stable with": (100 * (1 - below), "%"), "risk": (100 * below, "%")}
+            for axes in (left, right):
+                note(axes, Reading("K", row.unit, stiffness * row.factor, rows))
     for axes, name in ((left, "probability of being stable"), (right, "risk of instability")):
         style.panel(axes, f"stiffness K, {row.unit}", name)
     right.set_yscale("log")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.hover import Reading, note
 from bayeshaptic.report.numbers.quantities import percent, scale
 
 if TYPE_CHECKING:
@@ -66,6 +67,14 @@ def draw_on(axes: Axes, part: FilterLimits, table: LimitTable, rules: Rules | No
                 linestyle=style.DASHES[number],
                 label=f"{percent(risk)} risk of instability",
             )
+    risks = sorted(1 - probability for probability in PROBABILITIES)
+    boundaries = np.array([part.quantile(risk) * k.factor for risk in risks])
+    rows = {
+        f"{percent(risk)} risk of instability at K": (curve, k.unit)
+        for risk, curve in zip(risks, boundaries, strict=True)
+        if any(np.isclose(risk, stated) for stated in (*table.risks, 0.5))
+    }
+    note(axes, Reading("B", b.unit, damping, rows, risks, boundaries))
     axes.set_xlim(0, 1.04 * damping[-1] or 1.0)
     axes.set_ylim(0, 1.12 * top * k.factor or 1.0)
     if rules is not None:
