@@ -12,7 +12,12 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
-from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
+from bayeshaptic.report.numbers.misfit import (
+    misfit_factor,
+    misfit_is_clear,
+    misfit_is_faint,
+    residual_is_noticed,
+)
 from bayeshaptic.report.numbers.quantities import estimate, percent, pure, quantity
 from bayeshaptic.report.numbers.result import tip_limit
 
@@ -93,7 +98,7 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"{misfit_factor(analysis)} times the noise, reduced chi-square "
             f"{pure(analysis.fit.reduced_chi_square)})"
         )
-    if verdict is None and any(n.topic == "residual" for n in analysis.notices):
+    if verdict is None and residual_is_noticed(analysis):
         found.append(
             "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
         )

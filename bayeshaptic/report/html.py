@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report import tables, words
@@ -19,7 +19,7 @@ from bayeshaptic.report.page import answer, methods
 from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, unique, with_contents
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.next_step import next_step
-from bayeshaptic.report.page.reproduce import reproduce
+from bayeshaptic.report.page.reproduce import asked, reproduce
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -47,10 +47,16 @@ _CONTENTS = (
 )
 
 
-def render(result: Result, pictures: Mapping[str, Drawn], sections: Sequence[str] = ()) -> str:
+def render(
+    result: Result,
+    pictures: Mapping[str, Drawn],
+    sections: Sequence[str] = (),
+    origin: Mapping[str, Any] | None = None,
+) -> str:
     """The page of an analysis (or of what closing the loop returns) with its figures.
 
-    `sections` are ready as HTML: stable walls, and what to do next.
+    `sections` are ready as HTML: stable walls, and what to do next; `origin` is the `provenance` of
+    `summary.json`.
     """
     analysis, closed = result.analysis, result.closed
     head = headline(result)
@@ -80,7 +86,8 @@ def render(result: Result, pictures: Mapping[str, Drawn], sections: Sequence[str
         priors=priors(analysis),
         methods=methods.methods(result),
         bibtex=methods.bibtex(result),
-        reproduce=reproduce(result),
+        reproduce=reproduce(result, origin),
+        asked=asked(origin),
         files=FILES,
         sections=sections,
     )

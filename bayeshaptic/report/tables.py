@@ -12,6 +12,7 @@ from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, fini
 from bayeshaptic.report.numbers.quantities import (
     interval,
     percent,
+    percents,
     pretty_unit,
     pure,
     quantity,
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from bayeshaptic.models.prior import Prior
 
 _DASH = "\N{EN DASH}"
-_SHOWN = ("q05", "q95", "mean", "sd")
 _OUTCOMES = {
     "at a bound": "least squares stopped at its bound: no error bar",
     "prior-dominated": "the data alone do not decide it",
@@ -42,8 +42,7 @@ def parameters(result: Result) -> tuple[ParameterRow, ...]:
     for i, (name, found) in enumerate(posterior.summary().items()):
         row = scale((found["q50"], found["q95"]), found["unit"])
         value, sd = float(fit.theta[i]), finite(fit.sd[i])
-        low, high, mean, wide = (row.number(found[q], found["sd"]) for q in _SHOWN)
-        error = f" ± {row.number(sd, sd)}" if sd else ""
+        low, high = (row.number(found[q], found["sd"]) for q in ("q05", "q95"))
         remarks = [_OUTCOMES.get(fit.outcome.get(name, ""), "")]
         if found["prior_dominated"]:
             remarks.append("the prior decides this one")
@@ -54,8 +53,8 @@ def parameters(result: Result) -> tuple[ParameterRow, ...]:
                 name,
                 model.parameter(name).title,
                 row.unit,
-                row.number(value, sd or found["sd"]) + error,
-                f"{mean} ± {wide}",
+                row.with_error(value, sd) if sd else row.number(value, found["sd"]),
+                row.with_error(found["mean"], found["sd"]),
                 f"{low} to {high}",
                 row.number(model.reference.get(name)),
                 f"{min(found['ess_bulk'], found['ess_tail']):.0f}",
@@ -107,14 +106,7 @@ def safe(analysis: Analysis) -> Rows:
             row.append(_DASH if there is None else quantity(there, tip.unit, digits=4))
         shown.setdefault(tuple(row), []).append(risk)
     # Risks that are one number to the digits shown are said once.
-    return tuple(
-        (" to ".join(dict.fromkeys(map(percent, _ends(risks)))), *row)
-        for row, risks in shown.items()
-    )
-
-
-def _ends(values: list[float]) -> tuple[float, float]:
-    return values[0], values[-1]
+    return tuple((percents(risks), *row) for row, risks in shown.items())
 
 
 def crossings(analysis: Analysis) -> Rows:

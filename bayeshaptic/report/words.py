@@ -9,7 +9,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
-from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
+from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
 from bayeshaptic.report.numbers.octaves import third_octaves
 from bayeshaptic.report.numbers.quantities import estimate, interval, percent, pure, quantity
 from bayeshaptic.report.numbers.trust import doubtful_parameters
@@ -51,8 +51,13 @@ def misfit(analysis: Analysis, loop: bool = False) -> str:
     if outside.any():
         return (
             f"Overall the residual is no larger than the noise ({chi}), but {outside.sum()} of "
-            f"{len(outside)} third octaves lie above what 99 % of pure noise stays below; the "
-            f"highest is {place}."
+            f"{len(outside)} third octaves {'lies' if outside.sum() == 1 else 'lie'} above what "
+            f"99 % of pure noise stays below; the highest is {place}."
+        )
+    if residual_is_noticed(analysis):
+        return (
+            f"Over frequency the residual is no larger than the noise ({chi}). But it is not "
+            "noise: a test of it over time found more, as the warning above says."
         )
     return (
         f"The residual is what pure noise would leave ({chi}): all {len(outside)} third octaves "

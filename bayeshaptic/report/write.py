@@ -70,7 +70,7 @@ def _write_all(result: Result, folder: Path, origin: Mapping[str, Any] | None) -
         for name, drawn in part.items():
             (folder / f"{name}.png").write_bytes(drawn.png)
     analysis.posterior.save(folder / "posterior.nc")
-    page = render(result, pictures, [section.html for section in sections])
+    page = render(result, pictures, [section.html for section in sections], origin)
     (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
     (folder / _LAST).write_text(summary_json(result, origin), encoding="utf-8", newline="\n")
 

@@ -136,8 +136,8 @@ def infer_configurations(
     if len(measured) < 5:
         who = "held" if any(name in HAND for name in model.names) else "nobody holding it"
         text = (
-            f"{len(measured)} configurations ({who}) say little about what is between them: how "
-            "fast the device changes is half belief."
+            f"{len(measured)} configurations ({who}) say little about what is between them. How "
+            "fast the device changes there is the prior's guess as much as a finding."
         )
         notices = (*notices, Notice("note", "configurations", text))
     return Configurations(measured, model, chains.resting(), notices, path, here)

@@ -34,7 +34,8 @@ FONT = 8.5
 SMALL = 7.0
 DPI = 140
 _LAYER = "layer-"
-MOST_SVG = 110_000  # characters: beyond, the PNG is the smaller one
+MOST_SVG = 110_000  # characters: beyond, whichever is smaller, PNG or SVG, is in the page
+_BASE64 = 4 / 3  # characters a byte of a picture in a page
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
@@ -139,8 +140,9 @@ def drawn(figure: Figure, name: str) -> Drawn:
     from bayeshaptic.report.figures.canvas import draw_both
 
     pixels, text = draw_both(figure)
-    vector = for_a_page(text, name)
-    return Drawn(png(pixels), vector if len(vector) <= MOST_SVG else None, panels(figure))
+    picture, vector = png(pixels), for_a_page(text, name)
+    most = max(MOST_SVG, _BASE64 * len(picture))
+    return Drawn(picture, vector if len(vector) <= most else None, panels(figure))
 
 
 def layer(artists: Iterable[Any], name: str) -> None:
@@ -174,7 +176,27 @@ def for_a_page(svg: str, name: str) -> str:
     text = re.sub(r' id="([^"]+)"', lambda m: f' id="{names[m[1]]}"' if m[1] in used else "", text)
     text = re.sub(r'href="#([^"]+)"', lambda m: f'href="#{names[m[1]]}"', text)
     text = re.sub(r"url\(#([^)]+)\)", lambda m: f"url(#{names[m[1]]})", text)
-    return re.sub(r">\s+<", "><", text).strip()
+    return _joined(re.sub(r">\s+<", "><", text).strip())
+
+
+_D = r' d="([^"]*)"'
+# Strokes without a filling; of translucent ones each is its own, or crossings would look lighter.
+_BARE = r'<path d="([^"]*)"((?: clip-path="[^"]*")? style="fill: none(?:(?!opacity)[^"])*")/>'
+_USE = r'<use xlink:href="[^"]*" x="[^"]*" y="[^"]*"( style="[^"]*")/>'
+
+
+def _joined(text: str) -> str:
+    """Runs of strokes of one look as one path, runs of markers of one look in one group."""
+
+    def strokes(run: re.Match[str]) -> str:
+        return f'<path d="{" ".join(re.findall(_D, run[0]))}"{run[2]}/>'
+
+    def markers(run: re.Match[str]) -> str:
+        return f"<g{run[1]}>{run[0].replace(run[1], '')}</g>"
+
+    text = re.sub(_BARE + r'(?:<path d="[^"]*"\2/>)+', strokes, text)
+    text = re.sub(_USE + r'(?:<use xlink:href="[^"]*" x="[^"]*" y="[^"]*"\1/>)+', markers, text)
+    return re.sub(r'( [xy]=")(-?\d+\.\d{3,})', lambda m: f"{m[1]}{float(m[2]):.2f}", text)
 
 
 def _ids(text: str) -> list[str]:

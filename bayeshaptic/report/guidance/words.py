@@ -37,6 +37,7 @@ class Words:
     raise_it: str
     sweeps: tuple[str, ...]
     next: str
+    sweeps_caption: str
 
 
 def words(guidance: Guidance, experiments: Sequence[Experiment]) -> Words:
@@ -47,6 +48,7 @@ def words(guidance: Guidance, experiments: Sequence[Experiment]) -> Words:
         _raise(guidance.elasticities),
         tuple(_sweep(one) for one in guidance.sweeps),
         _next(guidance.shares, experiments),
+        _sweeps_caption(guidance.shares),
     )
 
 
@@ -113,14 +115,14 @@ def _raise(found: Sequence[Elasticities]) -> str:
         middle = one.median
         order = sorted(middle, key=lambda name: -abs(middle[name]))
         parts = [
-            f"of {short(name)} by {middle[name]:+.2g} %".replace("-", "\N{MINUS SIGN}")
+            f"{middle[name]:+.2g} % for {short(name)}".replace("-", "\N{MINUS SIGN}")
             for name in order[:3]
             if abs(middle[name]) > _FLAT
         ]
         if parts:
             sentences.append(
                 f"Where the {_lower(one.crossing.label)} sets the limit (probability "
-                f"{percent(one.crossing.probability)}), it changes with 1 % more "
+                f"{percent(one.crossing.probability)}), 1 % more of a parameter changes it by: "
                 f"{', '.join(parts)}."
             )
     return " ".join(sentences)
@@ -147,6 +149,16 @@ def _sweep(one: Sweep) -> str:
             f"{quantity(jump.after_hz, 'Hz')} binds, below it the {jump.before} at "
             f"{quantity(jump.before_hz, 'Hz')}."
         )
+    return text
+
+
+def _sweeps_caption(shares: VarianceShares) -> str:
+    text = (
+        "Critical stiffness over one parameter, all others as measured: median, 90 % band, and the "
+        "crossing that binds for most draws."
+    )
+    if shares.beyond >= _NAMED:
+        text += " The band is that of the parameters alone, without what widens the limit above."
     return text
 
 

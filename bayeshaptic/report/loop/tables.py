@@ -104,6 +104,12 @@ def outcomes(closed: Closed) -> Rows:
     )
 
 
+def raised(closed: Closed) -> bool:
+    """Whether any threshold is another one after than before."""
+    before = {test.name: test.threshold for test in closed.traced.before}
+    return any(test.threshold != before.get(test.name) for test in closed.traced.after)
+
+
 def errors(closed: Closed) -> Rows:
     """(what, before, after) of the error table of ``summary.json``."""
     before, after, unit = closed.before, closed.after, closed.analysis.limit.unit
@@ -135,7 +141,6 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
             value = known["parameters"][name]
             row = scale(value["mean"], value["unit"])
             sd = value["sd"]
-            error = f" ± {row.number(sd, sd)}" if sd else ""
             spread = f"{row.number(value['q05'], sd)} to {row.number(value['q95'], sd)}"
             rows.append(
                 ParameterRow(
@@ -143,7 +148,7 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
                     parameter_words(name),
                     row.unit,
                     _DASH,
-                    row.number(value["mean"], sd) + error,
+                    row.with_error(value["mean"], sd),
                     spread if sd else _DASH,
                     _DASH,
                     _DASH,
@@ -165,8 +170,7 @@ def _parameters(closed: Closed, effect: Accepted, known: Mapping[str, Any]) -> R
             if name in effect.parameters
             else parameter_words(name)
         )
-        error = f" ± {row.number(sd, sd)}" if sd else ""
-        middle = f"{row.number(value['mean'], sd)}{error} {row.unit}".rstrip()
+        middle = f"{row.with_error(value['mean'], sd)} {row.unit}".rstrip()
         ends = f"{row.number(value['q05'], sd)} to {row.number(value['q95'], sd)} {row.unit}"
         rows.append((title, middle, ends.rstrip() if sd else _DASH))
     return tuple(rows)

@@ -92,7 +92,8 @@ def in_short(closed: Closed) -> str:
     if not closed.effects:
         return ""
     names = " and ".join(_with_article(effect.title) for effect in closed.effects)
-    return f"The model as declared lacked {names}; here it is in the model. {_moved(closed)}."
+    here = "it is" if len(closed.effects) == 1 else "they are"
+    return f"The model as declared lacked {names}; here {here} in the model. {_moved(closed)}."
 
 
 def names(closed: Closed) -> str:
@@ -129,7 +130,7 @@ def parameter_words(name: str) -> str:
     """What an estimate that is no parameter of the model is, from its name."""
     if name.endswith(_OVER):
         return f"{name.removesuffix(_OVER)}, last part of the recording over the first"
-    return name.replace("_", " ")
+    return " ".join(word for word in name.split("_") if word != "hz")
 
 
 def shown_estimates(effect: Accepted) -> tuple[str, ...]:
@@ -140,8 +141,7 @@ def shown_estimates(effect: Accepted) -> tuple[str, ...]:
 def plus_minus(mean: float, sd: float | None, unit: str) -> str:
     """A number with its error and unit: ``"0.590 ± 0.020 N"``."""
     row = scale(mean, unit)
-    error = f" ± {row.number(sd, sd)}" if sd and math.isfinite(sd) else ""
-    return f"{row.number(mean, sd)}{error} {row.unit}".rstrip()
+    return f"{row.with_error(mean, sd)} {row.unit}".rstrip()
 
 
 def _nothing(closed: Closed) -> str:
@@ -203,7 +203,9 @@ def _noise_change(closed: Closed) -> str:
         return ""
     ratio = new.likelihood.noise_variance / old.likelihood.noise_variance
     share = float(np.sqrt(np.median(ratio)))
-    return f", and the noise itself to {pure(share, 2)} of what it seemed" if share < _LESS else ""
+    if share >= _LESS:
+        return ""
+    return f", and cut the noise itself to {pure(share, 2)} of what it seemed"
 
 
 def _times(error: float) -> str:

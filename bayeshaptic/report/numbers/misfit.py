@@ -26,6 +26,11 @@ def misfit_is_faint(analysis: Analysis) -> bool:
     return above and not misfit_is_clear(analysis)
 
 
+def residual_is_noticed(analysis: Analysis) -> bool:
+    """Whether a test found more than noise in the residual, and nobody traced it."""
+    return any(notice.topic == "residual" for notice in analysis.notices)
+
+
 def misfit_factor(analysis: Analysis) -> str:
     """How many times the noise the residual is, for a sentence."""
     return pure(math.sqrt(analysis.fit.reduced_chi_square), 2)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 _PREFIXES = {-9: "n", -6: "\N{MICRO SIGN}", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _GRAMS = {-9: "\N{MICRO SIGN}g", -6: "mg", -3: "g", 0: "kg"}
 _PREFIXABLE = ("N", "A", "s", "m", "Hz")
 _NOTHING = "\N{EN DASH}"
+_MOST_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,15 @@ class Scale:
         scaled = value * self.factor
         decimals = _decimals(scaled, None if sd is None else sd * self.factor, digits)
         return _minus(f"{round(scaled, decimals):.{max(decimals, 0)}f}")
+
+    def with_error(self, value: float | None, sd: float | None) -> str:
+        """A number and its error with as many decimals: ``"0.590 ± 0.020"``; alone without one."""
+        number = self.number(value, sd)
+        if value is None or not sd or not math.isfinite(sd):
+            return number
+        places = len(number.partition(".")[2])
+        error = f"{sd * self.factor:.{places}f}"
+        return f"{number} ± {error}" if float(error) else number
 
     def quantity(self, value: float | None, sd: float | None = None, digits: int = 3) -> str:
         """The number with its unit."""
@@ -88,8 +98,11 @@ def interval(low: float | None, high: float | None, unit: str, sd: float | None 
 
 
 def spread_of(low: float, high: float) -> float:
-    """The sd that decides the digits of a 90 % interval: no more than five digits in all."""
-    return max((high - low) / 3.29, 1e-3 * max(abs(low), abs(high)))
+    """What decides the digits of a 90 % interval: two digits of its width, five digits in all.
+
+    Its ends are quantiles of draws, known to some hundredths of the width.
+    """
+    return max(high - low, 1e-3 * max(abs(low), abs(high)))
 
 
 def estimate(middle: float, low: float, high: float, unit: str) -> str:
@@ -118,6 +131,12 @@ def percent(probability: float) -> str:
     return f"{text} %"
 
 
+def percents(probabilities: Sequence[float]) -> str:
+    """Probabilities that share one row: ``"5 % to 0.1 %"``."""
+    ends = (percent(probabilities[0]), percent(probabilities[-1]))
+    return " to ".join(dict.fromkeys(ends))
+
+
 def _first_symbol(unit: str) -> tuple[str, str]:
     for position, character in enumerate(unit):
         if character in " /²³":
@@ -126,7 +145,7 @@ def _first_symbol(unit: str) -> tuple[str, str]:
 
 
 def _decimals(value: float, sd: float | None, digits: int) -> int:
-    """Decimal places: two digits of `sd`, but at least two and at most seven of `value`."""
+    """Decimal places: two digits of `sd`, but at least two and at most nine of `value`."""
     if value == 0.0:
         return 0 if not sd else max(1 - math.floor(math.log10(sd)), 0)
     # Of the rounded number: 0.09998 is written 0.100.
@@ -134,7 +153,7 @@ def _decimals(value: float, sd: float | None, digits: int) -> int:
     if sd is None or not math.isfinite(sd) or sd <= 0.0:
         return digits - 1 - exponent
     wanted = 1 - math.floor(math.log10(sd))
-    return min(max(wanted, 1 - exponent), 6 - exponent)
+    return min(max(wanted, 1 - exponent), _MOST_DIGITS - 1 - exponent)
 
 
 def _minus(text: str) -> str:

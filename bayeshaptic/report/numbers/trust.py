@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.numbers.misfit import misfit_is_clear
+from bayeshaptic.report.numbers.misfit import misfit_is_clear, residual_is_noticed
 from bayeshaptic.report.numbers.result import families_of, is_unexplained
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ def doubtful_parameters(result: Result) -> dict[str, str]:
         return dict.fromkeys(names, why) if why else {}
     if has_feedback(analysis.notices):
         return dict.fromkeys(names, "feedback biases it")
+    if closed is None and residual_is_noticed(analysis):
+        return dict.fromkeys(names, "the residual is not noise")
     if is_unexplained(result) or misfit_is_clear(analysis):
         return dict.fromkeys(names, "part of the recording is unexplained")
     if closed is not None and "nonlinear" in families_of(result):

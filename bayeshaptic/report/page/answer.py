@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.numbers.quantities import estimate, percent, quantity
+from bayeshaptic.report.numbers.quantities import estimate, percent
 from bayeshaptic.report.numbers.result import tip_limit
 
 if TYPE_CHECKING:
@@ -93,12 +93,9 @@ def _holder(analysis: Analysis) -> str:
 
 def caption(result: Result) -> str:
     """Under the bar of all estimates."""
-    analysis = result.analysis
-    level = analysis.limit.quantile(0.5)
     line = ", the vertical line is the stiffness of the sentence above"
     line = line if headline(result).stiffness is not None else ""
-    said = f" (median {quantity(level, analysis.limit.unit)})" if math.isfinite(level) else ""
     return (
-        f"Every estimate of the limit on one axis{said}: bars are 90 % intervals{line}. The rules "
-        "hold for rigid devices only."
+        f"Every estimate of the limit on one axis: bars are 90 % intervals{line}. The rules hold "
+        "for rigid devices only, and nobody knows how far they are off for others."
     )

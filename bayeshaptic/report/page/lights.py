@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, misfit_is_faint
+from bayeshaptic.report.numbers.misfit import (
+    misfit_factor,
+    misfit_is_clear,
+    misfit_is_faint,
+    residual_is_noticed,
+)
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -67,6 +72,8 @@ def _recording(analysis: Analysis) -> Light:
 def _fit(analysis: Analysis) -> Light:
     if misfit_is_clear(analysis):
         return Light("Fit", BAD, f"{misfit_factor(analysis)} times the noise", "leftover")
+    if residual_is_noticed(analysis):
+        return Light("Fit", BAD, "not noise", "notices")
     if misfit_is_faint(analysis):
         return Light("Fit", DOUBT, "slightly above noise", "leftover")
     return Light("Fit", GOOD, "noise is left", "leftover")

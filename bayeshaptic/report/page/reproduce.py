@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -13,36 +12,38 @@ if TYPE_CHECKING:
     from bayeshaptic.report.numbers.rows import Rows
 
 
-def reproduce(result: Result) -> Rows:
-    """(what, value): the command, the file and its hash, the seed, versions, the time of stages.
+def reproduce(result: Result, origin: Mapping[str, Any] | None = None) -> Rows:
+    """(what, value): the command, the file and its hash, the seed, the time of stages, versions.
 
-    What the command line knows of itself comes with the result as `provenance`; a result that was
-    made from Python has none.
+    Parameters
+    ----------
+    result : Analysis or Closed
+    origin : mapping, optional
+        What `bayeshaptic.report.provenance` gives; a result that was made from Python has none.
     """
-    given = getattr(result, "provenance", None) or getattr(result.analysis, "provenance", None)
-    told: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
+    told = origin or {}
     rows: list[tuple[str, ...]] = []
-    command = told.get("command")
-    if command:
-        words = command if isinstance(command, str) else shlex.join(map(str, command))
-        rows.append(("Command", words))
-    rows += [(f"Option {name}", str(value)) for name, value in (told.get("options") or {}).items()]
-    rows += _file(result, told.get("sha256"))
+    if told.get("command"):
+        rows.append(("Command", str(told["command"])))
+    recording = result.measured.recording
+    source = None if recording is None else recording.source
+    if source is not None:
+        rows.append(("File", source.as_posix()))
+        digest = told.get("sha256") or sha256(source)
+        if digest:
+            rows.append(("SHA-256", str(digest)))
     rows.append(("Seed", str(result.analysis.posterior.seed)))
-    seconds = result.analysis.seconds
-    took = ", ".join(f"{name} {spent:.1f} s" for name, spent in seconds.items())
-    if took:
-        rows.append(("Time taken", took))
+    stages = result.analysis.seconds
+    if stages:
+        rows.append(("Time taken", ", ".join(f"{name} {t:.1f} s" for name, t in stages.items())))
     return (*rows, *versions().items())
 
 
-def _file(result: Result, known: Any) -> list[tuple[str, ...]]:
-    recording = result.measured.recording
-    source = None if recording is None else recording.source
-    if source is None:
-        return []
-    rows: list[tuple[str, ...]] = [("File", source.as_posix())]
-    digest = known if isinstance(known, str) else sha256(source)
-    if digest:
-        rows.append(("SHA-256", digest))
-    return rows
+def asked(origin: Mapping[str, Any] | None = None) -> Rows:
+    """(option, value): everything that was asked for, defaults included."""
+    options = (origin or {}).get("options") or {}
+    return tuple((name.replace("_", " "), _written(value)) for name, value in options.items())
+
+
+def _written(value: Any) -> str:
+    return "not given" if value is None else str(value)

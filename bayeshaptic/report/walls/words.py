@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bayeshaptic.report.numbers.quantities import percent, pretty_unit, pure, quantity
+from bayeshaptic.report.numbers.quantities import Scale, percent, percents, pure, quantity, scale
 
 if TYPE_CHECKING:
     from bayeshaptic.report.numbers.rules import Rules
@@ -45,32 +45,33 @@ def words(table: LimitTable, rules: Rules) -> Words:
         _DAMPING,
         _curve_caption(table),
         _kb_caption(table, rules),
-        pretty_unit(_area_unit(table)),
+        _area(table).unit,
         ", the hand included" if any(case.model.name == "grasped" for case in table.cases) else "",
         _rules(rules),
     )
 
 
 def width_rows(table: LimitTable) -> tuple[tuple[str, ...], ...]:
-    """Each filter at each risk: filter, risk, stiffest wall, its damping, largest damping, area."""
+    """Each filter at each risk: filter, risk, stiffest wall, its damping, largest damping, area.
+
+    Risks that are one row to the digits shown are said once.
+    """
+    area = _area(table)
     rows = []
     for part in table.filters:
-        for number, risk in enumerate(table.risks):
-            name = part.kind.label if number == 0 else ""
+        shown: dict[tuple[str, ...], list[float]] = {}
+        for risk in table.risks:
             width = part.width(risk)
-            if width is None:
-                rows.append((name, percent(risk), "too few draws to say", *(3 * (_DASH,))))
-                continue
-            rows.append(
-                (
-                    name,
-                    percent(risk),
+            row: tuple[str, ...] = ("too few draws to say", *(3 * (_DASH,)))
+            if width is not None:
+                row = (
                     quantity(width.stiffness, table.unit),
                     quantity(width.at_damping, table.damping_unit),
                     quantity(width.damping, table.damping_unit),
-                    pure(width.area),
+                    pure(width.area * area.factor),
                 )
-            )
+            shown.setdefault(row, []).append(risk)
+        rows += [(part.kind.label, percents(risks), *row) for row, risks in shown.items()]
     return tuple(rows)
 
 
@@ -178,5 +179,10 @@ def _rules(rules: Rules) -> str:
     )
 
 
-def _area_unit(table: LimitTable) -> str:
-    return f"({table.unit})({table.damping_unit})"
+def _area(table: LimitTable) -> Scale:
+    """How areas of the K-B plane are written: both units with the prefixes of the largest width."""
+    widths = [part.width(risk) for part in table.filters for risk in table.risks]
+    known = [width for width in widths if width is not None]
+    k = scale([width.stiffness for width in known], table.unit)
+    b = scale([width.damping for width in known], table.damping_unit)
+    return Scale(k.factor * b.factor, f"({k.unit})({b.unit})")

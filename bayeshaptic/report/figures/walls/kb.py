@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.hover import Reading, note
-from bayeshaptic.report.numbers.quantities import percent, scale
+from bayeshaptic.report.numbers.quantities import Scale, percent, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,18 +67,28 @@ def draw_on(axes: Axes, part: FilterLimits, table: LimitTable, rules: Rules | No
                 linestyle=style.DASHES[number],
                 label=f"{percent(risk)} risk of instability",
             )
-    risks = sorted(1 - probability for probability in PROBABILITIES)
-    boundaries = np.array([part.quantile(risk) * k.factor for risk in risks])
-    rows = {
-        f"{percent(risk)} risk of instability at K": (curve, k.unit)
-        for risk, curve in zip(risks, boundaries, strict=True)
-        if any(np.isclose(risk, stated) for stated in (*table.risks, 0.5))
-    }
-    note(axes, Reading("B", b.unit, damping, rows, risks, boundaries))
+    _note(axes, part, table, b, k)
     axes.set_xlim(0, 1.04 * damping[-1] or 1.0)
     axes.set_ylim(0, 1.12 * top * k.factor or 1.0)
     if rules is not None:
         _rules(axes, rules, part.damping[-1], b.factor, k.factor)
+
+
+def _note(axes: Axes, part: FilterLimits, table: LimitTable, b: Scale, k: Scale) -> None:
+    """The boundaries that the draws can state, and those of larger risks between them."""
+    known = {risk: part.boundary(risk) for risk in table.risks}
+    stated = {risk: one.stiffness * k.factor for risk, one in known.items() if one is not None}
+    rows = {
+        f"{percent(risk)} risk of instability at K": (curve, k.unit)
+        for risk, curve in stated.items()
+    }
+    middle = part.quantile(0.5) * k.factor
+    rows["median limit K"] = (middle, k.unit)
+    others = [1 - p for p in PROBABILITIES if 1 - p > max(table.risks) * 1.01]
+    every = {**stated, **{risk: part.quantile(risk) * k.factor for risk in others}}
+    risks = sorted(every)
+    boundaries = np.array([every[risk] for risk in risks])
+    note(axes, Reading("B", b.unit, part.damping * b.factor, rows, risks, boundaries))
 
 
 def _rules(axes: Axes, rules: Rules, last: float, b: float, k: float) -> None:
