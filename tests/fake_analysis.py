@@ -3,6 +3,7 @@ without a sampler, in every shape that an analysis can take."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -71,6 +72,7 @@ def fake_analysis(
     lever_m: float | None = None,
     title: str = "lhifam-user.csv",
     table: bool = False,
+    period_lines: int | None = None,
     seed: int = 3,
 ) -> Any:
     """One analysis of an invented recording whose truth is the device file.
@@ -85,10 +87,12 @@ def fake_analysis(
         Residual over the noise.
     table : bool
         Without a recording, as from an FRF table.
+    period_lines : int, optional
+        Excited lines of a periodic excitation.
     """
     rng = np.random.default_rng(seed)
     model = fake_model(name, device, force_unit)
-    etfe = _etfe(model, rng, misfit, title, table)
+    etfe = replace(_etfe(model, rng, misfit, title, table), period_lines=period_lines)
     posterior = _posterior(model, etfe, rng, spread, damping, converged)
     fit = _fit(model, etfe, posterior, misfit)
     limit = critical_stiffness(posterior)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from one_truth import check_page, page_of, words_only
 
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
@@ -17,6 +19,7 @@ from bayeshaptic.inference.time_domain.uneven import WAVES, Way
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report import write_report
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
 
@@ -111,7 +114,9 @@ def test_the_likelihood_is_a_students_t_around_the_fit() -> None:
     assert held == pytest.approx(likelihood(np.append(motion.values[:4], 1e-3)[None]))
 
 
-def test_a_recording_in_closed_loop_has_a_limit() -> None:
+def test_a_recording_in_closed_loop_has_a_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     recording = declared(in_loop(4.0, TRUTH["coulomb"], 2e-6))
     closed = close_loop(recording, "rigid", ess=600)
     analysis = closed.analysis
@@ -123,6 +128,10 @@ def test_a_recording_in_closed_loop_has_a_limit() -> None:
     assert analysis.limit.quantile(0.005) < truth < analysis.limit.quantile(0.995)
     assert closed.verdict == "explained"
     assert headline(closed).status == "caution"
+    words_only(monkeypatch)
+    write_report(closed, tmp_path)
+    check_page(closed, tmp_path)
+    assert "friction is not known here" not in page_of(tmp_path)
     # Nobody said that it is one mass: its modes are not known.
     auto = close_loop(recording, "auto", ess=600)
     assert headline(auto).status == "untrusted"

@@ -230,7 +230,7 @@ class Normal(Prior):
 
     def describe(self, unit: str) -> str:
         cut = f", not below {self.low:.4g}" if np.isfinite(self.low) else ""
-        return f"normal, {self.mean:.4g} +- {self.sd:.4g} {unit}{cut}"
+        return f"normal, {self.mean:.4g} ± {self.sd:.4g} {unit}{cut}"
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.quantities import (
     interval,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 _DASH = "\N{EN DASH}"
 _OUTCOMES = {
-    "at a bound": "least squares stopped at its bound: no error bar",
+    "at a bound": "least squares stopped at its bound",
     "prior-dominated": "the data alone do not decide it",
 }
 
@@ -93,17 +94,20 @@ def limit(analysis: Analysis) -> Rows:
 
 def safe(analysis: Analysis) -> Rows:
     """The stiffness at each risk: (risk, stiffness, dB), and at the tip where there is a lever."""
-    tip = tip_limit(analysis)
+    limit, tip = analysis.limit, tip_limit(analysis)
+    # Digits by the standard deviation: these are ends of the distribution, to be acted on.
+    sd = (limit.quantile(0.95) - limit.quantile(0.05)) / 3.29
+    share = sd / limit.quantile(0.5)
     shown: dict[tuple[str, ...], list[float]] = {}
     for risk in RISKS:
-        found = analysis.limit.safe(risk)
+        found = limit.safe(risk)
         if found is None:
             row = ["too few draws to say", _DASH]
         else:
-            row = [quantity(found, analysis.limit.unit, digits=4), _db(found)]
+            row = [_known_to(found, limit.unit, share), _db(found)]
         if tip is not None:
             there = None if found is None else tip.safe(risk)
-            row.append(_DASH if there is None else quantity(there, tip.unit, digits=4))
+            row.append(_DASH if there is None else _known_to(there, tip.unit, share))
         shown.setdefault(tuple(row), []).append(risk)
     # Risks that are one number to the digits shown are said once.
     return tuple((percents(risks), *row) for row, risks in shown.items())
@@ -174,6 +178,8 @@ def measured(analysis: Analysis) -> Rows:
 
 
 def _excitation(analysis: Analysis) -> str:
+    if has_feedback(analysis.notices):
+        return "computed from the motion"
     lines = analysis.etfe.period_lines
     return "random" if lines is None else f"periodic, {lines} excited lines"
 
@@ -188,6 +194,12 @@ def _scaled(
     if spread is None and known:
         spread = spread_of(min(known), max(known))
     return tuple(_DASH if v is None else row.quantity(v, spread) for v in values)
+
+
+def _known_to(value: float, unit: str, share: float) -> str:
+    """A stiffness by its relative standard deviation; four digits where that is none."""
+    sd = value * share if np.isfinite(share) else None
+    return quantity(value, unit, sd, digits=4)
 
 
 def _db(stiffness: float) -> str:

@@ -52,8 +52,10 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     # Beyond 100 % the noise has taken over, and a symmetric bar in dB says nothing.
     error = 2 * np.clip(relative / np.sqrt(2), 0.0, 1.0)
     gain_error, phase_error = 20 / np.log(10) * error, np.degrees(error)
-    _points(gain, etfe, etfe.gain_db, gain_error, "measured, ± 2 sd")
-    _points(phase, etfe, measured, phase_error)
+    points = _points(gain, etfe, etfe.gain_db, gain_error, "measured, ± 2 sd")
+    points += _points(phase, etfe, measured, phase_error)
+    if correction(result):
+        style.layer(points, "after")
     _note(gain, etfe, etfe.gain_db, gain_error, band, band.gain_db, "dB")
     _note(phase, etfe, measured, phase_error, band, band.phase_deg, "\N{DEGREE SIGN}")
     for axes, quantiles in ((gain, band.gain_db), (phase, band.phase_deg)):
@@ -160,8 +162,8 @@ def _difference(axes: Axes, etfe: Etfe, band: ResponseBand, error: NDArray[Any])
 
 def _points(
     axes: Axes, etfe: Etfe, value: NDArray[Any], error: NDArray[Any], label: str = ""
-) -> None:
-    axes.errorbar(
+) -> list[Any]:
+    bars = axes.errorbar(
         etfe.frequency_hz,
         value,
         yerr=error,
@@ -174,6 +176,7 @@ def _points(
         zorder=2,
         label=label,
     )
+    return bars.get_children()
 
 
 def _near(phase: NDArray[Any], model: NDArray[Any]) -> NDArray[Any]:

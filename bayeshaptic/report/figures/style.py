@@ -151,7 +151,6 @@ def layer(artists: Iterable[Any], name: str) -> None:
         artist.set_gid(f"{_LAYER}{name}")
 
 
-
 def png(pixels: Bytes) -> bytes:
     """Pixels of shape (height, width, 3) as PNG."""
     from PIL import Image

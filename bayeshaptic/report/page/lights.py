@@ -70,6 +70,10 @@ def _recording(analysis: Analysis) -> Light:
 
 
 def _fit(analysis: Analysis) -> Light:
+    if analysis.in_loop is not None:
+        if analysis.in_loop.doubts:
+            return Light("Fit", BAD, "halves disagree", "force")
+        return Light("Fit", GOOD, "motion is followed", "force")
     if misfit_is_clear(analysis):
         return Light("Fit", BAD, f"{misfit_factor(analysis)} times the noise", "leftover")
     if residual_is_noticed(analysis):

@@ -38,6 +38,12 @@ _BIBTEX = {
     convergence of {MCMC}},
   journal = {Bayesian Analysis}, volume = {16}, number = {2}, pages = {667--718}, year = {2021}
 }""",
+    "janot2014": """@article{janot2014,
+  author = {Janot, Alexandre and Vandanjon, Pierre-Olivier and Gautier, Maxime},
+  title = {A generic instrumental variable approach for industrial robot identification},
+  journal = {IEEE Transactions on Control Systems Technology},
+  volume = {22}, number = {1}, pages = {132--145}, year = {2014}
+}""",
     "kennedy2001": """@article{kennedy2001,
   author = {Kennedy, Marc C. and O'Hagan, Anthony},
   title = {Bayesian calibration of computer models},
@@ -50,6 +56,8 @@ _BIBTEX = {
 def methods(result: Result) -> str:
     """What was done, in one paragraph with the keys of its references in square brackets."""
     analysis = result.analysis
+    if analysis.in_loop is not None:
+        return " ".join((_in_loop(analysis), _sampled(analysis), _limit()))
     return " ".join(
         (*_measured(analysis.etfe), _model(analysis), _sampled(analysis), *_loop(result), _limit())
     )
@@ -75,6 +83,19 @@ def _measured(etfe: Etfe) -> tuple[str, ...]:
     return (
         f"The device's response to a commanded force was recorded for {length} at {rate}, and "
         f"estimated {how} with its noise ({band}).",
+    )
+
+
+def _in_loop(analysis: Analysis) -> str:
+    recording = analysis.recording
+    assert recording is not None
+    length = quantity(recording.duration_s, "s")
+    return (
+        f"Force and position were recorded for {length} at "
+        f"{quantity(1 / recording.period_s, 'Hz')} in closed loop: the force was computed from the "
+        "motion, so that a frequency response would be biased. One mass with viscous "
+        "and dry friction, a constant force and a delay, simulated in the same loop, was fitted to "
+        "the motion (closed-loop output error [janot2014])."
     )
 
 

@@ -46,4 +46,4 @@ def asked(origin: Mapping[str, Any] | None = None) -> Rows:
 
 
 def _written(value: Any) -> str:
-    return "not given" if value is None else str(value)
+    return str(value) if value or value in (0, False) else "not given"

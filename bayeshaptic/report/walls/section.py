@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 DRAWS = 2400
 _SLOW_DRAWS = 2000  # of a model without a finite set of poles
 _FRICTION = "friction_force"
+_IN_LOOP = "coulomb"  # the same, as a parameter of the motion under feedback
 
 
 def limits_section(
@@ -86,7 +87,9 @@ def case_of(result: Result) -> Case:
 
 def friction_of(result: Result) -> float | None:
     """The Coulomb friction that closing the loop found, or None."""
-    closed = result.closed
+    closed, posterior = result.closed, result.analysis.posterior
+    if _IN_LOOP in posterior.model.names:
+        return float(np.median(posterior.draws[:, posterior.model.names.index(_IN_LOOP)]))
     for effect in () if closed is None else closed.effects:
         if _FRICTION in effect.estimates:
             return float(effect.estimates[_FRICTION].mean)
