@@ -38,6 +38,7 @@ Floats = NDArray[Any]
 Complexes = NDArray[Any]
 
 _ALIASES = 8  # on either side
+_MOST_ALONE = 3  # the nearest alias that a series begins with; those before are summed themselves
 _TERMS = 16  # of the Chebyshev series
 _REACH = 5.2  # |p_max| T + theta up to which it converges to 1e-8 of itself
 
@@ -144,10 +145,16 @@ class Aliases:
         return np.asarray(chebyshev.chebval(x, self.coefficients[:, index], tensor=False))
 
 
-def aliases(remainder: Remainder, top: float, delay_s: Floats, period_s: float) -> Aliases:
-    """The sum as a Chebyshev series; only where `smooth_aliases` says so."""
+def aliases(
+    remainder: Remainder, top: float, delay_s: Floats, period_s: float, nearest: int = 1
+) -> Aliases:
+    """The sum as a Chebyshev series; only where `smooth_aliases` says so.
+
+    Without the aliases nearer than `nearest` that is so for poles that are faster by
+    2 pi / T for each of them.
+    """
     x, inverse = _chebyshev_nodes()
-    sums = alias_sums(remainder, (x + 1) * top / 2, delay_s, period_s)
+    sums = alias_sums(remainder, (x + 1) * top / 2, delay_s, period_s, nearest)
     return Aliases(inverse @ sums, top)
 
 
@@ -156,16 +163,42 @@ def smooth_aliases(fastest: Floats, top: float) -> NDArray[np.bool_]:
     return fastest + top < _REACH
 
 
-def alias_sums(remainder: Remainder, theta: Floats, delay_s: Floats, period_s: float) -> Complexes:
-    """The same sum, term by term, at angles of shape (L,) or (..., B); shape (L, B) or (..., B)."""
-    shared = theta.ndim == 1
+def alias_sums(
+    remainder: Remainder, theta: Floats, delay_s: Floats, period_s: float, nearest: int = 1
+) -> Complexes:
+    """The same sum, term by term, at angles of shape (L,) or (..., B); shape (L, B) or (..., B).
+
+    Without those nearer than `nearest`.
+    """
+    if theta.ndim == 1:
+        return _shared_alias_sums(remainder, theta, delay_s, period_s, nearest, _ALIASES)
     total: Complexes | float = 0.0
-    for k in (*range(-_ALIASES, 0), *range(1, _ALIASES + 1)):
-        omega = (theta + 2 * np.pi * k) / period_s
-        table = nodes_at(omega / (2 * np.pi), period_s).polynomial if shared else None
-        s = 1j * (omega[:, None] if shared else omega)
-        total = total + np.exp(-2j * np.pi * k * delay_s / period_s) * remainder.at(s, table) / s
+    for k in _numbers(nearest, _ALIASES):
+        s = 1j * (theta + 2 * np.pi * k) / period_s
+        total = total + np.exp(-2j * np.pi * k * delay_s / period_s) * remainder.at(s) / s
     return np.asarray(total)
+
+
+def _shared_alias_sums(
+    remainder: Remainder,
+    theta: Floats,
+    delay_s: Floats,
+    period_s: float,
+    nearest: int,
+    furthest: int,
+) -> Complexes:
+    """`alias_sums` at angles that the batch shares, shape (L,): all aliases in one call."""
+    k = _numbers(nearest, furthest)
+    omega = ((theta + 2 * np.pi * k[:, None]) / period_s).ravel()
+    s = 1j * omega[:, None]
+    values = remainder.at(s, nodes_at(omega / (2 * np.pi), period_s).polynomial) / s
+    turned = np.exp(-2j * np.pi * k[:, None] * delay_s / period_s)
+    return np.einsum("kb,klb->lb", turned, values.reshape(len(k), len(theta), -1))
+
+
+def _numbers(nearest: int, furthest: int) -> NDArray[np.int_]:
+    """Of the aliases on both sides."""
+    return np.r_[-furthest : 1 - nearest, nearest : furthest + 1]
 
 
 @cache
@@ -185,10 +218,20 @@ def sampled_remainder(
     total = remainder.at(s, nodes.polynomial) / s
     top = float(np.max(theta))
     fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
-    if len(theta) > _TERMS and np.all(smooth_aliases(fastest, top)):
-        series = aliases(remainder, top, delay_s, period_s)
-        total = total + chebyshev.chebvander(2 * theta / top - 1, _TERMS - 1) @ series.coefficients
-    else:
-        total = total + alias_sums(remainder, theta, delay_s, period_s)
+    few = len(theta) <= _TERMS
+    nearest = np.where(few, 0, 1 + np.ceil((fastest + top - _REACH) / (2 * np.pi)))
+    nearest = np.where(nearest > _MOST_ALONE, 0, np.maximum(nearest, 1)).astype(int)
+    for first in np.unique(nearest):  # 0: no series converges
+        rows = nearest == first
+        part = remainder if rows.all() else remainder.rows(rows)
+        late = delay_s[rows]
+        if first == 0:
+            total[:, rows] += alias_sums(part, theta, late, period_s)
+            continue
+        series = aliases(part, top, late, period_s, first)
+        powers = chebyshev.chebvander(2 * theta / top - 1, _TERMS - 1)
+        total[:, rows] += powers @ series.coefficients
+        if first > 1:
+            total[:, rows] += _shared_alias_sums(part, theta, late, period_s, 1, first - 1)
     hold = nodes.hold[:, None] / period_s
     return np.asarray((hold * np.exp(-s * delay_s) * total).T)

@@ -16,7 +16,7 @@ from bayeshaptic.models.response.remainder import Remainder, remainder_of, sampl
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Complexes, Floats
 
-_CHUNK = 128  # vectors at a time: the arrays of one chunk stay in the cache
+_CHUNK = 64  # vectors at a time: the arrays of one chunk stay in the cache
 
 
 @dataclass(frozen=True)
@@ -104,10 +104,11 @@ class LinearSystem:
         frequency_hz = np.asarray(frequency_hz, float)
         response = sampled_response(self.rational_form(frequency_hz, period_s))
         if self.dynamic_links:
+            remainder = self.remainder
             for start in range(0, self.batch, _CHUNK):
-                part = self.rows(slice(start, start + _CHUNK))
-                response[start : start + _CHUNK] += sampled_remainder(
-                    part.remainder, part.delay_s, frequency_hz, period_s
+                rows = slice(start, start + _CHUNK)
+                response[rows] += sampled_remainder(
+                    remainder.rows(rows), self.delay_s[rows], frequency_hz, period_s
                 )
         return response
 
