@@ -181,6 +181,13 @@ def test_few_frequencies_are_summed_term_by_term():
     )
 
 
+def test_one_link_is_compiled_as_it_is_written():
+    system = filtered(linked("lhifam", "grasped"), 3e-4)
+    one = replace(system, dynamic_links=system.dynamic_links[:1]).remainder
+    omega = np.concatenate([np.geomspace(0.1, 3e3, 50), -np.geomspace(3e3, 6e4, 50)])
+    np.testing.assert_allclose(one.on_axis(omega), one.at(1j * omega[:, None]), rtol=1e-12)
+
+
 def test_mechanism_too_fast_for_the_series():
     system = linked("lhifam", "grasped")
     mass = 0.1 * system.mechanism.masses[0]

@@ -11,7 +11,7 @@ from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import HAND, MASSES, apart, grid, typical
 from bayeshaptic.models import HalfNormal, LinearSystem, LogNormal, Model, Parameter
-from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink
+from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink, delayed
 from bayeshaptic.recordings.response.etfe import Etfe
 
 DELAYS_S, LAGS_S = (0.015, 0.025, 0.04, 0.07), (0.004, 0.02)  # where to start looking
@@ -21,7 +21,7 @@ def reflex_stiffness(
     s: Complexes, stiffness: Floats, damping: Floats, delay_s: Floats, lag_s: Floats
 ) -> Complexes:
     """(k + b s) e^(-s delay) / (1 + s lag)."""
-    return (stiffness + damping * s) * np.exp(-s * delay_s) / (1 + s * lag_s)
+    return (stiffness + damping * s) * delayed(s, delay_s) / (1 + s * lag_s)
 
 
 @register

@@ -39,3 +39,14 @@ class DynamicLink:
     def rows(self, index: Index) -> DynamicLink:
         """A part of the batch."""
         return replace(self, values=tuple(value[index] for value in self.values))
+
+
+def delayed(s: Complexes, delay_s: Floats) -> Complexes:
+    """e^(-s delay); on the imaginary axis, where nearly all points are, by cosine and sine."""
+    if np.any(s.real):
+        return np.exp(-s * delay_s)
+    angle = s.imag * delay_s
+    turned = np.empty(angle.shape, complex)
+    np.cos(angle, out=turned.real)
+    np.sin(-angle, out=turned.imag)
+    return turned

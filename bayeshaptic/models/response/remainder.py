@@ -19,7 +19,7 @@ without k = 0 is a short Chebyshev series in the frequency.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -28,7 +28,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
+from bayeshaptic.models.response.dynamic_link import DynamicLink, Index, delayed
 from bayeshaptic.models.response.filter import Filter
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.sampled import fastest_pole, laurent, nodes_at
@@ -72,29 +72,39 @@ class Remainder:
             tuple(factor.rows(index) for factor in self.filters),
         )
 
-    def at(
-        self, s: Complexes, polynomial: Callable[[Polynomial], Complexes] | None = None
-    ) -> Complexes:
-        """Values at points `s` of shape (..., 1) or (..., B); shape (..., B).
-
-        `polynomial`, where given, evaluates polynomials at `s` faster than Horner's rule.
-        """
-        value = polynomial or (lambda coefficients: evaluate(coefficients, s))
-        total, _ = self._add_links(s, value)
+    def at(self, s: Complexes) -> Complexes:
+        """Values at points `s` of shape (..., 1) or (..., B); shape (..., B)."""
+        total, _ = self._add_links(s)
         for factor in self.filters:
-            total *= value(factor.numerator) / value(factor.denominator)
+            total *= evaluate(factor.numerator, s) / evaluate(factor.denominator, s)
+        return total
+
+    def on_axis(self, omega: Floats) -> Complexes:
+        """Values at s = j omega, shape (L,) for the whole batch; shape (L, B).
+
+        With a single link compiled.
+        """
+        s = 1j * omega[:, None]
+        if len(self.links) > 1:
+            return self.at(s)
+        from bayeshaptic.models.response.kernels.remainder import add_link
+
+        stiffness = self.links[0].stiffness(s)
+        total = np.empty_like(stiffness)
+        pairs = self.denominator, self.compliances[0, 1], self.compliances[1, 1]
+        add_link(omega, *map(np.ascontiguousarray, pairs), _real(stiffness), _real(total))
+        for factor in self.filters:
+            total *= evaluate(factor.numerator, s) / evaluate(factor.denominator, s)
         return total
 
     def return_difference(self, s: Complexes) -> Complexes:
         """Characteristic function with the links over that without, at points as in `at`."""
-        return self._add_links(s, lambda coefficients: evaluate(coefficients, s))[1]
+        return self._add_links(s)[1]
 
-    def _add_links(
-        self, s: Complexes, value: Callable[[Polynomial], Complexes]
-    ) -> tuple[Complexes, Complexes]:
-        inverse: Complexes = 1 / value(self.denominator)
+    def _add_links(self, s: Complexes) -> tuple[Complexes, Complexes]:
+        inverse: Complexes = 1 / evaluate(self.denominator, s)
         h: dict[tuple[int, int], Complexes] = {
-            pair: value(numerator) * inverse for pair, numerator in self.compliances.items()
+            pair: evaluate(numerator, s) * inverse for pair, numerator in self.compliances.items()
         }
         total: Complexes = np.zeros_like(inverse)
         difference: Complexes = np.ones_like(inverse)
@@ -190,8 +200,7 @@ def _shared_alias_sums(
     """`alias_sums` at angles that the batch shares, shape (L,): all aliases in one call."""
     k = _numbers(nearest, furthest)
     omega = ((theta + 2 * np.pi * k[:, None]) / period_s).ravel()
-    s = 1j * omega[:, None]
-    values = remainder.at(s, nodes_at(omega / (2 * np.pi), period_s).polynomial) / s
+    values = remainder.on_axis(omega) / (1j * omega[:, None])
     turned = np.exp(-2j * np.pi * k[:, None] * delay_s / period_s)
     return np.einsum("kb,klb->lb", turned, values.reshape(len(k), len(theta), -1))
 
@@ -215,7 +224,7 @@ def sampled_remainder(
     nodes = nodes_at(frequency_hz, period_s)
     theta = nodes.s.imag * period_s
     s = nodes.s[:, None]
-    total = remainder.at(s, nodes.polynomial) / s
+    total = remainder.on_axis(nodes.s.imag) / s
     top = float(np.max(theta))
     fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
     few = len(theta) <= _TERMS
@@ -234,4 +243,9 @@ def sampled_remainder(
         if first > 1:
             total[:, rows] += _shared_alias_sums(part, theta, late, period_s, 1, first - 1)
     hold = nodes.hold[:, None] / period_s
-    return np.asarray((hold * np.exp(-s * delay_s) * total).T)
+    return np.asarray((hold * delayed(s, delay_s) * total).T)
+
+
+def _real(values: Complexes) -> Floats:
+    """Real and imaginary parts along a further axis."""
+    return values.view(float).reshape(*values.shape, 2)
