@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ class DynamicLink:
         return replace(self, values=tuple(value[index] for value in self.values))
 
 
-def delayed(s: Complexes, delay_s: Floats) -> Complexes:
+def delayed(s: NDArray[Any], delay_s: NDArray[Any]) -> Complexes:
     """e^(-s delay); on the imaginary axis, where nearly all points are, by cosine and sine."""
     if np.any(s.real):
         return np.exp(-s * delay_s)

@@ -91,8 +91,11 @@ class Remainder:
 
         stiffness = self.links[0].stiffness(s)
         total = np.empty_like(stiffness)
-        pairs = self.denominator, self.compliances[0, 1], self.compliances[1, 1]
-        add_link(omega, *map(np.ascontiguousarray, pairs), _real(stiffness), _real(total))
+        denominator, mutual, own = map(
+            np.ascontiguousarray,
+            (self.denominator, self.compliances[0, 1], self.compliances[1, 1]),
+        )
+        add_link(omega, denominator, mutual, own, _real(stiffness), _real(total))
         for factor in self.filters:
             total *= evaluate(factor.numerator, s) / evaluate(factor.denominator, s)
         return total
