@@ -50,7 +50,7 @@ def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
     fit : Fit
     etfe : Etfe
         Of a recording with random excitation.
-    over : {"velocity", "position", "stretch", "command"}
+    over : {"velocity", "load velocity", "position", "stretch", "command"}
     motion : ndarray, shape (N,)
         As `motions` gives it.
     """

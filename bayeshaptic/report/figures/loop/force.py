@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _TITLES = {
     "velocity": "velocity",
+    "load velocity": "velocity of the load",
     "position": "position",
     "stretch": "stretch",
     "command": "command",
@@ -114,7 +115,7 @@ def _panel(
     from matplotlib.ticker import MaxNLocator
 
     etfe = closed.base.etfe
-    unit = etfe.position_unit + ("/s" if over == "velocity" else "")
+    unit = etfe.position_unit + ("/s" if over.endswith("velocity") else "")
     unit = etfe.force_unit if over == "command" else unit
     motion = scale(float(np.abs(row[0][0].motion).max()), unit)
     style.panel(axes, f"{_TITLES[over]}, {motion.unit}")
