@@ -18,6 +18,7 @@ from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
+from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -60,7 +61,7 @@ def rubbed(force: float) -> tuple[State, tuple[Trial, ...]]:
     """A recording with dry friction on the motor (or none), and what is tried for a sign(v)."""
     bench = LHIFAM.with_effect("coulomb_friction", force=force) if force else LHIFAM
     state = state_of(bench)
-    return state, tuple(nonlinear_trials(state, {"sign(v)"}))
+    return state, tuple(nonlinear_trials(state, {"sign(v)"}, Meter()))
 
 
 def limit_db(state: State) -> float:
@@ -109,21 +110,28 @@ def test_where_nothing_rubs_no_friction_convinces() -> None:
 
 def test_a_test_that_calls_for_nothing_tries_nothing() -> None:
     state, _ = rubbed(0.5)
-    assert nonlinear_trials(state, set()) == []
+    assert nonlinear_trials(state, set(), Meter()) == []
+
+
+def test_what_the_budget_has_no_room_for_is_put_down() -> None:
+    state = state_of(LHIFAM.with_effect("coulomb_friction"))
+    spent = Meter(limit=0.0)
+    assert nonlinear_trials(state, {"sign(v)"}, spent) == []
+    assert spent.skipped == ["dry (Coulomb) friction"]
 
 
 def test_one_mass_gets_one_law_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     state, trials = rubbed(0.5)
     only(monkeypatch, "coulomb_friction", "stribeck_friction", "dahl_friction")
     known = replace(state, accepted=(trials[0].accepted,))
-    assert nonlinear_trials(known, {"sign(v)"}) == []
+    assert nonlinear_trials(known, {"sign(v)"}, Meter()) == []
 
 
 def test_one_actuator_has_one_characteristic(monkeypatch: pytest.MonkeyPatch) -> None:
     state, trials = rubbed(0.5)
     only(monkeypatch, "actuator_saturation", "soft_saturation", "dead_zone")
     zone = replace(trials[0].accepted, name="dead_zone", estimates={})
-    assert nonlinear_trials(replace(state, accepted=(zone,)), {"u^3"}) == []
+    assert nonlinear_trials(replace(state, accepted=(zone,)), {"u^3"}, Meter()) == []
 
 
 def test_candidates_are_announced_by_their_titles() -> None:
@@ -138,18 +146,18 @@ def test_candidates_are_announced_by_their_titles() -> None:
         raise Enough
 
     with pytest.raises(Enough):
-        nonlinear_trials(state, {"sign(v)"}, tick)
+        nonlinear_trials(state, {"sign(v)"}, Meter(), tick)
     assert len(titles) == 1 and titles[0]
 
 
 def test_without_a_recording_there_is_nothing_to_simulate() -> None:
     state, _ = rubbed(0.5)
     bare: Any = replace(state.etfe, recording=None)
-    assert nonlinear_trials(replace(state, etfe=bare), {"sign(v)"}) == []
+    assert nonlinear_trials(replace(state, etfe=bare), {"sign(v)"}, Meter()) == []
 
 
 def best_of(effect: BenchEffect | str, raised: str) -> Trial:
-    trials = nonlinear_trials(state_of(LHIFAM.with_effect(effect)), {raised})
+    trials = nonlinear_trials(state_of(LHIFAM.with_effect(effect)), {raised}, Meter())
     best = max(trials, key=lambda trial: trial.score)
     assert best.convincing
     # Ten seconds know K_CR to about a decibel.

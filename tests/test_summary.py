@@ -67,7 +67,7 @@ KEYS: dict[str, set[str]] = {
     "critical_stiffness.frequency_hz": QUANTILES,
     "critical_stiffness.etfe": QUANTILES,
     "critical_stiffness.safe": {"0.05", "0.01", "0.001"},
-    "diagnosis": {"verdict", "residual_class", "effects", "candidates"},
+    "diagnosis": {"verdict", "residual_class", "effects", "candidates", "not_tried"},
     "error": {"before", "after"},
     "provenance": {"command", "options", "versions", "seed", "sha256", "seconds"},
     "error.before": ERROR,

@@ -101,6 +101,7 @@ class Closed:
                 {"name": c.name, "score": c.score, "accepted": c.accepted}
                 for c in self.traced.candidates
             ],
+            "not_tried": list(self.traced.skipped),
         }
 
 
@@ -232,11 +233,18 @@ def _limit_alone(analysis: Analysis) -> dict[str, Any]:
 
 
 def _notices(traced: Traced) -> tuple[Notice, ...]:
-    if traced.verdict != "unexplained":
-        return ()
-    left = max((test for test in traced.after if test.flagged), key=lambda test: test.excess)
-    text = (
-        f"The residual is not explained ({traced.residual_class}): {left.text}. The critical "
-        "stiffness is widened by what remains; treat its upper half with suspicion."
-    )
-    return (Notice("warning", "unexplained", text),)
+    found = []
+    if traced.verdict == "unexplained":
+        left = max((test for test in traced.after if test.flagged), key=lambda test: test.excess)
+        text = (
+            f"The residual is not explained ({traced.residual_class}): {left.text}. The critical "
+            "stiffness is widened by what remains; treat its upper half with suspicion."
+        )
+        found.append(Notice("warning", "unexplained", text))
+    if traced.skipped:
+        text = (
+            "Not tried, because the budget of the search for effects was spent: "
+            f"{', '.join(traced.skipped)}; a larger --budget tries them."
+        )
+        found.append(Notice("note", "budget", text))
+    return tuple(found)

@@ -29,7 +29,7 @@ _ERROR = {
     "critical_stiffness": dict.fromkeys(QUANTILES),
     "critical_stiffness_db": None,
 }
-_DIAGNOSIS = dict.fromkeys(("verdict", "residual_class", "effects", "candidates"))
+_DIAGNOSIS = dict.fromkeys(("verdict", "residual_class", "effects", "candidates", "not_tried"))
 
 
 def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str, Any]:

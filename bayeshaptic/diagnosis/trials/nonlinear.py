@@ -6,7 +6,7 @@ parameters fitted anew: a profile.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.inference.least_squares import Fit, polish, summarise
 from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.random_excitation import points as points_of
 from bayeshaptic.stability.critical import critical_stiffness
@@ -35,7 +36,10 @@ _FAINT = 10.0  # gain below which nothing is tried
 
 
 def nonlinear_trials(
-    state: State, raised: set[str], tick: Callable[[str], None] | None = None
+    state: State,
+    raised: set[str],
+    meter: Meter,
+    tick: Callable[[str], None] | None = None,
 ) -> list[Trial]:
     """One trial for each nonlinear effect that the raised tests call for; the best of its variants.
 
@@ -44,6 +48,8 @@ def nonlinear_trials(
     state : State
     raised : set of str
         Names of the nonlinear tests that are flagged.
+    meter : Meter
+        Says whether one more search for a force, or one more fit of one, is affordable.
     tick : callable, optional
         Called with the title of each candidate.
     """
@@ -63,12 +69,18 @@ def nonlinear_trials(
             others.append(called)
         elif called:
             firsts[kind.strength[0]] = called
-    found = _fitted(bench, [_search(bench, called, motion, tick) for called in firsts.values()])
+
+    def searched(laws: Iterable[_Called], known: dict[str, Point]) -> list[Point]:
+        return [
+            _search(bench, called, motion, tick, known.get(called[0].strength[0]))
+            for called in laws
+            if meter.affords(called[0].title)
+        ]
+
+    found = _fitted(bench, searched(firsts.values(), {}), meter)
     known = {point.effect.strength[0]: point for point in found}
-    nearby = [
-        _search(bench, called, motion, tick, known.get(called[0].strength[0])) for called in others
-    ]
-    return [_trial(bench, point) for point in _fitted(bench, nearby, found)]
+    found = _fitted(bench, searched(others, known), meter, found)
+    return [_trial(bench, point) for point in found]
 
 
 def _there(kind: type[NonlinearEffect], state: State) -> bool:
@@ -84,14 +96,18 @@ def _there(kind: type[NonlinearEffect], state: State) -> bool:
     return kind.name in (names | actuators if names & actuators else names)
 
 
-def _fitted(bench: ForceBench, points: list[Point], before: Sequence[Point] = ()) -> list[Point]:
+def _fitted(
+    bench: ForceBench, points: list[Point], meter: Meter, before: Sequence[Point] = ()
+) -> list[Point]:
     """The points fitted, the most promising first; the hopeless as they are, the faint left out."""
     found = list(before)
     for point in sorted(points, key=lambda point: -point.gain_fit):
         if point.gain_fit < _FAINT:
             continue
         best = max((other.gain_fit for other in found), default=0.0)
-        found.append(fit_force(bench, point) if point.gain_fit > _HOPELESS * best else point)
+        worth = point.gain_fit > _HOPELESS * best
+        follow = worth and meter.affords(f"{point.effect.title}, its fit")
+        found.append(fit_force(bench, point) if follow else point)
     return found
 
 

@@ -64,8 +64,9 @@ class WindowTrials:
                 return found
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
-        if "nonlinear" in families and meter.affords("forces inside the device"):
-            found += [_with_change(state, trial) for trial in nonlinear_trials(state, raised, tick)]
+        if "nonlinear" in families:
+            forces = nonlinear_trials(state, raised, meter, tick)
+            found += [_with_change(state, trial) for trial in forces]
         return found
 
     def without_needless(self, state: State) -> tuple[State, str | None]:

@@ -34,7 +34,7 @@ def remainder(closed: Closed) -> tuple[str, ...]:
     first = (
         f"There is something {more}here that has no name in the library. Its class is "
         f"{' and '.join(families)}{where}: {top.text}, where {pure(top.threshold)} would raise "
-        f"suspicion. {_tried(closed)}{_skipped(closed)}"
+        f"suspicion. {_tried(closed)}"
     )
     advice = [MEASURE_NEXT[family] for family in families if family in MEASURE_NEXT]
     if "linear" in families and closed.model.name == "grasped":
@@ -52,17 +52,6 @@ def _tried(closed: Closed) -> str:
     return (
         f"Tried without success, the best first: {names}. None of them predicts the part of the "
         "recording that it was not fitted to well enough to be believed."
-    )
-
-
-def _skipped(closed: Closed) -> str:
-    """What did not fit in the budget."""
-    skipped = closed.traced.skipped
-    if not skipped:
-        return ""
-    return (
-        f" Not tried, because the budget of the search was spent: {', '.join(skipped)}; a larger "
-        "--budget tries them."
     )
 
 
