@@ -47,6 +47,7 @@ class FakeAnalysis(SimpleNamespace):
     closed = None
     effect_names = ()
     analysis = measured = property(lambda self: self)
+    declared = property(lambda self: self.limit)
 
 
 class FakeClosed(SimpleNamespace):
@@ -123,6 +124,7 @@ def fake_analysis(
         seconds={"read": 0.1, "etfe": 0.3, "fit": 0.4, "sample": 1.2},
         noise_scale=fit.reduced_chi_square if misfit > 1.2 else 1.0,
         lever_m=lever_m,
+        hidden=None,
         in_loop=None,
     )
 

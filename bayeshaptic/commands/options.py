@@ -109,6 +109,7 @@ ANALYSIS = (
     Flag("--band", "band_hz", {"type": band, "metavar": "LOW,HIGH"}),
     Flag("--held", "held", {"type": yes_or_no, "metavar": "yes|no"}),
     Flag("--loop", "close_loop", {"action": argparse.BooleanOptionalAction}),
+    Flag("--hidden", "hidden", {"type": yes_or_no, "metavar": "yes|no"}),
     Flag("--budget", "budget_s", {"type": positive, "metavar": "SECONDS"}),
     Flag("--seed", "seed", {"type": seed, "metavar": "N"}),
 )

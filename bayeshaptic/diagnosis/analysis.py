@@ -12,6 +12,7 @@ from typing import Any
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.feedback.in_loop import InLoop
+from bayeshaptic.diagnosis.hidden.hidden import Hidden
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
 from bayeshaptic.diagnosis.measured import device_of, measurement_of
 from bayeshaptic.diagnosis.options import Options, options_from
@@ -64,6 +65,8 @@ class Analysis:
         Factor on the noise variance in the posterior: the reduced chi-square where the model
         misfits, 1 elsewhere.
     lever_m : float or None
+    hidden : Hidden or None
+        What could hide, where the limit allows for it.
     in_loop : InLoop or None
         The motion that posterior and limit come from, where feedback biases the response.
     """
@@ -82,6 +85,12 @@ class Analysis:
     noise_scale: float = 1.0
     lever_m: float | None = None
     in_loop: InLoop | None = None
+    hidden: Hidden | None = None
+
+    @property
+    def declared(self) -> CriticalStiffness:
+        """The limit if the model is exact, with what was found; `limit` allows for more."""
+        return self.limit if self.hidden is None else self.hidden.declared
 
     # What a report asks of any result, closed loop or not: see `bayeshaptic.diagnosis.result`.
     @property

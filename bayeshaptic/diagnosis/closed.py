@@ -22,10 +22,12 @@ from bayeshaptic.diagnosis.feedback.explain import (
     explain_force,
     trace_force,
 )
+from bayeshaptic.diagnosis.hidden.hidden import with_hidden
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.measured import measurement_of
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
-from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
@@ -132,6 +134,7 @@ def close_loop(
         Where the measurement cannot be used.
     """
     chosen = options_from(options, changes)
+    prior = HiddenPrior.from_table(chosen.effects)
     begun = begin(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
     began = time.perf_counter()
     force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None
@@ -169,7 +172,31 @@ def close_loop(
     notices = analysis.notices + _notices(traced)
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds)
+    if chosen.hidden and force is None and traced.verdict != UNEXPLAINED:
+        analysis = _with_hidden(analysis, traced, prior, chosen)
     return Closed(base, analysis, traced, _error(base), _error(analysis), force)
+
+
+def _with_hidden(
+    analysis: Analysis, traced: Traced, prior: HiddenPrior, options: Options
+) -> Analysis:
+    """With a limit that allows for what tests cannot see; as it is where nothing can be said."""
+    if not analysis.posterior.converged or analysis.noise_scale > 1:
+        return analysis
+    began = time.perf_counter()
+    found = with_hidden(
+        analysis.limit,
+        analysis.posterior,
+        analysis.etfe,
+        traced.after,
+        [effect.name for effect in traced.state.accepted],
+        prior,
+        options.seed,
+    )
+    if found is None:
+        return analysis
+    seconds = {**analysis.seconds, "what could hide": time.perf_counter() - began}
+    return replace(analysis, limit=found[0], hidden=found[1], seconds=seconds)
 
 
 def _stages(

@@ -49,6 +49,10 @@ class Options:
     ess : float or None
         Effective draws of every parameter; by default what the limit wants
         (`bayeshaptic.diagnosis.limit_known`).
+    hidden : bool
+        Whether the limit allows for effects that are too small to be seen; by default it does.
+    effects : mapping
+        Prior probability of each of these, by its name; "each" is that of the others, 0.08.
     seed : int
         Of the sampler: the same seed gives the same report; by default 0.
     budget_s : float
@@ -66,6 +70,8 @@ class Options:
     held: bool | None = None
     lever_m: float | None = None
     ess: float | None = None
+    hidden: bool = True
+    effects: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     budget_s: float = BUDGET_S
     progress: Progress | bool | None = field(default=None, compare=False)

@@ -21,6 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bayeshaptic.effects.unseen import Unseen
 from bayeshaptic.models import LinearSystem, Model, Parameter
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
@@ -60,6 +61,10 @@ class LinearEffect(ABC):
     @abstractmethod
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         """The system with the effect; `values` holds every parameter of the model, shape (B,)."""
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen | None:
+        """What it may be on `model` where nobody has seen it; None where that is not asked."""
+        return None
 
     def own(self, values: Mapping[str, Floats]) -> tuple[Floats, ...]:
         """The values of this effect's parameters, in their order, shape (B,) each."""

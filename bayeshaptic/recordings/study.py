@@ -19,7 +19,7 @@ from bayeshaptic.recordings.read import Columns, Span, read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 
-STUDY_KEYS = ("device", "pool", "prior", "feedback", "recording", "reference")
+STUDY_KEYS = ("device", "pool", "prior", "effects", "feedback", "recording", "reference")
 ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns", "rows", "seconds")
 PRIOR_KEYS = ("median", "log_sd", "scale", "floor", "mean", "sd", "low", "high", "log")
 
@@ -71,6 +71,8 @@ class Study:
         Mapping of the recordings' columns.
     prior : mapping of str to mapping of str to float (or bool)
         By parameter name, for example ``{"m1": {"median": 0.2, "log_sd": 0.3}}``; see `read_study`.
+    effects : mapping of str to float
+        Prior probabilities of effects that hide, by their names.
     entries : tuple of StudyEntry
     notices : tuple of Notice
     references : tuple of Reference
@@ -85,6 +87,7 @@ class Study:
     entries: tuple[StudyEntry, ...]
     columns: Columns = None
     prior: Mapping[str, Mapping[str, float | bool]] = field(default_factory=dict)
+    effects: Mapping[str, float] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
     references: tuple[Reference, ...] = ()
     feedback: Feedback | None = None
@@ -153,14 +156,15 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
     overrides it; and `columns`. An optional ``[prior]`` table has a line a parameter: ``m1 = {
     median = 0.2, log_sd = 0.3 }``, ``b1 = { scale = 5 }`` (half-normal; with `floor` near zero),
     ``kc = { mean = 6e4, sd = 1e3 }``, ``m2 = { low = 1, high = 9 }`` (uniform; with ``log = true``
-    in the logarithm). Each ``[[recording]]`` table has a `file`, relative to the study, and where
-    they apply `user`, `configuration` (a number or a name), `trial`, `level`, `rows` or
-    `seconds` (the part to read) and `columns` of its own. Recordings are
-    looked for but not read; `Study.read` does that. Recordings that nothing tells apart count
-    together as one; ``pool = true`` at the top joins trials and levels, too, and ``pool = false``
-    nothing. Optional ``[[reference]]`` tables hold limits
-    known from elsewhere: `label`, `held`, and `critical_stiffness` or `critical_stiffness_db`. An
-    optional ``[feedback]`` table says which controller was in the loop.
+    in the logarithm). An optional ``[effects]`` table has prior probabilities of effects that are
+    too small to be seen, ``extra_delay = 0.2``; `each` is that of all others. Each
+    ``[[recording]]`` table has a `file`, relative to the study, and where they apply `user`,
+    `configuration` (a number or a name), `trial`, `level`, `rows` or `seconds` (the part to read)
+    and `columns` of its own. Recordings are looked for but not read; `Study.read` does that.
+    Recordings that nothing tells apart count together as one; ``pool = true`` at the top joins
+    trials and levels, too, and ``pool = false`` nothing. Optional ``[[reference]]`` tables hold
+    limits known from elsewhere: `label`, `held`, and `critical_stiffness` or
+    `critical_stiffness_db`. An optional ``[feedback]`` table says which controller was in the loop.
 
     Parameters
     ----------
@@ -203,6 +207,7 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
         entries=_pooled(read, _pool(table)),
         columns=columns,
         prior=_prior(table.content.get("prior", {}), f"{path}, [prior]"),
+        effects=_effects(table.content.get("effects", {}), f"{path}, [effects]"),
         notices=notices,
         references=read_references(table.content.get("reference", []), path),
         feedback=read_feedback(table.content.get("feedback"), f"{path}, [feedback]"),
@@ -327,6 +332,17 @@ def _trial(table: Table) -> int | str | None:
     if value is None or (isinstance(value, int) and not isinstance(value, bool)):
         return value
     return table.text("trial")
+
+
+def _effects(content: object, where: str) -> dict[str, float]:
+    """Probabilities by name; which names there are is the library's business."""
+    table, found = Table(content, where), {}
+    for name in table.content:
+        probability = table.number(name, 0)
+        if probability is None or probability >= 1:
+            raise table.wrong(name, "a probability, from 0 to below 1")
+        found[name] = probability
+    return found
 
 
 def _prior(content: object, where: str) -> dict[str, dict[str, float | bool]]:

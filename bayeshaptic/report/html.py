@@ -39,6 +39,7 @@ _CONTENTS = (
     ("lacked", "What the model lacked"),
     ("force", "Force"),
     ("parameters", "Parameters"),
+    ("hidden", "What could hide"),
     ("guidance", "What next"),
     ("diagnostics", "Diagnostics"),
     ("assumptions", "Assumptions"),

@@ -66,6 +66,7 @@ def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str
             "posterior": _posterior(result),
             "critical_stiffness": _critical_stiffness(analysis),
             "recommendation": _recommendation(result),
+            "hidden": _hidden(analysis),
             "diagnosis": diagnosis,
             "error": {name: _ERROR | dict(given or {}) for name, given in error.items()},
             "provenance": origin or provenance(seed=analysis.posterior.seed),
@@ -178,7 +179,32 @@ def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
         ],
         "etfe": {name: None if own is None else getattr(own, name) for name in QUANTILES},
         "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
+        "declared": {
+            **_quantiles(analysis.declared),
+            "db": {name: analysis.declared.db(p) for name, p in QUANTILES.items()},
+        },
     }
+
+
+def _hidden(analysis: Analysis) -> list[dict[str, Any]] | None:
+    """What could hide, an effect each; null where the limit does not allow for anything."""
+    if analysis.hidden is None:
+        return None
+    return [
+        {
+            "name": effect.name,
+            "title": effect.title,
+            "prior": effect.prior,
+            "probability": effect.probability,
+            "strength_q95": effect.strength_q95,
+            "unit": effect.unit,
+            "shift_db": effect.shift_db[0]
+            if -effect.shift_db[0] > effect.shift_db[2]
+            else effect.shift_db[2],
+            "shift": dict(zip(QUANTILES, effect.shift_db, strict=True)),
+        }
+        for effect in analysis.hidden.effects
+    ]
 
 
 def _recommendation(result: Result) -> dict[str, Any]:

@@ -82,6 +82,9 @@ def limit(analysis: Analysis) -> Rows:
     levels = tuple(QUANTILES.values())
     rows = [("critical stiffness", *_scaled(stiffness.quantile(levels), stiffness.unit))]
     rows.append((f"in dB re 1 {stiffness.unit}", *(_db(stiffness.quantile(p)) for p in levels)))
+    if analysis.hidden is not None:
+        exact = analysis.declared
+        rows.append(("if the model is exact", *_scaled(exact.quantile(levels), exact.unit)))
     if tip is not None:
         rows.append(("at the tip", *_scaled(tip.quantile(levels), tip.unit)))
         rows.append((f"at the tip in dB re 1 {tip.unit}", *(_db(tip.quantile(p)) for p in levels)))

@@ -12,6 +12,7 @@ from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.hidden.section import hidden_section
 from bayeshaptic.report.html import render
 from bayeshaptic.report.page.section import Section
 from bayeshaptic.report.summary import summary_json
@@ -86,5 +87,5 @@ def _sections(result: Result, folder: Path) -> tuple[Section, ...]:
     walls = limits_section(
         table, friction_of(result), resolution_of(analysis), head.status == "untrusted"
     )
-    advice = guidance_section(case, analysis)
-    return (walls,) if advice is None else (walls, advice)
+    others = hidden_section(analysis), guidance_section(case, analysis)
+    return (walls, *(one for one in others if one is not None))

@@ -143,7 +143,8 @@ def analyse_study(
     prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
     chosen = options_from(options, changes)
     device = device_of(chosen, model) or study.device
-    chosen = replace(chosen, device=device, prior=prior | dict(chosen.prior))
+    effects = {**study.effects, **chosen.effects}
+    chosen = replace(chosen, device=device, prior=prior | dict(chosen.prior), effects=effects)
     tasks = [
         Task(number, study, entry, model, close_loop, replace(chosen, progress=None))
         for number, entry in enumerate(study.entries)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import COMMAND, LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
 from bayeshaptic.inference.least_squares import Fit
@@ -32,16 +32,18 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     if recording is None or etfe.period_lines is not None:
         return ()
     tests = []
-    for name, column in columns(fit, etfe, recording).items():
+    for name, (column, rms) in columns(fit, etfe, recording).items():
         windows = etfe.spectra.windows(fit.response, column[None])
-        coefficient, score = common_coefficient(windows)
-        text = f"a force like {name} stands {abs(score):.1f} standard deviations out of the noise"
-        tests.append(Test(name, "nonlinear", abs(score), thresholds.two_sided(), None, text))
+        strength, sd = common_coefficient(windows)
+        score = abs(strength / sd) if sd > 0 else 0.0
+        text = f"a force like {name} stands {score:.1f} standard deviations out of the noise"
+        seen = ForceSeen(strength, sd, rms)
+        tests.append(Test(name, "nonlinear", score, thresholds.two_sided(), None, text, seen))
     return tuple(tests)
 
 
 def common_coefficient(windows: Windows) -> tuple[float, float]:
-    """Coefficient of the last input, the same in all windows, and its robust score.
+    """Coefficient of the last input, the same in all windows, and its robust standard deviation.
 
     Each window's own smooth response is free, so only what it cannot explain counts.
     """
@@ -55,11 +57,14 @@ def common_coefficient(windows: Windows) -> tuple[float, float]:
     left = found - coefficient * slope
     spread = np.sqrt(np.sum((weight * (slope.conj() * left).real) ** 2))
     usual = np.sqrt(0.5 * information)
-    return coefficient, coefficient * information / max(float(spread), float(usual))
+    return coefficient, max(float(spread), float(usual)) / information
 
 
-def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, Complexes]:
-    """Motions that nonlinear forces would add, at the lines of the spectra; by name."""
+def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, tuple[Complexes, float]]:
+    """Motions that nonlinear forces would add, at the lines of the spectra; by name.
+
+    Each with the rms of the motion that the force is a function of.
+    """
     s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     at_lines = line_transform(etfe, recording)
     found = {}
@@ -67,7 +72,8 @@ def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, Complexes]:
         response = response_to(fit, over, s)
         for shape in tested().values():
             if shape.over == over:
-                found[shape.name] = response * at_lines(shape.force(motion / motion.std()))
+                rms = float(motion.std())
+                found[shape.name] = response * at_lines(shape.force(motion / rms)), rms
     return found
 
 

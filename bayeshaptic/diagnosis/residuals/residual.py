@@ -24,6 +24,23 @@ _KNOTS = 16
 
 
 @dataclass(frozen=True)
+class ForceSeen:
+    """A force that a test looked for, a shape of a motion over its rms.
+
+    Attributes
+    ----------
+    strength, sd : float
+        In the unit of force.
+    rms : float
+        Of the motion.
+    """
+
+    strength: float
+    sd: float
+    rms: float
+
+
+@dataclass(frozen=True)
 class Test:
     """One test of the residual.
 
@@ -38,6 +55,8 @@ class Test:
         Where it is largest.
     text : str
         What was found, in words.
+    force : ForceSeen or None
+        What a test for a force found.
     """
 
     name: str
@@ -46,6 +65,7 @@ class Test:
     threshold: float
     frequency_hz: float | None
     text: str
+    force: ForceSeen | None = None
 
     @property
     def flagged(self) -> bool:

@@ -10,7 +10,8 @@ import numpy as np
 
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
-from bayeshaptic.effects.typical import BODY, HAND, MASSES, MOTOR, apart, grid, typical
+from bayeshaptic.effects.typical import BODY, HAND, MASSES, MOTOR, Typical, apart, grid, typical
+from bayeshaptic.effects.unseen import Unseen, combined
 from bayeshaptic.models import LinearSystem, LogNormal, LogUniform, Model, Parameter
 from bayeshaptic.recordings.response.etfe import Etfe
 
@@ -19,6 +20,16 @@ def mount(mass: Floats, frequency_hz: Floats, damping_ratio: Floats) -> tuple[Fl
     """Damper and spring of a mass that swings at a frequency when its foot is held."""
     rate = 2 * np.pi * frequency_hz
     return 2 * damping_ratio * mass * rate, mass * rate**2
+
+
+def modes(sizes: Typical) -> tuple[Floats, Floats]:
+    """Frequencies in the band and damping ratios of a mode that nobody has seen; their weights.
+
+    The frequencies are about as far apart as a resonance is wide.
+    """
+    ratios = (0.015, 0.06)
+    frequencies = sizes.frequencies(45)
+    return combined(frequencies, ratios)
 
 
 @dataclass(frozen=True)
@@ -66,6 +77,17 @@ class AttachedMass(LinearEffect):
         sizes = typical(model, etfe)
         masses = sizes[self.on] * np.array([0.02, 0.1, 0.3, 1.0])
         return grid(sizes.frequencies(35), masses, [0.03, 0.2])
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen:
+        """A mode in the band, its mass up to the one that it hangs on."""
+        sizes = typical(model, etfe)
+        carrier = sizes[self.on]
+
+        def own(share: Floats, shapes: Floats) -> Floats:
+            return np.stack([shapes[:, 0], share * carrier, shapes[:, 1]], axis=1)
+
+        title = "its mass over that of what it hangs on"
+        return Unseen("number", title, 1.0, own, *modes(sizes))
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         frequency, mass, damping = self.own(values)

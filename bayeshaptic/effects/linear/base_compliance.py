@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.effects.effect import Floats, LinearEffect
-from bayeshaptic.effects.linear.attached_mass import mount
+from bayeshaptic.effects.linear.attached_mass import modes, mount
 from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import apart, grid, typical
+from bayeshaptic.effects.unseen import Unseen
 from bayeshaptic.models import LinearSystem, LogNormal, LogUniform, Model, Parameter
 from bayeshaptic.recordings.response.etfe import Etfe
 
@@ -47,6 +48,15 @@ class BaseCompliance(LinearEffect):
         sizes = typical(model, etfe)
         masses = sizes.device_mass * np.array([1.0, 4.0, 15.0])
         return grid(sizes.frequencies(35), masses, [0.03, 0.2])
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen:
+        """A base that swings in the band, at least as heavy as the device."""
+        sizes = typical(model, etfe)
+
+        def own(share: Floats, shapes: Floats) -> Floats:
+            return np.stack([shapes[:, 0], sizes.device_mass / share, shapes[:, 1]], axis=1)
+
+        return Unseen("number", "device's mass over the base's", 1.0, own, *modes(sizes))
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         frequency, mass, damping = self.own(values)

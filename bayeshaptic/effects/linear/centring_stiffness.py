@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import MASSES, MOTOR, apart, typical
+from bayeshaptic.effects.unseen import Unseen, alone
 from bayeshaptic.models import LinearSystem, LogNormal, Model, Parameter
 from bayeshaptic.models.response.mechanism import Link
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -42,6 +43,12 @@ class CentringStiffness(LinearEffect):
         sizes = typical(model, etfe)
         rate = 2 * np.pi * sizes.low_hz * np.geomspace(0.3, 30, 9)
         return (sizes.device_mass * rate**2)[:, None]
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen:
+        """Up to what brings the whole device to resonance at ten times the band's low end."""
+        sizes = typical(model, etfe)
+        largest = sizes.device_mass * (20 * np.pi * sizes.low_hz) ** 2
+        return Unseen("stiffness", "spring to the frame", largest, alone)
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         (stiffness,) = self.own(values)

@@ -9,6 +9,7 @@ import numpy as np
 
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
+from bayeshaptic.effects.unseen import Unseen, alone
 from bayeshaptic.models import LinearSystem, Model, Normal, Parameter
 from bayeshaptic.recordings.response.etfe import Etfe
 
@@ -33,6 +34,12 @@ class ExtraDelay(LinearEffect):
     def starting_values(self, model: Model, etfe: Etfe) -> Floats:
         later = etfe.period_s * np.array([0.1, 0.3, 0.6, 1.2, 2.0, 3.0])
         return np.append(later, -0.5 * model.fixed["delay_s"])[:, None]
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen:
+        """Later or earlier by up to a period, but never before the command."""
+        earliest = -min(model.fixed["delay_s"], etfe.period_s)
+        title = "delay beyond the declared"
+        return Unseen("time", title, etfe.period_s, alone, lowest=earliest)
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         (delay_s,) = self.own(values)

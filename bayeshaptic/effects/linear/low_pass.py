@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import apart, grid
+from bayeshaptic.effects.unseen import Unseen, alone, combined
 from bayeshaptic.models import LinearSystem, LogNormal, Model, Parameter
 from bayeshaptic.recordings.response.etfe import Etfe
 
@@ -48,6 +49,12 @@ class ActuatorLag(LinearEffect):
 
     def starting_values(self, model: Model, etfe: Etfe) -> Floats:
         return etfe.period_s / self.order * np.geomspace(0.1, 10, 9)[:, None]
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen | None:
+        """One stage; more of them look the same while they are fast."""
+        if self.order > 1:
+            return None
+        return Unseen("time", "time constant", etfe.period_s, alone)
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         (lag,) = self.own(values)
@@ -90,6 +97,17 @@ class PositionFilter(LinearEffect):
     def starting_values(self, model: Model, etfe: Etfe) -> Floats:
         cut_offs = np.geomspace(0.02, 2, 9) / etfe.period_s
         return grid(cut_offs) if self.order == 1 else grid(cut_offs, [0.1, 0.35, 0.9])
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen | None:
+        """Two poles; one is what an actuator's lag is."""
+        if self.order == 1:
+            return None
+
+        def own(lag: Floats, shapes: Floats) -> Floats:
+            return np.stack([1 / (2 * np.pi * lag), shapes[:, 0]], axis=1)
+
+        title = "1 / (2 pi cut-off)"
+        return Unseen("time", title, etfe.period_s, own, *combined((0.35, 0.7, 1.4)))
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         cut_off, *damping = self.own(values)

@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import HAND, MASSES, apart, grid, typical
+from bayeshaptic.effects.unseen import Unseen, combined
 from bayeshaptic.models import HalfNormal, LinearSystem, LogNormal, Model, Parameter
 from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink, delayed
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -52,6 +53,16 @@ class Reflex(LinearEffect):
         sizes = typical(model, etfe)
         share = np.array([0.2, 0.7, 2.0])
         return grid(share * sizes["kh"], share * sizes["bh"], DELAYS_S, LAGS_S)
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen:
+        """Up to the hand's own spring and damper, with the delays of nerves."""
+        sizes = typical(model, etfe)
+
+        def own(share: Floats, shapes: Floats) -> Floats:
+            return np.column_stack([share * sizes["kh"], share * sizes["bh"], shapes])
+
+        title = "reflex over the hand's own spring and damper"
+        return Unseen("number", title, 1.0, own, *combined(DELAYS_S, LAGS_S))
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         link = DynamicLink(MASSES[HAND], None, reflex_stiffness, self.own(values))

@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import BODY, MASSES, MOTOR, Typical, apart, grid, typical
+from bayeshaptic.effects.unseen import Unseen, alone, combined
 from bayeshaptic.models import HalfNormal, LinearSystem, LogNormal, Model, Parameter, Uniform
 from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -89,6 +90,10 @@ class StructuralDamping(LinearEffect):
     def starting_values(self, model: Model, etfe: Etfe) -> Floats:
         return np.array([[0.02], [0.06], [0.12], [0.25]])
 
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen | None:
+        """A loss factor up to a third; the two laws are alike while it is small."""
+        return Unseen("number", "loss factor", _MOST, alone) if self.constant == "factor" else None
+
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         (loss_factor,) = self.own(values)
         spring = values["kc"]
@@ -136,6 +141,17 @@ class RelaxingTransmission(LinearEffect):
         sizes = typical(model, etfe)
         stiffness = sizes["kc"] * np.array([0.05, 0.2, 1.0])
         return grid(stiffness, np.geomspace(0.03, 30, 7) / self._rate(sizes))
+
+    def unseen(self, model: Model, etfe: Etfe) -> Unseen:
+        """Up to the transmission's own spring, relaxing thirty times slower to faster than it."""
+        sizes = typical(model, etfe)
+
+        def own(share: Floats, shapes: Floats) -> Floats:
+            return np.stack([share * sizes["kc"], shapes[:, 0]], axis=1)
+
+        times = np.geomspace(0.03, 30, 7) / self._rate(sizes)
+        title = "spring that relaxes over the other"
+        return Unseen("number", title, 1.0, own, *combined(times))
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         return system.with_dynamic_link(DynamicLink(*_ENDS, relaxing_stiffness, self.own(values)))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.numbers.hidden import in_short
 from bayeshaptic.report.numbers.quantities import estimate, percent
 from bayeshaptic.report.numbers.result import tip_limit
 
@@ -31,6 +32,8 @@ def facts(result: Result) -> Rows:
     rows: list[tuple[str, ...]] = [("Critical stiffness", _interval(limit))]
     if tip is not None:
         rows.append(("At the tip", _interval(tip)))
+    if analysis.hidden is not None:
+        rows.append(("What could hide", in_short(analysis)))
     rows.append(("What binds", _binding(analysis)))
     rows.append(("Model", _model(result)))
     rows.append(("Speaks for", _holder(analysis)))

@@ -1,0 +1,116 @@
+"""The model average: nothing more, one more effect, or two, by their evidence.
+
+Every effect has its prior probability by itself, so that two of them have the product of their
+odds.  The evidence of two at once is that of each, times what they take away from each other to
+first order; three are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
+from bayeshaptic.diagnosis.hidden.regression import Around
+from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, systematic
+from bayeshaptic.types import Floats
+
+_MOST_GAIN = 3.0  # log evidence that two effects may gain by cancelling each other
+
+
+@dataclass(frozen=True)
+class Looked:
+    """Every effect that was looked at, and what two of them share.
+
+    Attributes
+    ----------
+    weighed : tuple of Weighed
+        E effects, at one place each.
+    meeting : ndarray, shape (E, E, D, D)
+        Log weight of each two draws, over that of either alone.
+    gain : ndarray, shape (E, E)
+        The log of its mean: what the evidence of two has beyond the sum of theirs.
+    """
+
+    weighed: tuple[Weighed, ...]
+    meeting: Floats = field(repr=False)
+    gain: Floats = field(repr=False)
+
+
+def looked_at(weighed: Sequence[Weighed], known: Around) -> Looked:
+    """What each two effects share, to first order in both."""
+    every = np.concatenate([one.changes for one in weighed])
+    count, draws = len(weighed), len(weighed[0].changes)
+    shared = known.overlap(every, every).reshape(count, draws, count, draws)
+    meeting = np.minimum(-shared.transpose(0, 2, 1, 3), _MOST_GAIN)
+    return Looked(tuple(weighed), meeting, np.log(np.exp(meeting).mean(axis=(2, 3))))
+
+
+@dataclass(frozen=True)
+class Average:
+    """Probabilities of what there is beside the model.
+
+    Attributes
+    ----------
+    looked : Looked
+    nothing : float
+        Probability that there is nothing more.
+    single : ndarray, shape (E,)
+        That there is one.
+    pair : ndarray, shape (E, E)
+        That there are two, the first before the second; zero on and below the diagonal.
+    """
+
+    looked: Looked
+    nothing: float
+    single: Floats
+    pair: Floats
+
+    @property
+    def present(self) -> Floats:
+        """Probability that each effect is there, alone or not, shape (E,)."""
+        return self.single + self.pair.sum(axis=0) + self.pair.sum(axis=1)
+
+    def log_factors(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draws of what there is beside the model, as what it does to ln K_CR; shape (count,)."""
+        first, second = np.nonzero(self.pair)
+        factors = [one.log_factor for one in self.looked.weighed]
+        shares = np.concatenate([[self.nothing], self.single, self.pair[first, second]])
+        which = systematic(shares, count, rng)
+        edges = np.searchsorted(which, np.arange(len(shares) + 1))
+        out = np.zeros(count)
+        for number, own in enumerate(factors, start=1):
+            rows = slice(edges[number], edges[number + 1])
+            out[rows] = own[rng.integers(KEPT, size=edges[number + 1] - edges[number])]
+        for number, (a, b) in enumerate(zip(first, second, strict=True), start=len(factors) + 1):
+            rows, size = slice(edges[number], edges[number + 1]), edges[number + 1] - edges[number]
+            if size:
+                weight = np.exp(self.looked.meeting[a, b])
+                i, j = np.divmod(
+                    rng.permutation(systematic(weight.ravel(), size, rng)), len(weight)
+                )
+                out[rows] = factors[a][PAIRED * i] + factors[b][PAIRED * j]
+        return rng.permutation(out)
+
+
+def average(looked: Looked, prior: HiddenPrior) -> Average:
+    """What there is beside the model, with its probabilities.
+
+    An effect whose evidence is not known (no draw of it is possible) counts as excluded.
+    """
+    weighed, count = looked.weighed, len(looked.weighed)
+    probability = np.array([one.share * prior.of(one.name) for one in weighed])
+    evidence = np.array([one.log_evidence for one in weighed])
+    with np.errstate(divide="ignore"):
+        odds = np.log(probability) - np.log1p(-probability)
+    single = odds + np.where(np.isfinite(evidence), evidence, -np.inf)
+    names = np.array([one.name for one in weighed])
+    pair = single[:, None] + single + looked.gain
+    allowed = np.triu(np.ones((count, count), bool), 1) & (names[:, None] != names)
+    pair = np.where(allowed, pair, -np.inf)
+    top = max(0.0, float(single.max(initial=0.0)), float(pair.max(initial=0.0)))
+    shares = np.exp(-top), np.exp(single - top), np.exp(pair - top)
+    whole = sum(float(np.sum(share)) for share in shares)
+    return Average(looked, float(shares[0] / whole), shares[1] / whole, shares[2] / whole)

@@ -1,0 +1,198 @@
+"""The limit that allows for what the tests of a recording cannot see."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis.hidden.average import Average, average, looked_at
+from bayeshaptic.diagnosis.hidden.drift import drifts, weigh_drift
+from bayeshaptic.diagnosis.hidden.forces import force_suspects
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
+from bayeshaptic.diagnosis.hidden.regression import Around, around
+from bayeshaptic.diagnosis.hidden.suspects import linear_suspects
+from bayeshaptic.diagnosis.hidden.weighed import Weighed, weigh
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.types import Floats
+
+DRAWS = 400  # of the posterior that every effect is weighed with
+SENSITIVITY = (0.5, 2.0)  # factors on the prior probabilities
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """What one effect could be, unseen, and do to the limit.
+
+    Attributes
+    ----------
+    name, title, family, told_apart_by : str
+        The effect's.
+    prior, probability : float
+        That it is there, before and after the recording was looked at.
+    what, unit : str
+        What its strength is.
+    strength_q95 : float
+        With a probability of 95 % it is no larger, if it is there.
+    shift_db : tuple of float
+        What it does to K_CR, if it is there: 5 %, 50 % and 95 % points, dB.
+    pareto_k : float
+        Of the importance weights; above 0.7 these numbers are rough.
+    """
+
+    name: str
+    title: str
+    family: str
+    told_apart_by: str
+    prior: float
+    probability: float
+    what: str
+    unit: str
+    strength_q95: float
+    shift_db: tuple[float, float, float]
+    pareto_k: float
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What could hide in a recording.
+
+    Attributes
+    ----------
+    declared : CriticalStiffness
+        The limit if the model is exact.
+    nothing : float
+        Probability that there is nothing more, given the recording.
+    effects : tuple of HiddenEffect
+        The one that lowers the limit most comes first.
+    prior : HiddenPrior
+    sensitivity : mapping
+        Factor on the prior probabilities to 1, 5, 50 and 95 % points of K_CR.
+    """
+
+    declared: CriticalStiffness = field(repr=False)
+    nothing: float
+    effects: tuple[HiddenEffect, ...]
+    prior: HiddenPrior
+    sensitivity: dict[float, tuple[float, ...]]
+
+
+def with_hidden(
+    limit: CriticalStiffness,
+    posterior: Posterior,
+    etfe: Etfe,
+    tests: Sequence[Test],
+    found: Sequence[str],
+    prior: HiddenPrior,
+    seed: int = 0,
+) -> tuple[CriticalStiffness, Hidden] | None:
+    """The limit averaged over what could hide, and what that is.
+
+    None where no effect has a probability, and where the posterior does not come from windows of a
+    response: there is nothing to weigh an effect with.
+
+    Parameters
+    ----------
+    limit : CriticalStiffness
+        Of the declared model, and the accepted effects.
+    posterior : Posterior
+    etfe : Etfe
+    tests : sequence of Test
+        Of the residual that is left.
+    found : sequence of str
+        Names of the accepted effects: these do not hide.
+    prior : HiddenPrior
+    seed : int
+    """
+    if posterior.windows is None:
+        return None
+    rng = np.random.default_rng([seed, 15])
+    known = around(posterior, DRAWS, rng)
+    weighed = _weighed(known, etfe, tests, found, prior, rng)
+    if not weighed:
+        return None
+    looked = looked_at(weighed, known)
+    own = average(looked, prior)
+    samples = limit.samples * np.exp(own.log_factors(len(limit.samples), rng))
+    whole = replace(limit, samples=samples)
+    sensitivity = {}
+    for factor in SENSITIVITY:
+        other = average(looked, prior.times(factor))
+        moved = limit.samples * np.exp(other.log_factors(len(limit.samples), rng))
+        levels = replace(limit, samples=moved).quantile([0.01, 0.05, 0.5, 0.95])
+        sensitivity[factor] = tuple(float(level) for level in levels)
+    effects = _effects(own, prior, posterior)
+    return whole, Hidden(limit, own.nothing, effects, prior, sensitivity)
+
+
+def _weighed(
+    known: Around,
+    etfe: Etfe,
+    tests: Sequence[Test],
+    found: Sequence[str],
+    prior: HiddenPrior,
+    rng: np.random.Generator,
+) -> list[Weighed]:
+    model = known.model
+    rms = float(np.std(etfe.recording.force)) if etfe.recording is not None else 0.0
+    suspects = (*linear_suspects(model, etfe), *force_suspects(model, tests, found, rms))
+    every = [weigh(one, known, rng) for one in suspects if prior.of(one.name) > 0]
+    return every + [
+        weigh_drift(one, known, rng)
+        for one in drifts(model)
+        if prior.of(one.name) > 0 and one.name not in found
+    ]
+
+
+def _effects(
+    average: Average, prior: HiddenPrior, posterior: Posterior
+) -> tuple[HiddenEffect, ...]:
+    """One row an effect, its places together."""
+    present, rows, weighed = average.present, [], average.looked.weighed
+    for name in dict.fromkeys(one.name for one in weighed):
+        places = [i for i, one in enumerate(weighed) if one.name == name]
+        share = present[places] / max(float(present[places].sum()), 1e-300)
+        strength, factor = _pooled(weighed, places, share)
+        first, model = weighed[places[int(np.argmax(share))]], posterior.model
+        rows.append(
+            HiddenEffect(
+                name,
+                first.title,
+                first.family,
+                first.told_apart_by,
+                prior.of(name),
+                float(present[places].sum()),
+                first.what,
+                unit_of(first.dimension, model.force_unit, model.position_unit),
+                float(_quantile(np.abs(strength), 0.95)),
+                tuple(float(20 / np.log(10) * q) for q in _quantile(factor, [0.05, 0.5, 0.95])),  # type: ignore[arg-type]
+                max(weighed[i].pareto_k for i in places),
+            )
+        )
+    return tuple(sorted(rows, key=_widening, reverse=True))
+
+
+def _pooled(weighed: Sequence[Weighed], places: list[int], share: Floats) -> tuple[Floats, Floats]:
+    """Strengths and factors of an effect's places, as many of each as its probability says."""
+    strength, factor = [], []
+    for place, part in zip(places, share, strict=True):
+        one = weighed[place]
+        kept = np.linspace(0, len(one.strength) - 1, round(part * len(one.strength))).astype(int)
+        strength.append(one.strength[kept])
+        factor.append(one.log_factor[kept])
+    return np.concatenate(strength), np.concatenate(factor)
+
+
+def _quantile(values: Floats, levels: float | list[float]) -> Floats:
+    return np.asarray(np.quantile(values, levels)) if len(values) else np.zeros(np.shape(levels))
+
+
+def _widening(effect: HiddenEffect) -> float:
+    """How much it asks for: what lowers the limit first."""
+    low, _, high = effect.shift_db
+    return effect.probability * (max(-low, 0.0) + 0.1 * max(high, 0.0))

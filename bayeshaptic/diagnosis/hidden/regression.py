@@ -1,0 +1,185 @@
+"""How the parameters give way to an effect: regression over the posterior's own draws.
+
+With the effect at a certain strength the residuals change by g.  Around the posterior, normal
+with covariance C, where the slope of the residuals is J, the parameters move by -C J' g, and what
+they do not take up of g has the square g'(I - J C J')g: to first order in the parameters and to any
+order in the strength.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.inference.coordinates import Coordinates, coordinates, sampling_coordinates
+from bayeshaptic.inference.least_squares import weighted_residuals
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.models import Model, NearZero
+from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.stability.crossings import find_crossings
+from bayeshaptic.types import Floats
+
+_LEANS = 3.0  # standard deviations from its wall, from where a parameter may be moved
+_RIDGE = 1e-12
+_IMPOSSIBLE = 1e6
+
+
+@dataclass(frozen=True)
+class Around:
+    """A posterior, as the regression sees it.
+
+    Attributes
+    ----------
+    model : Model
+    windows : Windows
+    here : Coordinates
+    draws : ndarray, shape (M, P)
+        Some of the posterior's, natural values.
+    phi : ndarray, shape (M, P)
+        The same in the coordinates `here`.
+    log_density : ndarray, shape (M,)
+        Of the posterior there, in these coordinates, up to a constant.
+    centre : ndarray, shape (P,)
+        Their mean.
+    left : ndarray, shape (N,)
+        Residuals at the centre, of unit variance.
+    slope : ndarray, shape (N, P)
+        Of the residuals there.
+    root : ndarray, shape (F, P)
+        A root of the covariance, root' root, without the parameters that lean on a wall: these
+        stay where they are, so that no draw is pushed through the wall.
+    pull : ndarray, shape (F, N)
+        root J'.
+    """
+
+    model: Model
+    windows: Windows
+    here: Coordinates
+    draws: Floats = field(repr=False)
+    phi: Floats = field(repr=False)
+    log_density: Floats = field(repr=False)
+    centre: Floats = field(repr=False)
+    left: Floats = field(repr=False)
+    slope: Floats = field(repr=False)
+    root: Floats = field(repr=False)
+    pull: Floats = field(repr=False)
+
+    @property
+    def theta(self) -> Floats:
+        """The centre in natural values, shape (P,)."""
+        return np.asarray(self.here.natural(self.centre[None])[0])
+
+    @cached_property
+    def log_limit(self) -> Floats:
+        """ln K_CR of the draws, shape (M,)."""
+        return log_limits(self.model, self.draws)
+
+    def natural(self, phi: Floats) -> Floats:
+        """Natural values at `phi`, (B, P); where steps went too far, infinite ones."""
+        with np.errstate(over="ignore"):
+            return self.here.natural(phi)
+
+    def changes(self, model: Model, vectors: Floats, moved: Floats | None = None) -> Floats:
+        """Change g of the residuals, (C, N): of extended `model` at (C, P').
+
+        With the parameters `moved`, (C, P), what the slope does not account for.
+        """
+        residuals = weighted_residuals(Likelihood(model, self.windows), coordinates(model))
+        with np.errstate(all="ignore"):
+            found = residuals(coordinates(model).coordinate(vectors)) - self.left
+        if moved is not None:
+            found -= moved @ self.slope.T
+        return np.where(np.isfinite(found), found, _IMPOSSIBLE)
+
+    def density(self, model: Model, vectors: Floats, phi: Floats) -> Floats:
+        """Log posterior density in `here`, (B,): of extended `model` with the base at `phi`."""
+        value = np.full(len(phi), -np.inf)
+        inside = self.here.inside(phi)
+        with np.errstate(all="ignore"):  # far-away vectors may overflow
+            value[inside] = (
+                self.model.log_prior(self.here.natural(phi[inside]))
+                + self.here.log_jacobian(phi[inside])
+                + Likelihood(model, self.windows)(vectors[inside])
+            )
+        return np.where(np.isfinite(value), value, -np.inf)
+
+    def power(self, changes: Floats) -> Floats:
+        """Squares of what the parameters cannot take up, shape (C,)."""
+        absorbed = changes @ self.pull.T
+        power = np.einsum("cn,cn->c", changes, changes) - np.einsum("cf,cf->c", absorbed, absorbed)
+        return np.maximum(power, 0.0)
+
+    def moved(self, changes: Floats) -> Floats:
+        """How far the parameters give way, in `here`, shape (C, P)."""
+        return -(changes @ self.pull.T) @ self.root
+
+    def overlap(self, one: Floats, other: Floats) -> Floats:
+        """What two effects at once take off the sum of their log evidences, shape (A, B)."""
+        return one @ other.T - (one @ self.pull.T) @ (other @ self.pull.T).T
+
+
+def log_limits(model: Model, vectors: Floats) -> Floats:
+    """ln K_CR of parameter vectors (B, P); -inf where never stable, inf where nothing limits it."""
+    assert model.period_s is not None
+    with np.errstate(divide="ignore"):
+        return np.log(find_crossings(model.system(vectors), model.period_s).critical)
+
+
+def around(posterior: Posterior, count: int, rng: np.random.Generator) -> Around:
+    """The regression of a posterior that was sampled from windows, over `count` draws."""
+    model, windows = posterior.model, posterior.windows
+    assert windows is not None
+    every = posterior.draws
+    draws = every[rng.permutation(len(every))[: min(count, len(every))]]
+    here = sampling_coordinates(model, draws.mean(axis=0), draws.std(axis=0))
+    likelihood = Likelihood(model, windows)
+    phi = here.coordinate(draws)
+    centre = phi.mean(axis=0)
+    residuals = weighted_residuals(likelihood, here)
+    left = residuals(centre[None])[0]
+    slope = jacobian(residuals, centre[None])[0]
+    curvature = _curvature(model, here, centre, phi.std(axis=0))
+    root = _root(slope, curvature, ~_leaning(model, here, phi))
+    nothing = np.zeros(len(draws))
+    known = here, draws, phi, nothing, centre, left, slope, root, root @ slope.T
+    found = Around(model, windows, *known)
+    return replace(found, log_density=found.density(model, draws, phi))
+
+
+def _leaning(model: Model, here: Coordinates, phi: Floats) -> NDArray[np.bool_]:
+    """Which parameters lean on a wall, shape (P,)."""
+    ends = here.walls | np.array([isinstance(model.prior(n), NearZero) for n in model.names])
+    with np.errstate(invalid="ignore"):
+        room = phi.mean(axis=0) - here.low
+    return ends & (room < _LEANS * phi.std(axis=0))
+
+
+def _root(slope: Floats, curvature: Floats, free: NDArray[np.bool_]) -> Floats:
+    """Of the covariance of the free coordinates, the others known, shape (F, P).
+
+    From slope and prior, not from the draws: what an effect and the parameters share may be a
+    hundred standard deviations, and the covariance of some hundred draws is right to some per cent.
+    """
+    normal = slope[:, free].T @ slope[:, free] + np.diag(curvature[free])
+    scale = 1 / np.sqrt(np.diag(normal))
+    values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
+    out = np.zeros((int(free.sum()), len(free)))
+    out[:, free] = (vectors / np.sqrt(np.maximum(values, _RIDGE))).T * scale
+    return out
+
+
+def _curvature(model: Model, here: Coordinates, centre: Floats, spread: Floats) -> Floats:
+    """Of the log prior at the centre, downwards, shape (P,); none where it bends upwards."""
+    steps = np.concatenate([np.zeros((1, len(centre))), np.diag(spread), -np.diag(spread)])
+    points = centre + 0.5 * steps
+    with np.errstate(all="ignore"):
+        value = model.log_prior(here.natural(points)) + here.log_jacobian(points)
+        bend = (value[1 : len(centre) + 1] + value[len(centre) + 1 :] - 2 * value[0]) / (
+            0.5 * spread
+        ) ** 2
+    return np.where(np.isfinite(bend), np.maximum(-bend, 0.0), 0.0)

@@ -1,0 +1,154 @@
+"""The posterior of one effect: its sizes, its evidence, and how far it moves the limit.
+
+Sizes are drawn by what the regression says of them, the posterior's draws are moved along, and both
+are weighed by the real likelihood and the real priors: importance sampling, whose weights' mean is
+the evidence against nothing more (D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4,
+1992, for what that is; A. Vehtari et al., JMLR 25, 2024, for how it is checked).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bayeshaptic.diagnosis.hidden.regression import Around, log_limits
+from bayeshaptic.diagnosis.hidden.sizes import sizes_of
+from bayeshaptic.diagnosis.hidden.suspects import Suspect
+from bayeshaptic.numerics.pareto import pareto_k
+from bayeshaptic.types import Floats, Ints
+
+KEPT = 200  # equally weighted draws of an effect
+PAIRED = 5  # every so many of them meet those of another effect
+_BOLD = 0.25  # share of the sizes that are drawn from the flatter distribution
+# Steps of Gauss and Newton towards where the parameters give way to: of few cases, and of many.
+_STEPS, _FEW, _STEPS_EACH = 8, 200, 2
+_FARTHEST = 5.0  # log stiffness: a factor of 150 either way is far enough
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What the recording says of an effect, if it is there.
+
+    Attributes
+    ----------
+    name, title, family, told_apart_by : str
+        The effect's.
+    what, dimension : str
+        What its strength is, in words and as `unit_of` knows it.
+    share : float
+        Of the effect's prior probability.
+    log_evidence : float
+        Over that of nothing more.
+    pareto_k : float
+        Above 0.7 the evidence is not known.
+    strength : ndarray, shape (KEPT,)
+        Equally weighted draws.
+    log_factor : ndarray, shape (KEPT,)
+        What each does to ln K_CR.
+    changes : ndarray, shape (KEPT / PAIRED, N)
+        Of the residuals, before the parameters give way, by some of them.
+    """
+
+    name: str
+    title: str
+    family: str
+    told_apart_by: str
+    what: str
+    dimension: str
+    share: float
+    log_evidence: float
+    pareto_k: float
+    strength: Floats = field(repr=False)
+    log_factor: Floats = field(repr=False)
+    changes: Floats = field(repr=False)
+
+
+def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
+    """The posterior of one effect."""
+    sizes = sizes_of(suspect, known)
+    moved, changes = _followed(suspect, known, sizes.own)
+    said = np.log(sizes.weight)
+    if suspect.tested is not None:
+        said = said + suspect.tested.log_likelihood(sizes.strength)
+    there = known.centre + moved
+    vectors = suspect.vectors(known.natural(there), sizes.own)
+    guess = known.density(suspect.model, vectors, there)
+    cells, log_share = _drawn(said + guess, len(known.phi), rng)
+    phi = known.phi + moved[cells]
+    theta = known.natural(phi)
+    vectors = suspect.vectors(theta, sizes.own[cells])
+    target = known.density(suspect.model, vectors, phi)
+    log_weight = said[cells] - log_share + target - known.log_density
+    possible = np.isfinite(log_weight)
+    top = float(log_weight.max())
+    weight = np.exp(log_weight - top) if np.isfinite(top) else np.full(len(phi), 1.0)
+    evidence = top + float(np.log(weight.mean()))
+    kept = rng.permutation(systematic(weight, KEPT, rng))
+    factor = _log_factor(suspect, known, vectors, theta, kept)
+    return Weighed(
+        suspect.name,
+        suspect.title,
+        suspect.family,
+        suspect.told_apart_by,
+        suspect.unseen.title,
+        suspect.unseen.dimension,
+        suspect.share,
+        evidence,
+        pareto_k(log_weight[possible]) if possible.sum() > 50 else np.inf,
+        sizes.strength[cells][kept],
+        factor,
+        changes[cells[kept[::PAIRED]]],
+    )
+
+
+def _followed(suspect: Suspect, known: Around, own: Floats) -> tuple[Floats, Floats]:
+    """Where the parameters go with every size of an effect, (C, P); what changed, (C, N)."""
+    moved = np.zeros((len(own), len(known.centre)))
+    for _ in range(_STEPS if len(own) <= _FEW else _STEPS_EACH):
+        vectors = suspect.vectors(known.natural(known.centre + moved), own)
+        changes = known.changes(suspect.model, vectors, moved)
+        moved = known.moved(changes)
+    return moved, changes
+
+
+def _drawn(log_weight: Floats, count: int, rng: np.random.Generator) -> tuple[Ints, Floats]:
+    """Cells by their weight, some by a flatter one; and the log probability of each drawn."""
+    sharp = _normalised(log_weight)
+    share = (1 - _BOLD) * sharp + _BOLD * _normalised(0.5 * log_weight)
+    cells = rng.permutation(systematic(share, count, rng))
+    return cells, np.log(share[cells])
+
+
+def _normalised(log_weight: Floats) -> Floats:
+    top = log_weight.max()
+    weight = np.exp(log_weight - top) if np.isfinite(top) else np.ones(len(log_weight))
+    return weight / weight.sum()
+
+
+def systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
+    """`count` indices, each as often as its weight says, in ascending order."""
+    edges = np.cumsum(weight / weight.sum())
+    edges[-1] = 1.0
+    return np.searchsorted(edges, (np.arange(count) + rng.uniform()) / count)
+
+
+def _log_factor(
+    suspect: Suspect, known: Around, vectors: Floats, theta: Floats, kept: Ints
+) -> Floats:
+    """ln K_CR of the kept draws over that of the same draws without the effect.
+
+    What the weights alone do to the parameters, which a factor on every draw would not show, is
+    added to it on average.
+    """
+    used, place = np.unique(kept, return_inverse=True)
+    own = known.log_limit
+    if suspect.counts:
+        new = log_limits(suspect.model, vectors[used])
+    else:
+        new = log_limits(known.model, theta[used])
+    with np.errstate(invalid="ignore"):
+        factor = np.clip(new - own[used], -_FARTHEST, _FARTHEST)
+    factor = np.where(np.isnan(factor), 0.0, factor)
+    drift = float(own[kept].mean() - own.mean()) if np.isfinite(own).all() else 0.0
+    return np.asarray(factor[place] + drift)

@@ -1,0 +1,65 @@
+"""What an effect may be where nobody has seen it: its shapes, and how large it could be at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayeshaptic.types import Floats
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """An effect of any strength: what it could look like.
+
+    Attributes
+    ----------
+    dimension, title : str
+        Of the strength, see `unit_of`; zero is no effect.
+    largest : float
+        Of the strength; a device with more is another device.
+    own : callable
+        From strengths (C,) and shapes (C, K) to the values of the effect's parameters, (C, p).
+    shapes : ndarray, shape (S, K)
+        Everything else that is not known of it: a mode's frequency and damping.
+    weight : ndarray, shape (S,)
+        Probability of each shape.
+    lowest : float
+        Least strength, below zero where it may have either sign.
+    """
+
+    dimension: str
+    title: str
+    largest: float
+    own: Callable[[Floats, Floats], Floats] = field(repr=False)
+    shapes: Floats = field(default_factory=lambda: np.zeros((1, 0)), repr=False)
+    weight: Floats = field(default_factory=lambda: np.ones(1), repr=False)
+    lowest: float = 0.0
+
+
+def alone(strength: Floats, shapes: Floats) -> Floats:
+    """Of an effect whose one parameter is its strength."""
+    return strength[:, None]
+
+
+def combined(*axes: ArrayLike, weights: Any = None) -> tuple[Floats, Floats]:
+    """Every combination of values on the axes, (S, axes), with probabilities (S,).
+
+    Parameters
+    ----------
+    *axes : array_like
+    weights : sequence of array_like, optional
+        Of each axis's values; by default all alike.
+    """
+    given = [np.ones(np.shape(axis)) for axis in axes] if weights is None else weights
+    values = [np.asarray(axis, float) for axis in axes]
+    table = np.stack([a.ravel() for a in np.meshgrid(*values, indexing="ij")], axis=1)
+    share = np.ones(1)
+    for one in given:
+        one = np.asarray(one, float)
+        share = np.outer(share, one / one.sum()).ravel()
+    return table, share

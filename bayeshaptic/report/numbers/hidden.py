@@ -1,0 +1,58 @@
+"""Numbers of what could hide, as a person writes them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from bayeshaptic.report.numbers.quantities import estimate, quantity
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.hidden.hidden import HiddenEffect
+    from bayeshaptic.stability.critical import CriticalStiffness
+
+FEW = 0.005  # dB below which nothing moves the limit
+
+
+def in_short(analysis: Analysis) -> str:
+    """A fact of the first screen; empty where nothing was asked."""
+    hidden = analysis.hidden
+    if hidden is None:
+        return ""
+    first = next(iter(hidden.effects), None)
+    text = f"{interval_of(hidden.declared)} if the model is exact"
+    if first is None or reach(first) < FEW:
+        return text
+    shift = min(first.shift_db[0], 0.0) if first.shift_db[0] < 0 else first.shift_db[2]
+    return f"{text}; most of the difference is {first.title}, unseen {size(first)} ({db(shift)} dB)"
+
+
+def interval_of(limit: CriticalStiffness) -> str:
+    """Median and 90 % interval."""
+    low, middle, high = limit.quantile([0.05, 0.5, 0.95])
+    if not all(math.isfinite(value) for value in (low, middle, high)):
+        return "not bounded above"
+    return estimate(middle, low, high, limit.unit)
+
+
+def reach(effect: HiddenEffect) -> float:
+    """How far it could move the limit, dB."""
+    return max(abs(shift) for shift in effect.shift_db)
+
+
+def size(effect: HiddenEffect) -> str:
+    """The size that it does not exceed, in words."""
+    return f"up to {strength(effect)}"
+
+
+def strength(effect: HiddenEffect) -> str:
+    """The size that it does not exceed, with its unit; shares in per cent."""
+    if effect.unit:
+        return quantity(effect.strength_q95, effect.unit, digits=2)
+    return f"{100 * effect.strength_q95:.2g} %"
+
+
+def db(shift: float) -> str:
+    """With its sign."""
+    return f"{shift:+.3f}".replace("-", "\N{MINUS SIGN}")

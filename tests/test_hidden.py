@@ -1,0 +1,175 @@
+"""What could hide: its evidence by brute force, its average by hand, and the limit it gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linear_bench import RIGID, Device
+
+from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.hidden.average import average, looked_at
+from bayeshaptic.diagnosis.hidden.forces import slope_of
+from bayeshaptic.diagnosis.hidden.hidden import with_hidden
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
+from bayeshaptic.diagnosis.hidden.regression import around
+from bayeshaptic.diagnosis.hidden.sizes import sizes_of
+from bayeshaptic.diagnosis.hidden.suspects import ForceSaid, Suspect, linear_suspects
+from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, weigh
+from bayeshaptic.effects.library import effect_class
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference import least_squares, sample
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.study import read_study
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.stability.critical import critical_stiffness
+
+
+@pytest.fixture(scope="module")
+def rigid() -> Posterior:
+    """A posterior of two parameters."""
+    rng = np.random.default_rng(2)
+    force = rng.normal(size=8000)
+    position = Device(RIGID).simulate(force)
+    position = position + 1e-3 * position.std() * rng.normal(size=len(position))
+    etfe = estimate_etfe(recording_from_arrays(force, position, 1e-3), (1.0, 200.0))
+    fit = least_squares(build_model("rigid", delay_s=2e-4, period_s=1e-3), etfe)
+    return sample(fit.model, etfe, start=fit, ess=1000)
+
+
+def suspect_in(posterior: Posterior, name: str) -> Suspect:
+    assert posterior.etfe is not None
+    found = linear_suspects(posterior.model, posterior.etfe)
+    return next(one for one in found if one.name == name)
+
+
+@pytest.mark.parametrize("name", ["extra_delay", "centring_stiffness", "actuator_lag"])
+def test_evidence_is_what_an_integral_over_everything_gives(rigid: Posterior, name: str) -> None:
+    suspect = suspect_in(rigid, name)
+    known = around(rigid, 400, np.random.default_rng(1))
+    found = weigh(suspect, known, np.random.default_rng(1))
+    sizes = sizes_of(suspect, known)
+    # Both parameters over a grid that holds every place that the effect may push them to.
+    spread = rigid.draws.std(axis=0)
+    axes = [m + s * np.linspace(-14, 14, 90) for m, s in zip(known.theta, spread, strict=True)]
+    grid = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
+    grid = grid[np.all(grid > 0, axis=1)]
+    prior = rigid.model.log_prior(grid)
+    base = Likelihood(rigid.model, known.windows)(grid) + prior
+    likelihood = Likelihood(suspect.model, known.windows)
+    weight, each = 0.0, np.zeros(len(sizes.weight))
+    for number, own in enumerate(sizes.own):
+        vectors = suspect.vectors(grid, np.repeat(own[None], len(grid), axis=0))
+        each[number] = np.exp(likelihood(vectors) + prior - base.max()).sum()
+    weight = np.exp(base - base.max()).sum()
+    exact = np.log(sizes.weight @ each / weight)
+    assert found.log_evidence == pytest.approx(exact, abs=0.15)
+    assert found.pareto_k < 0.7
+    share = sizes.weight * each
+    order = np.argsort(np.abs(sizes.strength))
+    edges = np.cumsum(share[order]) / share.sum()
+    exact95 = np.abs(sizes.strength)[order][np.searchsorted(edges, 0.95)]
+    assert np.quantile(np.abs(found.strength), 0.95) == pytest.approx(exact95, rel=0.15)
+
+
+def weighed(name: str, evidence: float, changes: np.ndarray, factor: float = 0.0) -> Weighed:
+    about = name, name, "linear", "", "", "number", 1.0
+    rows = np.repeat(changes[None], KEPT // PAIRED, axis=0)
+    return Weighed(*about, evidence, 0.0, np.ones(KEPT), np.full(KEPT, factor), rows)
+
+
+def test_the_average_of_effects_that_share_nothing_is_bayes_rule_for_each(rigid: Posterior) -> None:
+    known = around(rigid, 200, np.random.default_rng(1))
+    _, _, right = np.linalg.svd(known.pull)
+    apart = right[-2:]  # directions of the residuals that no parameter takes up
+    evidence, prior = (1.0, -2.0), HiddenPrior(0.2)
+    looked = looked_at(
+        [
+            weighed("extra_delay", evidence[0], apart[0], -0.1),
+            weighed("reflex", evidence[1], apart[1]),
+        ],
+        known,
+    )
+    found = average(looked, prior)
+    odds = 0.25 * np.exp(evidence)
+    assert found.present == pytest.approx(odds / (1 + odds), rel=1e-6)
+    assert found.nothing == pytest.approx(1 / np.prod(1 + odds), rel=1e-6)
+    factors = found.log_factors(10_000, np.random.default_rng(0))
+    assert np.mean(factors < -0.05) == pytest.approx(found.present[0], abs=2e-3)
+
+
+def test_two_effects_that_explain_the_same_are_hardly_both_there(rigid: Posterior) -> None:
+    known = around(rigid, 200, np.random.default_rng(1))
+    same = 3 * np.linalg.svd(known.pull)[2][-1]
+    looked = looked_at(
+        [weighed("extra_delay", 4.0, same), weighed("actuator_lag", 4.0, same)], known
+    )
+    found = average(looked, HiddenPrior(0.2))
+    assert looked.gain[0, 1] == pytest.approx(-9.0, rel=1e-6)
+    assert found.pair[0, 1] < 0.05 * found.single.sum()
+
+
+def test_with_no_probability_the_limit_is_the_declared_one(rigid: Posterior) -> None:
+    assert rigid.etfe is not None
+    limit = critical_stiffness(rigid)
+    assert with_hidden(limit, rigid, rigid.etfe, (), (), HiddenPrior(0.0)) is None
+    tiny = with_hidden(limit, rigid, rigid.etfe, (), (), HiddenPrior(1e-9))
+    assert tiny is not None
+    assert np.array_equal(tiny[0].samples, limit.samples) and tiny[1].nothing > 0.999999
+
+
+def test_a_lag_that_no_test_sees_is_allowed_for() -> None:
+    """The declared interval lies beside the truth, on the unsafe side."""
+    bench = Bench.from_device("phantom", held=True)
+    bench = bench.with_effect("actuator_lag", time_constant_s=15e-6)
+    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 10.0)
+    made = simulate(bench, noise, seed=6)
+    recording = recording_from_arrays(
+        made.force,
+        made.position,
+        made.period_s,
+        force_unit=made.force_unit,
+        position_unit=made.position_unit,
+        encoder_resolution=bench.encoder_resolution,
+    )
+    closed = close_loop(recording, "grasped", device="phantom")
+    assert closed.verdict == "consistent"
+    truth, analysis = bench.true_critical_stiffness(), closed.analysis
+    assert truth < analysis.declared.quantile(0.01)
+    assert analysis.limit.quantile(0.05) < truth < analysis.limit.quantile(0.95)
+    assert analysis.limit.safe(0.01) < truth
+    assert analysis.hidden is not None and analysis.hidden.nothing < 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "slope"), [("coulomb_friction", -np.sqrt(2 / np.pi)), ("cubic_damping", -3.0)]
+)
+def test_a_force_stands_in_the_fit_as_its_describing_function(name: str, slope: float) -> None:
+    shape = effect_class(name).tests[0]
+    assert slope_of(shape.force) == pytest.approx(slope, rel=0.02)
+
+
+def test_what_a_test_says_of_a_strength_is_its_likelihood() -> None:
+    seen = ForceSaid(0.3, 0.1)
+    strength = np.array([0.0, 0.3, 0.6])
+    assert seen.log_likelihood(strength) == pytest.approx([0.0, 4.5, 0.0])
+
+
+def test_probabilities_of_a_study(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time_s,force_n,position_m\n")
+    text = '[device]\nname = "lhifam"\n[effects]\nextra_delay = {p}\neach = 0.01\n'
+    file = tmp_path / "study.toml"
+    file.write_text(text.format(p=0.3) + '[[recording]]\nfile = "a.csv"\n')
+    prior = HiddenPrior.from_table(read_study(file).effects)
+    assert prior.of("extra_delay") == 0.3 and prior.of("reflex") == 0.01
+    assert prior.times(2.0).of("extra_delay") == 0.5
+    file.write_text(text.format(p=1.5) + '[[recording]]\nfile = "a.csv"\n')
+    with pytest.raises(InputError, match="extra_delay.*probability"):
+        read_study(file)
+    with pytest.raises(InputError, match="did you mean extra_delay"):
+        HiddenPrior.from_table({"extra_dela": 0.1})
