@@ -36,9 +36,11 @@ class Case:
     device : str
     friction : bool
     answer : float
-        Of a closed loop: share of the force's power that answers to what the reference does not
-        cause (friction, the hand, counts of the encoder). It is this share that biases.
+        Of a closed loop: share of the force's power that answers to chance, which is what the hand
+        and the counts of the encoder do. It is this share that biases: friction alone moves with
+        the force, and an open loop with the same force shows the same motion.
     recording : Recording
+    bench : Bench
     """
 
     closed: bool
@@ -49,6 +51,15 @@ class Case:
     friction: bool
     answer: float
     recording: Recording
+    bench: Bench
+
+    @property
+    def weight(self) -> float:
+        """Power of the force's answer to chance, over that of the chance of one sample in all.
+
+        Its root bounds the bias of any parameter, in standard deviations, for a white force.
+        """
+        return self.answer * self.recording.samples
 
 
 def open_case(seed: int) -> Case:
@@ -62,8 +73,8 @@ def open_case(seed: int) -> Case:
         logged = LOGGED[rng.choice(3, p=(0.5, 0.25, 0.25))]
         if np.ptp(made.position) > _FEWEST_COUNTS * bench.encoder_resolution:
             break
-    recording = _logged(made.force, made.position, bench, logged)
-    return Case(False, kind, "", logged, device, friction, 0.0, recording)
+    recording = written_down(made.force, made.position, bench, logged)
+    return Case(False, kind, "", logged, device, friction, 0.0, recording, bench)
 
 
 def closed_case(seed: int) -> Case:
@@ -81,10 +92,10 @@ def closed_case(seed: int) -> Case:
         whole = len(made.force) >= round(seconds / bench.period_s) - 1
         if whole and np.ptp(made.position) > _FEWEST_COUNTS * bench.encoder_resolution:
             break
-    ideal = run_loop(replace(bench.quiet(), effects=()), controller(), seconds, noise)
+    ideal = run_loop(bench.quiet(), controller(), seconds, noise)
     answer = _answer(made.force, ideal.force)
-    recording = _logged(made.force, made.position, bench, logged)
-    return Case(True, kind, reference, logged, device, friction, answer, recording)
+    recording = written_down(made.force, made.position, bench, logged)
+    return Case(True, kind, reference, logged, device, friction, answer, recording, bench)
 
 
 def _bench(rng: np.random.Generator) -> tuple[Bench, str, bool]:
@@ -218,11 +229,12 @@ def _controller(
 
 
 def _answer(force: Floats, ideal: Floats) -> float:
-    """Share of a force's power that an ideal device would not have caused."""
+    """Share of a force's power that a device without noise would not have caused."""
     return float(np.var(force - ideal) / np.var(force))
 
 
-def _logged(force: Floats, position: Floats, bench: Bench, logged: str) -> Recording:
+def written_down(force: Floats, position: Floats, bench: Bench, logged: str) -> Recording:
+    """The recording, with each position beside the force that `logged` says."""
     if logged == "a sample early":
         force, position = force[:-1], position[1:]
     elif logged == "a sample late":

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.types import Bools, Floats
+from bayeshaptic.types import Bools, Floats, Ints
 
 _LAGS_OF_ITSELF = 60
 # The other signal by differences over wider and wider spans: each coefficient more costs a share of
@@ -60,6 +60,8 @@ class Prediction:
         What both pasts do not tell of the other signal now, and one, three and six samples later.
     stretch : ndarray of bool, shape (rows,)
         Which of the two halves a row belongs to.
+    rows : ndarray of int, shape (rows,)
+        Samples that were predicted.
     """
 
     own: Floats
@@ -67,6 +69,7 @@ class Prediction:
     cut: Floats
     other: Floats
     stretch: Bools
+    rows: Ints
 
     def past(self, floor: float) -> Share:
         """Share of the error (variance) that the other's past removes.
@@ -155,7 +158,7 @@ def predict(target: Floats, other: Floats, left_out: Bools | None = None) -> Pre
                 cut[rest] = beyond
         weights = _least_squares(columns[fitted], beside[fitted])
         new[:, rest] = (beside[rest] - columns[rest] @ weights).T
-    return Prediction(errors[0], errors[1], cut, new, half)
+    return Prediction(errors[0], errors[1], cut, new, half, rows)
 
 
 def _regressors(
@@ -209,15 +212,21 @@ def _least_squares(columns: Floats, wanted: Floats, weight: Floats | None = None
 
 def _correlation(one: Floats, other: Floats) -> Share:
     """Correlation without what lies beyond the usual size in either."""
-    cuts = [_CUT * np.quantile(np.abs(s), _USUAL) for s in (one, other)]
-    kept = (np.abs(one) <= cuts[0]) & (np.abs(other) <= cuts[1])
-    a, b = np.where(kept, one, 0.0), np.where(kept, other, 0.0)
+    a, b = within_the_usual(one), within_the_usual(other)
+    kept = (a != 0) & (b != 0)
+    a, b = np.where(kept, a, 0.0), np.where(kept, b, 0.0)
     if min(float(np.mean(a * a)), float(np.mean(b * b))) < _DUST:
         return Share(0.0, 0.0)
     starts, tiny = _blocks(len(a)), _TINY
     product, left, right = (np.add.reduceat(v, starts) for v in (a * b, a * a, b * b))
     value = product.sum() / np.sqrt(left.sum() * right.sum() + tiny)
     return Share(float(value), _z(product / np.sqrt(left * right + tiny)))
+
+
+def within_the_usual(signal: Floats) -> Floats:
+    """A signal with zeros where it lies beyond its usual size."""
+    size = np.abs(signal)
+    return np.where(size <= _CUT * np.quantile(size, _USUAL), signal, 0.0)
 
 
 def _z(votes: Floats) -> float:

@@ -1,0 +1,83 @@
+"""Whether what is new in the force answers to what was new in the position before.
+
+Where both are predicted as well as their pasts allow, nothing of the one that is left may be
+correlated with the other one's past (L. D. Haugh, *JASA* 71, 1976). A past that one prediction
+lacks does no harm while the other has it: errors of both together are needed to feign an answer,
+so that far less than a share of the force can be seen than by comparing two predictions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.recordings.signals.prediction import Prediction, within_the_usual
+from bayeshaptic.types import Floats
+
+# Samples later at which the force answers: sums over wider and wider spans, fewer than the
+# prediction of the force reaches back.
+_SPANS = ((1, 2), (2, 3), (3, 5), (5, 9), (9, 17), (17, 33))
+_LAST = _SPANS[-1][1]
+# A force that is predicted to less than this (of its increments' power), or not at all, has
+# nothing new in it that chance made; nor has one whose news come in jumps, or foretell each other.
+_FAINTEST, _STRONGEST = 2.5e-3, 1.2
+_IN_JUMPS = 0.1
+_FORETOLD = 5e-3
+
+
+@dataclass(frozen=True)
+class News:
+    """The answer of the force's news to those of the position.
+
+    Attributes
+    ----------
+    evidence : float
+        Chi-square of six spans of delay, and of an answer against the motion within the sample;
+        zero where the force is not such that it can be told.
+    """
+
+    evidence: float
+
+
+def news(of_force: Prediction, of_position: Prediction) -> News:
+    """Correlate the force's news with earlier ones of the position.
+
+    Parameters
+    ----------
+    of_force, of_position : Prediction
+        Each from both pasts; the position of all samples.
+
+    Returns
+    -------
+    News
+    """
+    force, position = (within_the_usual(e) for e in (of_force.own, of_position.full))
+    usual = 1 - _power(force) / max(_power(of_force.own), np.finfo(float).tiny) < _IN_JUMPS
+    if not (usual and _FAINTEST < _power(of_force.own) < _STRONGEST and _is_white(force)):
+        return News(0.0)
+    force, position = force - force.mean(), position - position.mean()
+    # Row k of the force among those of the position.
+    at = np.searchsorted(of_position.rows, of_force.rows)
+    inside = at >= _LAST
+    force, at = force[inside], at[inside]
+    summed = np.concatenate([[0.0], np.cumsum(position)])
+    found = [_z(force * (summed[at - low + 1] - summed[at - high + 1])) for low, high in _SPANS]
+    against = min(_z(force * position[at]), 0.0)
+    return News(float(np.sum(np.square([*found, against]))))
+
+
+def _power(signal: Floats) -> float:
+    return float(np.mean(signal**2))
+
+
+def _is_white(signal: Floats) -> bool:
+    """Whether a signal hardly foretells itself, as far as the spans reach."""
+    centred = signal - signal.mean()
+    power = centred @ centred + np.finfo(float).tiny
+    own = [centred[lag:] @ centred[:-lag] / power for lag in range(1, _LAST)]
+    return float(np.sum(np.square(own))) < 2 * _LAST / len(signal) + _FORETOLD
+
+
+def _z(products: Floats) -> float:
+    return float(products.sum() / (np.sqrt(products @ products) + np.finfo(float).tiny))
