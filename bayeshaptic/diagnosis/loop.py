@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+import numpy as np
+
 from bayeshaptic.diagnosis import acceptance
 from bayeshaptic.diagnosis.battery import is_periodic
 from bayeshaptic.diagnosis.periodic.lines import LineTrials
@@ -60,7 +62,7 @@ def trace(
 
     Each round tests the residual, tries the candidates of every class that a test raises, each
     fitted to half of the windows, and accepts the one that best predicts another quarter, unless
-    it raises the held-out error; then takes out again what that made needless; until nothing is
+    it raises the error held out or that of all windows; then takes out again what that made needless; until nothing is
     raised, nothing convinces, or the budget is spent.
 
     Parameters
@@ -127,7 +129,7 @@ class _Loop:
         Tried again after every round: what the model lacked may have looked like a fault.
         """
         mended = self.kind.mended(state)
-        if mended is state or self._raises(held_out_rms(state.fit, CHOOSE), mended):
+        if mended is state or self._raises(_errors(state), mended):
             return state, tests
         new = mended.accepted[len(state.accepted) :]
         self.candidates += [
@@ -147,8 +149,8 @@ class _Loop:
                 left[id(trial)] = self._remaining(trial.state)
             return left[id(trial)]
 
-        error = held_out_rms(state.fit, CHOOSE)
-        open_ = [t for t in trials if t.convincing and not self._raises(error, t.state)]
+        errors = _errors(state)
+        open_ = [t for t in trials if t.convincing and not self._raises(errors, t.state)]
         chosen = acceptance.choose(open_, lambda trial: acceptance.excess(remaining(trial)))
         self.candidates += [
             Candidate(t.name, t.accepted.title, t.score, t is chosen, self.number)
@@ -175,14 +177,22 @@ class _Loop:
     def _remaining(self, state: State) -> tuple[Test, ...]:
         return acceptance.remaining(self.kind.tests(state), state.accepted, self.seen)
 
-    def _raises(self, error: float, after: State) -> bool:
-        return acceptance.raises_error(error, held_out_rms(after.fit, CHOOSE))
+    def _raises(self, before: tuple[float, float], after: State) -> bool:
+        return any(map(acceptance.raises_error, before, _errors(after)))
 
     def _tick(self, what: str) -> None:
         if self.progress:
             # Each round is half of what is left: nobody knows how many there will be.
             share = 1 - 0.5 ** (self.number - 1)
             self.progress(share, f"round {self.number}: trying {what}")
+
+
+def _errors(state: State) -> tuple[float, float]:
+    """Weighted rms on windows that took no part in the fit, and on all: neither may rise.
+
+    A quarter of the windows may get better at the expense of the others.
+    """
+    return held_out_rms(state.fit, CHOOSE), float(np.sqrt(state.fit.reduced_chi_square))
 
 
 def _statistic(name: str, tests: tuple[Test, ...]) -> float:

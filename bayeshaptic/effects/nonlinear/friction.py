@@ -205,7 +205,9 @@ def _power(power: int) -> Callable[[Floats], Floats]:
 
 def _resistance(power: int) -> Shape:
     title = f"drag {{where}} with power {power} of the velocity"
-    return Shape(f"drag_{power}", title, VELOCITY, _power(power), f"{{force}} ({{x}}/s)^-{power}")
+    unit = f"{{force}} ({{x}}/s)^-{power}"
+    # A drag below zero would drive the motion.
+    return Shape(f"drag_{power}", title, VELOCITY, _power(power), unit, positive=True)
 
 
 @register
