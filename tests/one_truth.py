@@ -91,6 +91,10 @@ def _what_is_stated_is_stated_everywhere(page: str, found: Any, limits: Any) -> 
                 assert column is None
             elif column is not None:
                 assert column[0] == pytest.approx(stiffness, rel=1e-5)
+    reason = found["critical_stiffness"]["reason"]
+    assert ("None is stated" in page) is (reason is not None)
+    if reason is not None:
+        return
     unstated = None in found["critical_stiffness"]["safe"].values()
     assert ("too few draws to say" in page) >= unstated
 

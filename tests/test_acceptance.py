@@ -18,9 +18,13 @@ from bayeshaptic.diagnosis.acceptance import (
     rivals_of,
     ties,
     verdict_of,
+    with_misfit,
 )
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
 from bayeshaptic.diagnosis.state import Accepted, State, Trial, log_likelihoods
+from bayeshaptic.effects.laws import fitted
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.shapes import Usual
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import rigid
 from bayeshaptic.numerics.spending import Meter, metered, spend
@@ -156,6 +160,20 @@ def test_no_explanation_may_raise_the_held_out_error(
     before: float, after: float, worse: bool
 ) -> None:
     assert raises_error(before, after) is worse
+
+
+@pytest.mark.parametrize(("misfits", "verdict"), [(True, "unexplained"), (False, "explained")])
+def test_what_is_explained_leaves_noise(misfits: bool, verdict: str) -> None:
+    fit: Any = SimpleNamespace(reduced_chi_square=2.0, misfits=misfits)
+    state: Any = SimpleNamespace(fit=fit, accepted=accepted("nonlinear"))
+    tests = with_misfit((found("nonlinear", 5.0, 6.0),), state)  # allowed for, as a law's error
+    assert verdict_of(state.accepted, tests)[0] == verdict
+
+
+def test_a_drag_drives_no_motion() -> None:
+    usual = Usual(velocity=1.0, position=1.0, x="m")
+    shapes = [shape for _, shape in fitted(MOTOR, usual) if shape.name.startswith("drag")]
+    assert shapes and all(shape.positive for shape in shapes)
 
 
 def test_an_effect_that_is_worth_less_than_its_parameters_may_go() -> None:

@@ -167,6 +167,21 @@ def test_signals_of_other_people_are_neither_feedback_nor_swapped() -> None:
     assert abs(found.answer.value) < 0.02
 
 
+@pytest.mark.parametrize("gain", [0.0, 0.08])
+def test_an_answer_of_less_than_a_hundredth_of_the_force_is_seen(gain: float) -> None:
+    """White noise on a loop: expected chi-square N gain^2 and some 7 by chance, so 135 and 7."""
+    rng = np.random.default_rng(4)
+    added, noise = rng.standard_normal((2, 20_000))
+    force, position = np.zeros((2, len(added)))
+    for k in range(2, len(added)):
+        position[k] = 0.9 * position[k - 1] + 0.3 * force[k - 1] + noise[k]
+        force[k] = added[k] - gain * noise[k - 1]
+    found = judge(force, position)
+    assert all(share.value < 0.01 for share in found.feedback)
+    assert found.has_feedback is (gain > 0)
+    assert not (gain == 0 and found.doubtful)
+
+
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_units_do_not_matter(factor: float) -> None:
     force, position = (signal[0] for signal in open_loops("phantom free"))

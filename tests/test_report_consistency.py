@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,15 @@ from bayeshaptic.stability.guidance.shares import VarianceShares
 
 NOT_NOISE = Notice("warning", "residual", "The residual is not noise: a force like v|v|.")
 
+
+def _decades_away(make: Callable[[], Any]) -> Any:
+    """A result whose limit is nothing that was measured."""
+    result = make()
+    one = result.analysis
+    one.limit = replace(one.limit, samples=one.limit.samples * 1e-120)
+    return result
+
+
 KINDS: dict[str, Callable[[], Any]] = {
     **{name: partial(fake_analysis, **options) for name, options in CASES.items()},
     "consistent": partial(fake_closed, "consistent", "linear"),
@@ -34,6 +44,8 @@ KINDS: dict[str, Callable[[], Any]] = {
     "explained, and yet not": partial(fake_closed, misfit=1.5),
     "periodic": partial(fake_analysis, period_lines=60),
     "residual that is not noise": partial(fake_analysis, notices=(NOT_NOISE,)),
+    "decades away": partial(_decades_away, fake_analysis),
+    "decades away, closed": partial(_decades_away, partial(fake_closed, "unexplained")),
     "far off": partial(fake_closed, "unexplained", misfit=13.0),
 }
 

@@ -64,6 +64,7 @@ KEYS: dict[str, set[str]] = {
         "etfe",
         "safe",
         "declared",
+        "reason",
     },
     "critical_stiffness.db": QUANTILES,
     "critical_stiffness.frequency_hz": QUANTILES,
@@ -185,6 +186,14 @@ def test_infinite_and_vanishing_limits_become_null() -> None:
         found = strictly_parsed(summary_json(analysis))["critical_stiffness"]
         assert found["db"] == dict.fromkeys(QUANTILES)
         assert found["q50"] == (0.0 if value == 0 else None)
+
+
+def test_a_limit_decades_from_anything_measured_is_missing_with_the_reason() -> None:
+    analysis = fake_analysis("rigid")
+    analysis.limit = dataclasses.replace(analysis.limit, samples=analysis.limit.samples * 1e-150)
+    found = summary(analysis)["critical_stiffness"]
+    assert found["q50"] is None and found["db"]["q50"] is None and found["safe"]["0.01"] is None
+    assert "decades" in found["reason"] and found["etfe"]["q50"] > 0
 
 
 def test_what_closing_the_loop_adds() -> None:

@@ -15,6 +15,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
+from bayeshaptic.inference.least_squares import MISFIT
 from bayeshaptic.stability.critical import critical_stiffness
 
 _NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit
@@ -130,6 +131,19 @@ def raises_error(before: float, after: float) -> bool:
     What is next to the noise may move within it.
     """
     return after > thresholds.WORSE * max(before, 1.0)
+
+
+def with_misfit(tests: tuple[Test, ...], state: State) -> tuple[Test, ...]:
+    """The tests of what is left in the end, and one that no allowance excuses: of the whole misfit.
+
+    Allowances are for finding out whether to go on. What is explained leaves noise.
+    """
+    found = state.fit.reduced_chi_square
+    if not state.fit.misfits or any(test.flagged for test in tests):
+        return tests
+    families = [e.family for e in state.accepted if e.family == "nonlinear"]
+    text = f"what the model leaves over is {np.sqrt(found):.2g} times the noise"
+    return (*tests, Test("misfit", (*families, "linear")[0], found, MISFIT, None, text))
 
 
 def verdict_of(accepted: Sequence[Accepted], tests: Iterable[Test]) -> tuple[str, str | None]:

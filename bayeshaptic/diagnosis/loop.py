@@ -62,8 +62,8 @@ def trace(
 
     Each round tests the residual, tries the candidates of every class that a test raises, each
     fitted to half of the windows, and accepts the one that best predicts another quarter, unless
-    it raises the error held out or that of all windows; then takes out again what that made needless; until nothing is
-    raised, nothing convinces, or the budget is spent.
+    it raises the error held out or that of all windows; then takes out again what that made
+    needless; until nothing is raised, nothing convinces, or the budget is spent.
 
     Parameters
     ----------
@@ -110,6 +110,7 @@ class _Loop:
             if found is None:
                 break
             state, tests = self._mended(*found)
+        tests = acceptance.with_misfit(tests, state)
         verdict, residual_class = acceptance.verdict_of(state.accepted, tests)
         return Traced(
             verdict,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,6 +22,7 @@ from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
 
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
+_CHANCE_SDS = 4.0
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
 REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
 # Before a start is in its valley its cost says little of how deep that is, and many of those that
@@ -75,6 +77,19 @@ class Fit:
     residual: NDArray[np.complex128] = field(repr=False)
     starts: int = 0
     elsewhere: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False, kw_only=True)
+
+    @property
+    def by_chance(self) -> float:
+        """Reduced chi-square that noise alone hardly reaches.
+
+        It scatters by one over the root of the number of points.
+        """
+        return 1.0 + _CHANCE_SDS / math.sqrt(max(len(self.residual), 1))
+
+    @property
+    def misfits(self) -> bool:
+        """Whether the model lacks something: a residual far beyond the noise, and not by chance."""
+        return not self.reduced_chi_square <= max(MISFIT, self.by_chance)
 
     @property
     def sd(self) -> Floats:

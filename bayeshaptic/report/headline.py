@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.loop.words import in_short
@@ -20,6 +18,7 @@ from bayeshaptic.report.numbers.misfit import (
 )
 from bayeshaptic.report.numbers.quantities import estimate, percent, pure, quantity
 from bayeshaptic.report.numbers.result import tip_limit
+from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -29,8 +28,6 @@ HEADLINE_RISKS = (0.01, 0.05)
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001
-# A crossing may lie a decade below the band, where a mass is a hundred times as soft.
-_DECADES = 1000.0
 # Residual over noise from which a limit widened by what is unexplained is no advice either.
 _TOO_FAR = 3.0
 
@@ -111,8 +108,8 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"the force {how} computed from the motion (feedback), which biases the response that "
             "everything here is read from"
         )
-    if _far_from_measured(analysis):
-        found.append("the model's limit lies decades from any stiffness that was measured")
+    if (far := unstated(analysis)) is not None:
+        found.append(far)
     if not analysis.posterior.converged:
         found.append("the sampler has not converged, so the interval may be too narrow")
     if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
@@ -125,16 +122,6 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _far_from_measured(analysis: Analysis) -> bool:
-    """Whether the limit is another world than the measured dynamic stiffness, 1/|G|."""
-    limit = analysis.limit.quantile(0.5)
-    size = np.abs(analysis.etfe.value)
-    stiffness = 1 / size[size > 0]
-    if not math.isfinite(limit) or len(stiffness) == 0:
-        return False
-    return not stiffness.min() / _DECADES < limit < stiffness.max() * _DECADES
-
-
 def _untrusted(
     analysis: Analysis, objections: tuple[str, ...], closed: Closed | None = None
 ) -> Headline:
@@ -143,11 +130,13 @@ def _untrusted(
     middle, low, high = (limit.quantile(p) for p in (0.5, 0.05, 0.95))
     shown = estimate(middle, low, high, limit.unit)
     details = []
-    if analysis.in_loop is not None:
+    if unstated(analysis) is not None:
+        details.append("So no limit stands on this page.")
+    elif analysis.in_loop is not None:
         details.append(
             f"As one mass with friction, followed through the feedback, it has a limit of {shown}."
         )
-    elif not _far_from_measured(analysis):
+    else:
         details.append(
             f"The model's limit and its interval, {shown}, are not to be trusted; they stand below "
             "for comparison only."

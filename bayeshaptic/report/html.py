@@ -15,6 +15,7 @@ from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop import tables as loop_tables
 from bayeshaptic.report.loop import words as loop_words
 from bayeshaptic.report.numbers.trust import doubtful_parameters
+from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.page import answer, methods
 from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, unique, with_contents
 from bayeshaptic.report.page.lights import lights
@@ -75,6 +76,7 @@ def render(
         answer=answer,
         next_step=next_step(head, result),
         doubtful=words.doubtful(result),
+        no_limit=unstated(analysis),
         untrusted=doubtful_parameters(result),
         notices=unique(analysis.notices),
         pictures={name: embedded(name, one, _SHOWN[name]) for name, one in pictures.items()},

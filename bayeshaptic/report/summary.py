@@ -14,6 +14,7 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, finite
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.trust import doubtful_parameters
+from bayeshaptic.report.numbers.unstated import errors, unstated
 from bayeshaptic.report.provenance import provenance
 from bayeshaptic.version import __version__
 
@@ -51,7 +52,7 @@ def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str
     analysis = result.analysis
     closed = result.closed
     diagnosis = _DIAGNOSIS | dict(closed.diagnosis if closed else {})
-    error = {name: getattr(closed, name, None) for name in ("before", "after")}
+    error = errors(closed) if closed else dict.fromkeys(("before", "after"))
     return plain(
         {
             "version": __version__,
@@ -68,7 +69,7 @@ def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str
             "recommendation": _recommendation(result),
             "hidden": _hidden(analysis),
             "diagnosis": diagnosis,
-            "error": {name: _ERROR | dict(given or {}) for name, given in error.items()},
+            "error": {name: _error(given or {}) for name, given in error.items()},
             "provenance": origin or provenance(seed=analysis.posterior.seed),
         }
     )
@@ -94,6 +95,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return finite(value)
     return value
+
+
+def _error(given: Mapping[str, Any]) -> dict[str, Any]:
+    """With every key, null where it is missing."""
+    return _ERROR | {name: value for name, value in given.items() if value is not None}
 
 
 def _effects(analysis: Analysis, diagnosis: Mapping[str, Any]) -> list[str]:
@@ -167,6 +173,22 @@ def _posterior(result: Result) -> dict[str, Any]:
 def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
     limit, own = analysis.limit, analysis.etfe_limit
     tip = tip_limit(analysis)
+    reason = unstated(analysis)
+    measured = {name: None if own is None else getattr(own, name) for name in QUANTILES}
+    if reason is not None:
+        missing = dict.fromkeys(QUANTILES)
+        return {
+            "unit": limit.unit,
+            **missing,
+            "db": missing,
+            "frequency_hz": missing,
+            "tip": None,
+            "crossings": [],
+            "etfe": measured,
+            "safe": {f"{risk:g}": None for risk in RISKS},
+            "declared": {**missing, "db": missing},
+            "reason": reason,
+        }
     return {
         "unit": limit.unit,
         **_quantiles(limit),
@@ -177,12 +199,13 @@ def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
             {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
             for c in limit.crossings
         ],
-        "etfe": {name: None if own is None else getattr(own, name) for name in QUANTILES},
+        "etfe": measured,
         "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
         "declared": {
             **_quantiles(analysis.declared),
             "db": {name: analysis.declared.db(p) for name, p in QUANTILES.items()},
         },
+        "reason": None,
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.hidden.section import hidden_section
 from bayeshaptic.report.html import render
+from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.page.section import Section
 from bayeshaptic.report.summary import summary_json
 from bayeshaptic.report.walls.section import (
@@ -83,7 +85,10 @@ def _sections(result: Result, folder: Path) -> tuple[Section, ...]:
     case = case_of(result)
     table = table_of([case])
     name = None if analysis.device is None else analysis.device.name
-    table.write(folder, name, head.status, head.stiffness)
+    reason = unstated(analysis)
+    replace(table, reason=reason).write(folder, name, head.status, head.stiffness)
+    if reason is not None:
+        return ()
     walls = limits_section(
         table, friction_of(result), resolution_of(analysis), head.status == "untrusted"
     )

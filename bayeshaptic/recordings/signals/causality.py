@@ -199,7 +199,7 @@ def causality(recording: Recording) -> Causality:
     of_force, of_position = predict(force, position, left_out), predict(position, force)
     return Causality(
         feedback=tuple(of_force.past(floor) for _, _, floor in _LADDER),
-        news=news(of_force, of_position),
+        news=news(of_force, of_position) if saturates < _MOST_AT_LIMIT else News(0.0),
         answer=of_position.past(_FLOOR),
         same_sample=of_force.same_instant(),
         next_sample=of_force.next_instant(),

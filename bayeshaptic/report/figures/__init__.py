@@ -28,6 +28,7 @@ from bayeshaptic.report.figures.loop import residual as loop_residual
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.figures.loop import tests as loop_tests
 from bayeshaptic.report.figures.style import Drawn, drawn
+from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,13 +46,23 @@ class Picture:
     shown: Callable[[Any], bool] = lambda result: True
 
 
+def _has_limit(result: Result) -> bool:
+    return unstated(result.analysis) is None
+
+
 PICTURES = (
     Picture(
         "answer",
         answer.draw,
         "Model, deterministic fit, measurement and rules: each one's limit with its 90 % interval",
+        shown=_has_limit,
     ),
-    Picture("stiffness", stiffness.draw, "Distribution of the critical stiffness by crossing"),
+    Picture(
+        "stiffness",
+        stiffness.draw,
+        "Distribution of the critical stiffness by crossing",
+        shown=_has_limit,
+    ),
     Picture("response", response.draw, "Measured gain, phase and coherence with the model's band"),
     Picture(
         "record",
@@ -60,7 +71,12 @@ PICTURES = (
         shown=record.is_shown,
     ),
     Picture("residuals", residuals.draw, "Residual over frequency in units of the noise"),
-    Picture("crossings", crossings.draw, "Stiffness and phase over frequency, with every crossing"),
+    Picture(
+        "crossings",
+        crossings.draw,
+        "Stiffness and phase over frequency, with every crossing",
+        shown=_has_limit,
+    ),
     Picture("marginals", marginals.draw, "Posterior, prior and least squares of each parameter"),
     Picture("pairs", pairs.draw, "Pairs of the most strongly correlated parameters"),
     Picture("sampler", sampler.draw, "Trace, ranks, effective draws and R-hat of the sampler"),
@@ -85,7 +101,7 @@ LOOP_PICTURES = (
         "loop_stiffness",
         loop_stiffness.draw,
         "Critical stiffness before and after, and the measurement's own",
-        shown=lambda closed: closed.verdict != "consistent",
+        shown=lambda closed: closed.verdict != "consistent" and _has_limit(closed),
     ),
 )
 

@@ -11,6 +11,7 @@ from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.numbers.quantities import estimate, quantity, scale
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
 from bayeshaptic.report.numbers.titles import question, title_of
+from bayeshaptic.report.numbers.unstated import errors as stated_errors
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
@@ -112,14 +113,15 @@ def raised(closed: Closed) -> bool:
 
 def errors(closed: Closed) -> Rows:
     """(what, before, after) of the error table of ``summary.json``."""
-    before, after, unit = closed.before, closed.after, closed.analysis.limit.unit
+    stated, unit = stated_errors(closed), closed.analysis.limit.unit
+    before, after = stated["before"], stated["after"]
 
     def row(title: str, key: str, suffix: str) -> tuple[str, ...]:
         return (title, *(_number(e[key], suffix) for e in (before, after)))
 
     def limits(e: Mapping[str, Any]) -> str:
         q = e["critical_stiffness"]
-        if not all(math.isfinite(value) for value in q.values()):
+        if q is None or not all(math.isfinite(value) for value in q.values()):
             return _DASH
         return estimate(q["q50"], q["q05"], q["q95"], unit)
 

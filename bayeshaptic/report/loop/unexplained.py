@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.report.numbers.quantities import interval, pure, quantity
+from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
@@ -59,6 +60,8 @@ def _widened(closed: Closed) -> str:
     from bayeshaptic.stability.critical import critical_stiffness
 
     limit = closed.analysis.limit
+    if unstated(closed.analysis) is not None:
+        return "No critical stiffness is stated."
     narrow = critical_stiffness(closed.analysis.posterior)
     before = interval(narrow.quantile(0.05), narrow.quantile(0.95), limit.unit)
     after = interval(limit.quantile(0.05), limit.quantile(0.95), limit.unit)

@@ -19,6 +19,7 @@ from bayeshaptic.report.numbers.quantities import (
     quantity,
     scale,
 )
+from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
@@ -214,6 +215,8 @@ def _times(error: float) -> str:
 
 
 def _limit_change(closed: Closed) -> str:
+    if any(unstated(one) is not None for one in (closed.base, closed.analysis)):
+        return "K_CR is not stated"
     before, after = (e["critical_stiffness"] for e in (closed.before, closed.after))
     unit = closed.analysis.limit.unit
     old, new = before["q50"], after["q50"]

@@ -10,6 +10,7 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.hidden import in_short
 from bayeshaptic.report.numbers.quantities import estimate, percent
 from bayeshaptic.report.numbers.result import tip_limit
+from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -29,6 +30,12 @@ def facts(result: Result) -> Rows:
     """(what, value): the interval, the tip, what binds, the model, whom it speaks for."""
     analysis = result.analysis
     limit, tip = analysis.limit, tip_limit(analysis)
+    if (reason := unstated(analysis)) is not None:
+        return (
+            ("Critical stiffness", f"none is stated: {reason}"),
+            ("Model", _model(result)),
+            ("Speaks for", _holder(analysis)),
+        )
     rows: list[tuple[str, ...]] = [("Critical stiffness", _interval(limit))]
     if tip is not None:
         rows.append(("At the tip", _interval(tip)))

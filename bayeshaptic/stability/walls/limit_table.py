@@ -115,6 +115,8 @@ class LimitTable:
     by_case : tuple of tuple of float or None
         The same of each case.
     filters : tuple of FilterLimits
+    reason : str or None
+        Why no limit is stated: then every stiffness in the files is missing.
     """
 
     cases: tuple[Case, ...] = field(repr=False)
@@ -123,6 +125,7 @@ class LimitTable:
     stiffness: tuple[float | None, ...]
     by_case: tuple[tuple[float | None, ...], ...]
     filters: tuple[FilterLimits, ...]
+    reason: str | None = None
 
     @property
     def unit(self) -> str:
@@ -153,6 +156,7 @@ class LimitTable:
             "version": __version__,
             "device": device,
             "status": status,
+            "reason": self.reason,
             "recommended": recommended,
             "period_s": self.filters[0].region.period_s,
             "stiffness_unit": self.unit,
@@ -215,10 +219,12 @@ class LimitTable:
             (Path(folder) / name).write_text(text, encoding="utf-8", newline="\n")
 
     def _by_risk(self, values: Sequence[float | None]) -> dict[str, float | None]:
-        return {f"{r:g}": _plain(v) for r, v in zip(self.risks, values, strict=True)}
+        stated = values if self.reason is None else [None] * len(values)
+        return {f"{r:g}": _plain(v) for r, v in zip(self.risks, stated, strict=True)}
 
     def _boundary(self, part: FilterLimits) -> dict[str, Any]:
-        found = {f"{risk:g}": part.boundary(risk) for risk in self.risks}
+        stated = self.reason is None
+        found = {f"{risk:g}": part.boundary(risk) if stated else None for risk in self.risks}
         return {
             "damping_filter": "backward" if part.kind.cutoff_hz is None else "low_pass",
             "cutoff_hz": part.kind.cutoff_hz,
