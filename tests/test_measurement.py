@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.samples.clipped import clipped
 from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
+from bayeshaptic.diagnosis.samples.prediction import as_recorded
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability import critical_stiffness
 
 SECONDS, SEED = 8.0, 4
@@ -163,3 +166,23 @@ def test_what_is_known_is_not_found_twice() -> None:
     once = repair_measurement(State(etfe, fit))
     twice = repair_measurement(replace(once, etfe=replace(once.etfe)))
     assert [effect.name for effect in twice.accepted] == ["held_samples"]
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.3])
+@pytest.mark.parametrize("bench", [PHANTOM, Bench.from_device("lhifam", mechanism="rigid")])
+def test_a_pause_at_the_target_is_no_clipping(bench: Bench, friction: float) -> None:
+    """Steps under PD: the force changes while friction holds the device at the target."""
+    sticky = bench.with_effect("coulomb_friction", force=friction * bench.force_rms)
+    mass = sum(value for name, value in bench.values.items() if name.startswith("m"))
+    stiffness, damping = mass * 25.0**2, 1.4 * mass * 25.0
+    size, before = 2 * bench.force_rms / stiffness, 0.0
+
+    def control(k: int, position: float) -> float:
+        nonlocal before
+        speed, before = (position - before) / bench.period_s, position
+        return stiffness * (size * (k // 500 % 3) - position) - damping * speed
+
+    made = run_loop(sticky, control, 3.0)
+    recording = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    wrong, statistic = clipped(as_recorded(recording))
+    assert not wrong.any() and statistic < thresholds.CLIPPED
