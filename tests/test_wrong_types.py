@@ -60,7 +60,10 @@ def cases() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize(("function", "wrong"), list(cases()))
-def test_an_argument_of_a_wrong_type(function: Callable[..., Any], wrong: str) -> None:
+def test_an_argument_of_a_wrong_type(
+    function: Callable[..., Any], wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     parameters = inspect.signature(function).parameters.values()
     given = {
         one.name: good(str(one.annotation))
@@ -72,6 +75,7 @@ def test_an_argument_of_a_wrong_type(function: Callable[..., Any], wrong: str) -
         function(**given | {wrong: object()})
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 250
     assert wrong in str(caught.value)
+    assert not list(tmp_path.iterdir())
 
 
 LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, int))
