@@ -131,7 +131,7 @@ response = _several(
 )
 crossings = _several(
     "crossings",
-    "Where the limit comes from: 1/|G| and the phase, with every crossing.",
+    "Where the limit comes from: 1/abs(G) and the phase, with every crossing.",
     crossings_figure.draw_on,
     (2.6, 1.8),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -9,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+import bayeshaptic
 from bayeshaptic.cli import build_parser
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("data/*.md")})
+PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("data/*.md")})
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 
@@ -58,8 +60,8 @@ def test_links_lead_to_files(page: Path) -> None:
 
 
 def test_every_page_is_linked_from_the_readme_or_the_index() -> None:
-    linked = {ROOT / "README.md", ROOT / "docs" / "README.md"}
-    for index in tuple(linked):
+    linked = {ROOT / "README.md", ROOT / "docs" / "README.md", ROOT / "docs" / "index.md"}
+    for index in (ROOT / "README.md", ROOT / "docs" / "README.md"):
         for target in LINK.findall(index.read_text(encoding="utf-8")):
             linked.add((index.parent / target.split("#")[0]).resolve())
     assert not [page for page in PAGES if page.resolve() not in linked]
@@ -85,3 +87,40 @@ def test_every_key_of_the_summary_is_described() -> None:
         names = content if isinstance(content, dict) and key != "error" else {}
         missing = [name for name in names if f"`{name}`" not in line and not name.startswith("q")]
         assert not missing, f"{key}: {missing}"
+
+
+def test_every_public_name_is_in_the_reference() -> None:
+    text = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^\.\. auto(?:class|function):: (\w+)$", text, re.MULTILINE))
+    assert listed == set(bayeshaptic.__all__) - {"__version__", "plot"}
+    assert "automodule:: bayeshaptic.plot" in text
+
+
+def calls_of(name: str) -> dict[Path, list[ast.Call]]:
+    """Every call of a function or class by its bare name, by file of the package."""
+    found: dict[Path, list[ast.Call]] = {}
+    for path in sorted((ROOT / "bayeshaptic").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", None) == name:
+                found.setdefault(path.relative_to(ROOT / "bayeshaptic"), []).append(node)
+    return found
+
+
+def test_every_warning_has_an_entry() -> None:
+    text = (ROOT / "docs" / "faq.md").read_text(encoding="utf-8")
+    topics = {
+        call.args[1].value
+        for calls in calls_of("Notice").values()
+        for call in calls
+        if isinstance(call.args[1], ast.Constant)
+    }
+    assert {"feedback", "units", "misfit"} <= topics
+    assert not [topic for topic in sorted(topics) if f"\n### {topic}\n" not in text]
+
+
+def test_every_refusal_has_an_entry() -> None:
+    text = (ROOT / "docs" / "faq.md").read_text(encoding="utf-8")
+    places = " ".join(re.findall(r"<!-- refuses: (.*?) -->", text)).split()
+    assert all((ROOT / "bayeshaptic" / place).exists() for place in places)
+    refusing = [path.as_posix() for path in calls_of("InputError")]
+    assert not [path for path in refusing if not path.startswith(tuple(places))]

@@ -106,7 +106,7 @@ class LogNormal(Prior):
 
 @dataclass(frozen=True)
 class HalfNormal(Prior):
-    """|z|, z normal around zero with standard deviation `scale`: for dampers, which may be zero."""
+    """abs(z), z normal around zero with standard deviation `scale`: for dampers, which may be 0."""
 
     scale: float
     coordinate = "linear"

@@ -57,7 +57,7 @@ class RelayMeasurement:
         Of the oscillation: centre of its line in the force's averaged power spectral density. The
         sd is a jackknife's, and at least that of a bin of 1/(length of a segment).
     gain_margin, gain_margin_sd : float
-        |U/Y| there, in `unit`: the stiffness that the relay measured.
+        abs(U/Y) there, in `unit`: the stiffness that the relay measured.
     phase_deg : float
         Phase of the response there, from -180 degrees; positive: it has not come so far yet.
     phase_bound_deg : float
