@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import pickle
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -102,6 +104,22 @@ def test_a_batch_goes_on_and_is_resumed(folder: Path, tmp_path: Path, reports: R
     page = (out / "index.html").read_text()
     assert 'href="a/report.html"' in page and "&lt;Ada&gt;" in page and "http" not in page
     assert json.loads((out / "manifest.json").read_text())["versions"]["bayeshaptic"]
+
+
+def test_a_thousand_recordings(tmp_path: Path, reports: Reports) -> None:
+    """The index stays a page that opens at once, and what the parent keeps is a line each."""
+    place = tmp_path / "many"
+    place.mkdir()
+    for number in range(1000):
+        (place / f"r{number:03d}.csv").write_text(str(number))
+    began = time.process_time()
+    entries = bh.run_batch([place], tmp_path / "out", executor=executors.serial)
+    assert time.process_time() - began < 20.0
+    assert len(entries) == 1000 and all(entry.state == "done" for entry in entries)
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert page.count("<tr>") == 1001 and len(page) < 2_000_000
+    assert sum(len(pickle.dumps(entry)) for entry in entries) < 3_000_000
+    assert bh.run_batch([place], tmp_path / "out", executor=executors.serial) == entries
 
 
 def test_any_executor(folder: Path, tmp_path: Path, reports: Reports) -> None:

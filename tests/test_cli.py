@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fake_analysis import fake_analysis
 
 import bayeshaptic
 from bayeshaptic import cli
@@ -371,6 +372,8 @@ def test_warnings_are_one_line_each(run: Run, monkeypatch: pytest.MonkeyPatch) -
 # A shell's background processes ignore interrupts, and so would their children.
 WAITING = """
 import signal, sys, time
+from fake_analysis import fake_analysis
+
 from bayeshaptic import cli
 from bayeshaptic.jobs import batch
 
@@ -710,6 +713,20 @@ def test_simulate_options(run: Run) -> None:
     spectrum = np.abs(np.fft.rfft(recording.force))
     excited = np.flatnonzero(spectrum > 1e-6 * spectrum.max()) / 3.0
     assert excited.min() == 5 and excited.max() == 100
+
+
+def test_simulate_from_a_posterior_and_from_its_priors(run: Run, tmp_path: Path) -> None:
+    fake_analysis("grasped", device="lhifam").posterior.save(tmp_path / "p.nc")
+    truths = []
+    for options in ((), ("--seed", "1"), ("--from-prior",)):
+        status, out, err = run(
+            "simulate", "p.nc", "-o", "a.csv", "--seconds", "1", "--force", *options
+        )
+        assert status == 0 and not err
+        truths.append(float(out.split("stiffness ")[1].split()[0]))
+    assert len(set(truths)) == 3 and min(truths[:2]) > 1e3 and max(truths[:2]) < 1e5
+    status, _, err = run("simulate", "phantom", "-o", "b.csv", "--from-prior")
+    assert status == 2 and "--from-prior is for a posterior.nc" in only_line(err)
 
 
 def test_effects_are_parsed() -> None:

@@ -66,3 +66,21 @@ def test_excitations_of_the_bench(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert cli.main(command) == 2
     assert "exists; name another file, or overwrite it with --force" in capsys.readouterr().err
     assert cli.main([*command, "--force"]) == 0
+
+
+def test_a_study_is_written_with_what_a_person_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a terminal the guess is asked about: a line each, empty for what is suggested."""
+    rng = np.random.default_rng(1)
+    table = np.column_stack([1e-3 * np.arange(99), rng.normal(size=(99, 2)).cumsum(axis=0)])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,iq,enc", comments="")
+    answers = iter(["", "nothing", "iq*2.1[N]", "enc*1e-6[m]"])
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", lambda _: next(answers))
+    study = tmp_path / "s.toml"
+    assert cli.main(["inspect", str(tmp_path / "a.csv"), "--write", str(study)]) == 0
+    assert 'columns = "time=t,force=iq*2.1[N],position=enc*1e-6[m]"' in study.read_text()
+    assert "no column 'nothing'" in capsys.readouterr().out
+    assert read_study(study).read_all()[0].force_unit == "N"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ SUMMARY = "what is in a file, and a --columns line to read it with"
 DESCRIPTION = """\
 List the columns of a file: how many samples, their range, resolution (an encoder's count) and rate,
 what each may be, and what it looks like over time. The line for --columns is a guess by names and
-by what the numbers do; look at it before you use it."""
+by what the numbers do; look at it before you use it. In a terminal --write asks about each."""
 EXAMPLES = """\
   bayeshaptic inspect bench.mat
   bayeshaptic inspect bench.mat --png bench.png --write study.toml"""
@@ -52,7 +53,9 @@ def run(arguments: argparse.Namespace) -> int:
         draw(found, arguments.png)
         print(f"picture: {arguments.png}")
     if arguments.write is not None:
-        arguments.write.write_text(study_text(found, arguments.write), encoding="utf-8")
+        mapping = asked(found) if sys.stdin.isatty() and sys.stdout.isatty() else found.mapping
+        text = study_text(found, arguments.write, mapping)
+        arguments.write.write_text(text, encoding="utf-8")
         print(f"study: {arguments.write}")
     return 0
 
@@ -87,9 +90,32 @@ def lines(found: Overview) -> list[str]:
     return table
 
 
-def study_text(found: Overview, path: Path) -> str:
-    """A study with this one recording."""
-    columns = found.mapping or "time=...,force=...,position=..."
+def asked(found: Overview) -> str:
+    """The mapping as somebody at the terminal wants it: a line each, empty for the guess."""
+    from bayeshaptic.recordings.columns import parse_columns, pick
+
+    guesses = dict(part.split("=", 1) for part in (found.mapping or "").split(",") if part)
+    chosen = {}
+    print("Which columns are these? NAME, NAME*FACTOR or NAME*FACTOR[UNIT]; empty for the guess.")
+    for role in ("time", "force", "position"):
+        while True:
+            answer = input(f"  {role} [{_safe(guesses.get(role, '-'))}]: ").strip()
+            term = answer or guesses.get(role, "")
+            if not term and role == "time":
+                break  # the period is given instead
+            try:
+                pick(found.arrays, role, parse_columns({role: term}), found.path)
+            except InputError as error:
+                print(f"  {_safe(str(error))}")
+                continue
+            chosen[role] = term
+            break
+    return ",".join(f"{role}={term}" for role, term in chosen.items())
+
+
+def study_text(found: Overview, path: Path, mapping: str | None) -> str:
+    """A study with this one recording, its columns as in `mapping`."""
+    columns = mapping or "time=...,force=...,position=..."
     file = os.path.relpath(found.path.resolve(), path.resolve().parent).replace(os.sep, "/")
     return f"""\
 # A study: one device and all its recordings. See docs/file-formats.md.

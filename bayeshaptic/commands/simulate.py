@@ -24,6 +24,7 @@ EXAMPLES = """\
   bayeshaptic simulate lhifam --held -o lhifam-user.csv.gz
   bayeshaptic simulate phantom --excitation multisine --seconds 20 -o multisine.npz
   bayeshaptic simulate lhifam --held --excitation relay -o relay.csv.gz
+  bayeshaptic simulate out/posterior.nc --seed 7 -o again.csv.gz
   bayeshaptic simulate lhifam --effect coulomb_friction=force:1.5 -o rubbing.csv"""
 
 
@@ -81,6 +82,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "help": "something that the plain model lacks, at a typical strength or with the fields "
         "given; may come more than once. An unknown name or field lists the known ones",
     },
+    "--from-prior": {
+        "action": "store_true",
+        "help": "of a posterior.nc: draw from the priors of its model instead",
+    },
     "--seed": {
         "type": seed,
         "default": 0,
@@ -94,7 +99,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The device, the file, and what is simulated."""
     parser.add_argument(
-        "device", metavar="DEVICE", help="lhifam, phantom, or the path of a device file (TOML)"
+        "device",
+        metavar="DEVICE",
+        help="lhifam, phantom, the path of a device file (TOML), or a report's posterior.nc, of "
+        "which a draw is taken",
     )
     parser.add_argument(
         "-o",
@@ -162,7 +170,16 @@ def bench_from(arguments: argparse.Namespace) -> Bench:
         "band_hz": arguments.band,
     }
     changes = {name: value for name, value in options.items() if value is not None}
-    bench = Bench.from_device(arguments.device, held=arguments.held, **changes)
+    if arguments.device.lower().endswith(".nc"):
+        from bayeshaptic.commands.drawn import drawn_device
+
+        path = Path(arguments.device)
+        device, mechanism = drawn_device(path, arguments.seed, arguments.from_prior)
+        bench = Bench.from_device(device, mechanism=mechanism, **changes)
+    else:
+        if arguments.from_prior:
+            raise InputError("--from-prior is for a posterior.nc, whose model has the priors")
+        bench = Bench.from_device(arguments.device, held=arguments.held, **changes)
     for text in arguments.effect:
         name, fields = parse_effect(text)
         bench = bench.with_effect(name, **fields)

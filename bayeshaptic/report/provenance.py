@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,11 @@ def provenance(
 
 def versions() -> dict[str, str]:
     """Of this package, of Python, and of the libraries that numbers depend on."""
+    return dict(_versions())
+
+
+@cache  # a batch asks for each of its recordings
+def _versions() -> dict[str, str]:
     found = {"bayeshaptic": __version__, "python": platform.python_version()}
     for name in _LIBRARIES:
         try:
