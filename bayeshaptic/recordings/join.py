@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 
@@ -14,6 +15,7 @@ from bayeshaptic.recordings.recording import Recording
 FEWEST_SAMPLES = 250
 
 
+@at_the_door
 def join_recordings(recordings: Sequence[Recording], name: str | None = None) -> Recording:
     """Recordings of one device, held alike, as one recording of several pieces.
 
