@@ -54,8 +54,9 @@ def line_of(job: Job, with_file: bool, path: Path, out: Path) -> list[str]:
     if with_file:
         return [*line, "--device", device]
     known = load_device(device)
-    resolution, late = str(known.encoder_resolution), str(known.delay_s)
-    return [*line, "--delay-s", late, "--encoder-resolution", resolution]
+    line += ["--delay-s", str(known.delay_s)]
+    grid = known.encoder_resolution
+    return line if grid is None else [*line, "--encoder-resolution", str(grid)]
 
 
 def measured(line: list[str], version: Path, out: Path) -> dict[str, Any]:
@@ -129,13 +130,16 @@ def summarise(rows: dict[tuple[int, str], dict[str, Any]]) -> None:
                 row
                 for row in rows.values()
                 if row["version"] == "new"
+                and row["status"] == 0
                 and size in (-1, len(row["effects"]))
                 and file in (None, row["with_file"])
             ]
             if not own:
                 continue
             both = [(row, rows.get((row["number"], "old"))) for row in own]
-            ratios = [old["cpu_s"] / row["cpu_s"] for row, old in both if old]
+            ratios = [
+                old["cpu_s"] / row["cpu_s"] for row, old in both if old and old["status"] == 0
+            ]
             times = [row["cpu_s"] for row in own]
             older = [old["cpu_s"] for _, old in both if old]
             which = {True: ", device file", False: ", no device file", None: ""}[file]

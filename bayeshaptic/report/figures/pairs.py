@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 SHOWN = 6
 POINTS = 800
 LEVELS = (0.9, 0.5)
+_MOST_DRAWS = 8000
 
 
 def correlation(draws: NDArray[Any]) -> NDArray[Any]:
@@ -44,40 +45,52 @@ def strongest(matrix: NDArray[Any], count: int = SHOWN) -> list[int]:
 def draw(result: Result) -> Figure:
     """Scatter and contours below the diagonal; all correlations as a map in the empty corner."""
     analysis = result.analysis
-    draws = analysis.posterior.draws[:: max(len(analysis.posterior.draws) // 20_000, 1)]
+    draws = _some(analysis.posterior.draws)
     matrix = correlation(draws)
     chosen = strongest(matrix)
     size = len(chosen) - 1
     if size < 1:
         return _nothing()
     figure = style.new_figure(1.2 + 1.12 * size, style.WIDTH_IN if size > 2 else 4.6)
-    panels = figure.subplots(size, size, squeeze=False, sharex="col", sharey="row")
+    panels = _triangle(figure, size)
     names = [analysis.model.names[i] for i in chosen]
     middles = np.median(draws[:, chosen], axis=0)
     units = [analysis.model.unit(name) for name in names]
     rows = [scale(float(m), unit) for m, unit in zip(middles, units, strict=True)]
     label = [f"{style.short(n)}\n[{row.unit}]" for n, row in zip(names, rows, strict=True)]
     scaled = draws[:, chosen] * [row.factor for row in rows]
-    for i in range(size):
-        for j in range(size):
-            if j > i:
-                panels[i, j].axis("off")
-                continue
-            _pair(panels[i, j], scaled[:, j], scaled[:, i + 1], matrix[chosen[j], chosen[i + 1]])
-            panels[i, j].label_outer()
+    for (i, j), axes in panels.items():
+        _pair(axes, scaled[:, j], scaled[:, i + 1], matrix[chosen[j], chosen[i + 1]])
+        axes.label_outer()
     for i in range(size):
         panels[i, 0].set_ylabel(label[i + 1], fontsize=style.FONT)
-        panels[-1, i].set_xlabel(label[i], fontsize=style.FONT)
+        panels[size - 1, i].set_xlabel(label[i], fontsize=style.FONT)
     figure.align_labels()
     if size > 3:
         _map(figure, matrix, analysis.model.names)
     return figure
 
 
+def _some(draws: NDArray[Any]) -> NDArray[Any]:
+    """As many draws as the contours need."""
+    return draws[:: max(len(draws) // _MOST_DRAWS, 1)]
+
+
+def _triangle(figure: Figure, size: int) -> dict[tuple[int, int], Axes]:
+    """Axes on and below the diagonal, by row and column; those of a row and a column share it."""
+    grid = figure.add_gridspec(size, size)
+    panels: dict[tuple[int, int], Axes] = {}
+    for i in range(size):
+        for j in range(i + 1):
+            shared = {"sharex": panels.get((j, j)), "sharey": panels.get((i, 0))}
+            panels[i, j] = figure.add_subplot(grid[i, j], **shared)
+    return panels
+
+
 def draw_on(axes: Axes, result: Result, x: str, y: str) -> None:
     """Two parameters on axes that are there."""
     model, draws = result.analysis.model, result.analysis.posterior.draws
-    chosen = draws[:: max(len(draws) // 20_000, 1)][:, [model.names.index(n) for n in (x, y)]]
+    chosen = _some(draws)[:, [model.names.index(n) for n in (x, y)]]
     rows = [
         scale(float(middle), model.unit(name))
         for middle, name in zip(np.median(chosen, axis=0), (x, y), strict=True)

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.report.figures.hover import panels
+import numpy as np
+
 from bayeshaptic.types import Bytes
 
 if TYPE_CHECKING:
@@ -91,16 +93,41 @@ def legend(axes: Axes, **options: Any) -> None:
 
 def frequency_axis(axes: Axes, low_hz: float, high_hz: float, label: str = "") -> None:
     """A logarithmic frequency axis with plain numbers (1, 10, 100) on it."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     axes.set_xscale("log")
     axes.set_xlim(low_hz, high_hz)
     narrow = high_hz / low_hz < 30
     axes.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5) if narrow else (1,)))
     axes.xaxis.set_major_formatter(FuncFormatter(plain))
-    axes.xaxis.set_minor_locator(LogLocator(10, subs=range(2, 10)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(NullLocator())
+    _minor_marks(axes, low_hz, high_hz)
     axes.set_xlabel(label, fontsize=FONT)
+
+
+def _minor_marks(axes: Axes, low: float, high: float) -> None:
+    """Short ticks at 2 to 9 times the powers of ten, as markers of one invisible line.
+
+    matplotlib's own are four objects each, and take a third of the time of such a figure.
+    """
+    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+    places = np.outer(decades, np.arange(2, 10)).ravel()
+    places = places[(places >= low) & (places <= high)]
+    (line,) = axes.plot(
+        places,
+        np.zeros(len(places)),
+        linestyle="none",
+        marker=3,  # a tick downwards
+        markersize=2,
+        markeredgewidth=0.4,
+        color="black",
+        transform=axes.get_xaxis_transform(),
+        clip_on=False,
+        label="_minor ticks",
+        scalex=False,
+        scaley=False,
+    )
+    line.set_in_layout(False)
 
 
 def plain(value: float, _: object = None) -> str:
