@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.report.figures.hover import panels
 import numpy as np
 
+from bayeshaptic.report.figures.hover import panels
 from bayeshaptic.types import Bytes
 
 if TYPE_CHECKING:
