@@ -77,6 +77,14 @@ def test_evidence_is_what_an_integral_over_everything_gives(rigid: Posterior, na
     assert np.quantile(np.abs(found.strength), 0.95) == pytest.approx(exact95, rel=0.15)
 
 
+def test_where_no_draw_is_possible_there_is_no_density(rigid: Posterior) -> None:
+    suspect = suspect_in(rigid, "extra_delay")
+    known = around(rigid, 50, np.random.default_rng(1))
+    nowhere = np.full((3, 2), -1e3)
+    vectors = suspect.vectors(np.abs(nowhere), np.zeros((3, 1)))
+    assert np.all(known.density(suspect.model, vectors, nowhere) == -np.inf)
+
+
 def weighed(name: str, evidence: float, changes: np.ndarray, factor: float = 0.0) -> Weighed:
     about = name, name, "linear", "", "", "number", 1.0
     rows = np.repeat(changes[None], KEPT // PAIRED, axis=0)

@@ -100,6 +100,8 @@ class Around:
         """Log posterior density in `here`, (B,): of extended `model` with the base at `phi`."""
         value = np.full(len(phi), -np.inf)
         inside = self.here.inside(phi)
+        if not inside.any():
+            return value
         with np.errstate(all="ignore"):  # far-away vectors may overflow
             value[inside] = (
                 self.model.log_prior(self.here.natural(phi[inside]))
