@@ -13,12 +13,12 @@ import pytest
 
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.quantities import estimate
 from bayeshaptic.report import write
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, style
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.tables import outcomes
 from bayeshaptic.report.numbers.misfit import misfit_is_clear, residual_is_noticed
-from bayeshaptic.report.numbers.quantities import estimate
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.page import section
 from bayeshaptic.report.page.lights import lights

@@ -21,6 +21,7 @@ from fake_analysis import CASES, FEEDBACK, fake_analysis, fake_closed
 
 import bayeshaptic
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.quantities import estimate, interval, percent, quantity, scale
 from bayeshaptic.report import write, write_report
 from bayeshaptic.report.figures import PICTURES, draw_pictures
 from bayeshaptic.report.figures.pairs import correlation, strongest
@@ -29,7 +30,6 @@ from bayeshaptic.report.figures.style import Drawn, drawn
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import least_squares_limit, witnesses
 from bayeshaptic.report.numbers.octaves import third_octaves
-from bayeshaptic.report.numbers.quantities import estimate, interval, percent, quantity, scale
 from bayeshaptic.report.page.answer import FARED
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.methods import bibtex, methods

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from bayeshaptic.quantities import quantity
+from bayeshaptic.shown import Shown
+
 KINDS = ("translational", "rotational")
 
 # The parameters of each base model, in the order of the paper's tables; a device file may give
@@ -16,8 +19,8 @@ STRUCTURES: dict[str, tuple[str, ...]] = {
 }
 
 
-@dataclass(frozen=True)
-class Device:
+@dataclass(frozen=True, repr=False)
+class Device(Shown):
     """A device's facts, from a device file or from the `[device]` table of a study.
 
     Attributes
@@ -61,3 +64,14 @@ class Device:
     def force_unit(self) -> str:
         """Unit of a commanded force with a known force constant."""
         return "Nm" if self.kind == "rotational" else "N"
+
+    def _lines(self) -> tuple[str, ...]:
+        def told(value: float | None, unit: str) -> str:
+            return "unknown" if value is None else quantity(value, unit)
+
+        return (
+            f"Device {self.name}: {self.kind}, parameters of {', '.join(self.parameters)}",
+            f"period {told(self.period_s, 's')}, loop delay {told(self.delay_s, 's')}",
+            f"encoder count {told(self.encoder_resolution, self.position_unit)}, lever "
+            f"{told(self.lever_m, 'm')}",
+        )

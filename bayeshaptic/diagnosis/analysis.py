@@ -22,12 +22,14 @@ from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model, build_model
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.sufficiency import refuse_too_little
+from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.threads import single_threaded
@@ -39,8 +41,8 @@ _MISFIT_EVALUATIONS = 100_000
 _WIDEST = 0.4  # of the sampling rate: a band's upper end
 
 
-@dataclass(frozen=True)
-class Analysis:
+@dataclass(frozen=True, repr=False)
+class Analysis(Shown):
     """What is known of one device from one measurement.
 
     Attributes
@@ -108,6 +110,16 @@ class Analysis:
     @property
     def effect_names(self) -> tuple[str, ...]:
         return ()
+
+    def _lines(self) -> tuple[str, ...]:
+        of = "a frequency response" if self.recording is None else self.recording.name
+        state = "converged" if self.posterior.converged else "not converged"
+        return (
+            f"Analysis of {of} with the model {self.model.name}",
+            repr(self.limit).partition("\n")[0],
+            f"reduced chi-square {quantity(self.fit.reduced_chi_square, '')}, sampler {state}, "
+            f"{sum(n.level == 'warning' for n in self.notices)} warnings",
+        )
 
 
 @dataclass

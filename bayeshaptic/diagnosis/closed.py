@@ -34,11 +34,12 @@ from bayeshaptic.models import Model
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.shown import Shown
 from bayeshaptic.threads import single_threaded
 
 
-@dataclass(frozen=True)
-class Closed:
+@dataclass(frozen=True, repr=False)
+class Closed(Shown):
     """The result of closing the loop on one measurement.
 
     Attributes
@@ -105,6 +106,16 @@ class Closed:
             ],
             "not_tried": list(self.traced.skipped),
         }
+
+    def _lines(self) -> tuple[str, ...]:
+        recording = self.base.recording
+        of = "a frequency response" if recording is None else recording.name
+        found = " and ".join(effect.title for effect in self.effects) or "nothing"
+        return (
+            f"Closed loop on {of}: {self.verdict}",
+            f"added to the model {self.base.model.name}: {found}",
+            repr(self.analysis.limit).partition("\n")[0],
+        )
 
 
 @single_threaded

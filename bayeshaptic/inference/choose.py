@@ -13,6 +13,7 @@ from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.shown import Shown
 from bayeshaptic.threads import single_threaded
 
 _MATERIAL = 2.0  # a richer model that misfits too must cut the squared residual by this factor
@@ -39,8 +40,8 @@ class ScoredFit:
     score: float
 
 
-@dataclass(frozen=True)
-class Choice:
+@dataclass(frozen=True, repr=False)
+class Choice(Shown):
     """The chosen base model and the reason in words.
 
     Attributes
@@ -54,6 +55,10 @@ class Choice:
     fit: Fit
     reason: str
     candidates: Mapping[str, ScoredFit]
+
+    def _lines(self) -> tuple[str, ...]:
+        others = ", ".join(name for name in self.candidates if name != self.fit.model.name)
+        return f"Chosen model: {self.fit.model.name}", self.reason, f"compared with: {others}"
 
 
 @at_the_door

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,10 @@ from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.start import informed, starting_points
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
+from bayeshaptic.quantities import quantity, scale
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
 
@@ -35,8 +38,8 @@ _ONE_VALLEY = 0.02  # relative steps of cost within a valley
 _OTHER_VALLEYS = 2
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(Shown):
     """A weighted least-squares fit.
 
     Attributes
@@ -112,6 +115,37 @@ class Fit:
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
         """The fitted sampled response at `frequency_hz`, shape (L,)."""
         return self.model.response(self.theta, frequency_hz)
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a parameter: value, sd, unit, outcome."""
+        return data_frame(
+            (
+                {
+                    "parameter": name,
+                    "value": float(self.theta[i]),
+                    "sd": float(self.sd[i]),
+                    "unit": self.model.unit(name),
+                    "outcome": self.outcome[name],
+                }
+                for i, name in enumerate(self.model.names)
+            ),
+            "parameter",
+        )
+
+    def to_control(self) -> Any:
+        """The sampled response of the fit for python-control: see `Model.to_control`."""
+        return self.model.to_control(self.theta)
+
+    def _lines(self) -> tuple[str, ...]:
+        found = []
+        for name, value, sd in zip(self.model.names, self.theta, self.sd, strict=True):
+            row = scale(float(value), self.model.unit(name))
+            found.append(f"{name} {row.with_error(float(value), float(sd))} {row.unit}".rstrip())
+        return (
+            f"Least-squares fit of the model {self.model.name}",
+            f"reduced chi-square {quantity(self.reduced_chi_square, '')}, where 1 is pure noise",
+            listed(found, 4),
+        )
 
 
 @at_the_door

@@ -14,15 +14,17 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.inference.arviz_groups import save_posterior, to_arviz
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.models import Model
+from bayeshaptic.quantities import scale
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Floats
 
 _DOMINATED = 0.5  # posterior sd over prior sd from which the prior decides
 
 
-@dataclass(frozen=True)
-class Posterior:
+@dataclass(frozen=True, repr=False)
+class Posterior(Shown):
     """Draws from the posterior of a model's parameters.
 
     Attributes
@@ -122,6 +124,23 @@ class Posterior:
     def save(self, path: str | Path) -> Path:
         """Write it to `path` as netCDF for `load_posterior`; never leaves half a file."""
         return save_posterior(self, Path(path))
+
+    def to_dataframe(self) -> Any:
+        """`summary` as a ``pandas.DataFrame``, a row a parameter."""
+        rows = ({"parameter": name, **found} for name, found in self.summary().items())
+        return data_frame(rows, "parameter")
+
+    def _lines(self) -> tuple[str, ...]:
+        found = []
+        for name, one in self.summary().items():
+            row = scale(one["mean"], one["unit"])
+            found.append(f"{name} {row.with_error(one['mean'], one['sd'])} {row.unit}".rstrip())
+        state = "converged" if self.converged else "not converged"
+        return (
+            f"Posterior of the model {self.model.name}: {len(self.draws):,} draws, {state}",
+            f"largest R-hat {float(np.max(self.rhat)):.3f}, {self.effective:.0f} effective draws",
+            listed(found, 4),
+        )
 
 
 def prior_dominated(model: Model, draws: Floats) -> list[bool]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,8 @@ from bayeshaptic.models.parameter import Parameter, unit_of
 from bayeshaptic.models.prior import Prior
 from bayeshaptic.models.response.system import Complexes, Floats, LinearSystem
 from bayeshaptic.models.structures import Structure
+from bayeshaptic.quantities import quantity
+from bayeshaptic.shown import Shown, listed
 
 if TYPE_CHECKING:
     from bayeshaptic.devices import Device
@@ -34,8 +36,8 @@ class Extension(Protocol):
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem: ...
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(Shown):
     """A parametric model of the sampled response from commanded force to motor position.
 
     Attributes
@@ -165,6 +167,35 @@ class Model:
             raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
         return response[0] if np.ndim(theta) == 1 else response
 
+    def to_control(self, theta: ArrayLike | None = None) -> Any:
+        """The sampled response as a ``control.StateSpace`` of python-control, exact.
+
+        Close the loop of a wall by ``control.feedback(model.to_control(theta), K)``.
+
+        Parameters
+        ----------
+        theta : array_like, shape (P,), optional
+            Parameters in the order of `names`; by default those of the device file.
+
+        Raises
+        ------
+        InputError
+            If python-control is not installed, the model has no sampling period, or no finite
+            number of states.
+        """
+        from bayeshaptic.models.response.state_space import state_space
+
+        if self.period_s is None:
+            raise InputError("the model has no sampling period: give period_s, or a device.")
+        try:
+            import control
+        except ImportError:
+            raise InputError(
+                "python-control is not installed, and to_control() needs it: pip install control."
+            ) from None
+        system = self.system(self.values if theta is None else theta)
+        return control.ss(*state_space(system, self.period_s), self.period_s)
+
     def log_prior(self, theta: ArrayLike) -> Floats:
         """Log prior density of parameter vectors `theta` of shape (B, P); shape (B,)."""
         theta = np.atleast_2d(np.asarray(theta, float))
@@ -224,4 +255,17 @@ class Model:
             self,
             parameters=tuple(p for p in self.parameters if p.name not in gone),
             effects=tuple(e for e in self.effects if e is not effect),
+        )
+
+    def _lines(self) -> tuple[str, ...]:
+        names = [effect.name for effect in self.effects]
+        added = f" with {', '.join(names)}" if names else ""
+        period = "not set" if self.period_s is None else quantity(self.period_s, "s")
+        delay = self.fixed.get("delay_s")
+        known = "estimated" if delay is None else quantity(delay, "s")
+        return (
+            f"Model {self.name}{added}: {self.structure.title}",
+            f"{self.size} parameters: {listed(self.names, 12)}",
+            f"force in {self.force_unit}, position in {self.position_unit}; period {period}, delay "
+            f"{known}",
         )

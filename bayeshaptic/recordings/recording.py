@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import Notice
+from bayeshaptic.quantities import pretty_unit, quantity
 from bayeshaptic.recordings.feedback import Feedback
+from bayeshaptic.shown import Shown
 
 FORCE_UNITS = ("N", "Nm", "A")
 POSITION_UNITS = ("m", "rad")
 
 
-@dataclass(frozen=True)
-class Recording:
+@dataclass(frozen=True, repr=False)
+class Recording(Shown):
     """One experiment: commanded force u[k] and motor position y[k], every T seconds.
 
     The force u[k] is commanded at the instant of sample k and held until k + 1 (zero-order hold);
@@ -105,3 +107,15 @@ class Recording:
         joints = tuple(joint - start for joint in self.joints if start < joint < stop)
         force, position = self.force[start:stop], self.position[start:stop]
         return replace(self, force=force, position=position, joints=joints)
+
+    def _lines(self) -> tuple[str, ...]:
+        length = quantity(self.duration_s, "s")
+        count = self.encoder_resolution
+        encoder = "unknown" if count is None else quantity(count, self.position_unit)
+        return (
+            f"Recording {self.name}: {self.samples:,} samples in {length}, one every "
+            f"{quantity(self.period_s, 's')}",
+            f"force in {pretty_unit(self.force_unit)}, position in {self.position_unit}, encoder "
+            f"count {encoder}",
+            f"device {self.device or 'not named'}, held by {self.user or 'nobody named'}",
+        )

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from bayeshaptic.models.structures import QUANTITIES
+from bayeshaptic.quantities import interval, pretty_unit, pure, quantity
 from bayeshaptic.report import words
-from bayeshaptic.report.numbers.quantities import interval, pretty_unit, pure, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

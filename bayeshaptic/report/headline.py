@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.quantities import estimate, percent, pure, quantity
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
@@ -16,7 +17,6 @@ from bayeshaptic.report.numbers.misfit import (
     misfit_is_faint,
     residual_is_noticed,
 )
-from bayeshaptic.report.numbers.quantities import estimate, percent, pure, quantity
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
 

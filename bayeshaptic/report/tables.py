@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
-from bayeshaptic.report.numbers.quantities import (
+from bayeshaptic.quantities import (
     interval,
     percent,
     percents,
@@ -20,6 +18,8 @@ from bayeshaptic.report.numbers.quantities import (
     scale,
     spread_of,
 )
+from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
 from bayeshaptic.report.numbers.trust import doubtful_parameters

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.quantities import estimate, interval, percent, pure, quantity
 from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
 from bayeshaptic.report.numbers.octaves import third_octaves
-from bayeshaptic.report.numbers.quantities import estimate, interval, percent, pure, quantity
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -104,11 +104,32 @@ def group_crossings(kinds: Ints, frequency_hz: Floats) -> tuple[tuple[BindingCro
                 len(part) / len(kinds),
             )
             found.append((crossing, part))
+    found = _at_one_place(found)
     found.sort(key=lambda pair: -pair[0].probability)
     group = np.empty(len(kinds), int)
     for number, (_, part) in enumerate(found):
         group[part] = number
     return tuple(crossing for crossing, _ in found), group
+
+
+def _at_one_place(
+    found: list[tuple[BindingCrossing, Ints]],
+) -> list[tuple[BindingCrossing, Ints]]:
+    """Groups whose labels would name one frequency are one crossing: the larger gives its kind.
+
+    Where a mass hardly moves, its phase decides the kind from draw to draw.
+    """
+    places: dict[str, list[tuple[BindingCrossing, Ints]]] = {}
+    for pair in found:
+        places.setdefault(pair[0].label.partition(" at ")[2] or pair[0].label, []).append(pair)
+    joined = []
+    for pairs in places.values():
+        first = max((pair[0] for pair in pairs), key=lambda one: one.probability)
+        whole = sum(one.probability for one, _ in pairs)
+        joined.append(
+            (replace(first, probability=whole), np.concatenate([part for _, part in pairs]))
+        )
+    return joined
 
 
 def _split(members: Ints, frequency_hz: Floats, draws: int) -> list[Ints]:

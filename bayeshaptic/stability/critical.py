@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.model import Model
+from bayeshaptic.quantities import estimate, percent, quantity
+from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
 from bayeshaptic.stability.crossings import find_crossings, rational
 from bayeshaptic.stability.effective import effective_draws
@@ -25,8 +27,8 @@ _CHUNK = 4096
 _CHECKED = 64
 
 
-@dataclass(frozen=True)
-class CriticalStiffness:
+@dataclass(frozen=True, repr=False)
+class CriticalStiffness(Shown):
     """K_CR of each draw of a posterior, or of one model.
 
     Attributes
@@ -143,6 +145,38 @@ class CriticalStiffness:
         if not lever_m > 0:
             raise InputError(f"lever_m is {lever_m}; give the lever arm in metres, above zero.")
         return replace(self, samples=self.samples / lever_m**2, unit="N/m")
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a draw: limit, frequency, label of what binds."""
+        return data_frame(
+            {
+                "critical_stiffness": float(self.samples[i]),
+                "unit": self.unit,
+                "frequency_hz": float(self.frequency_hz[i]),
+                "binds": self.crossings[int(self.group[i])].label,
+            }
+            for i in range(len(self.samples))
+        )
+
+    def _lines(self) -> tuple[str, ...]:
+        low, middle, high = (float(self.quantile(p)) for p in (0.05, 0.5, 0.95))
+        binds = ", ".join(f"{c.label} ({percent(c.probability)})" for c in self.crossings[:3])
+        if len(self.samples) == 1:
+            return (
+                f"Critical stiffness {quantity(middle, self.unit, digits=4)}",
+                f"binds: {binds}",
+            )
+        safe = [
+            f"{quantity(found, self.unit, digits=4)} at {percent(risk)}"
+            for risk in (0.05, 0.01, 0.001)
+            if (found := self.safe(risk)) is not None
+        ]
+        return (
+            f"Critical stiffness {estimate(middle, low, high, self.unit)}, median and 90 % "
+            f"interval of {len(self.samples):,} draws",
+            f"by risk of instability: {', '.join(safe) or 'too few draws to say'}",
+            f"binds: {binds}",
+        )
 
 
 @at_the_door

@@ -17,8 +17,10 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, describe
 from bayeshaptic.inference.population.infer import Population
 from bayeshaptic.models import prior_from_table
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study, StudyEntry
+from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit
 from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.cases import StudyCases, study_cases
@@ -31,8 +33,8 @@ Executor = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 _RECORDINGS = 0.8  # share of the progress that the recordings take
 
 
-@dataclass(frozen=True)
-class StudyAnalysis:
+@dataclass(frozen=True, repr=False)
+class StudyAnalysis(Shown):
     """Everything that is known of one device from one study.
 
     Attributes
@@ -80,6 +82,39 @@ class StudyAnalysis:
     def failed(self) -> tuple[Analysed, ...]:
         """The recordings that could not be analysed."""
         return tuple(one for one in self.recordings if one.error is not None)
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a case: quantiles of its limit, and how often it binds."""
+        shares = {b.case: b.probability for b in self.limit.binding} if self.limit else {}
+        return data_frame(
+            (
+                {
+                    "case": case.label,
+                    "group": case.group,
+                    **{
+                        f"q{100 * p:02.0f}": float(case.limit.quantile(p))
+                        for p in (0.05, 0.5, 0.95)
+                    },
+                    "unit": case.limit.unit,
+                    "binds": shares.get(case.label, 0.0),
+                }
+                for case in self.cases
+            ),
+            "case",
+        )
+
+    def _lines(self) -> tuple[str, ...]:
+        safe = None if self.limit is None else self.limit.safe(0.01)
+        told = (
+            "not stated" if safe is None or self.limit is None else quantity(safe, self.limit.unit)
+        )
+        return (
+            f"Study {self.name} of {self.device.name}: {len(self.recordings)} recordings, "
+            f"{len(self.failed)} failed",
+            f"{len(self.users)} users, {len(self.configurations)} sets of configurations, "
+            f"{len(self.cases)} cases",
+            f"stable in every case with 99 %: {told}",
+        )
 
 
 @dataclass(frozen=True)

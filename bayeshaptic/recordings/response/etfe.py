@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.quantities import interval, pretty_unit, pure
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.periodic_excitation import estimate_periodic
 from bayeshaptic.recordings.response.random_excitation import estimate_random
@@ -21,6 +22,7 @@ from bayeshaptic.recordings.response.spectra import (
     TableSpectra,
 )
 from bayeshaptic.recordings.response.windows import Reference, Windows
+from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.threads import single_threaded
 
 __all__ = [
@@ -33,8 +35,8 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
-class Etfe:
+@dataclass(frozen=True, repr=False)
+class Etfe(Shown):
     """The measured frequency response from commanded force to position.
 
     Attributes
@@ -109,6 +111,29 @@ class Etfe:
     def phase_deg(self) -> NDArray[Any]:
         """Unwrapped phase in degrees, shape (L,)."""
         return np.degrees(np.unwrap(np.angle(self.value)))
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a frequency: gain, phase, their errors, coherence."""
+        return data_frame(
+            {
+                "frequency_hz": float(self.frequency_hz[i]),
+                "gain_db": float(self.gain_db[i]),
+                "phase_deg": float(self.phase_deg[i]),
+                "relative_sd": float(self.relative_sd[i]),
+                "coherence": float(self.coherence[i]),
+            }
+            for i in range(len(self.frequency_hz))
+        )
+
+    def _lines(self) -> tuple[str, ...]:
+        of = "a table" if self.recording is None else self.recording.name
+        error = 100 * float(np.median(self.relative_sd))
+        return (
+            f"Frequency response of {of}: {interval(*self.band_hz, 'Hz')}, {self.lines:,} lines",
+            f"{self.position_unit} over {pretty_unit(self.force_unit)}, median error "
+            f"{pure(error, 2)} % of its magnitude",
+            f"{'random' if self.period_lines is None else 'periodic'} excitation",
+        )
 
 
 @at_the_door

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.quantities import estimate, quantity
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import Witness, decibel, witnesses
-from bayeshaptic.report.numbers.quantities import estimate, quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.quantities import Scale, quantity, scale
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import thinned
-from bayeshaptic.report.numbers.quantities import Scale, quantity, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

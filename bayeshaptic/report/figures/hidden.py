@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.quantities import percent
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.numbers.hidden import size
-from bayeshaptic.report.numbers.quantities import percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

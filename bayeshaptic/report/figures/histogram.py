@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.quantities import percent
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.numbers.estimates import RISKS
-from bayeshaptic.report.numbers.quantities import percent
 from bayeshaptic.types import Floats
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.quantities import scale
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.numbers.quantities import scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.quantities import pretty_unit
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import ResponseBand, response_band
 from bayeshaptic.report.figures.hover import Reading, note
 from bayeshaptic.report.numbers.estimates import correction
-from bayeshaptic.report.numbers.quantities import pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

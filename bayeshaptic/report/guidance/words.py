@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.report.figures.style import short
-from bayeshaptic.report.numbers.quantities import percent, pure, quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

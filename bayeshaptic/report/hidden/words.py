@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bayeshaptic.quantities import percent, quantity
 from bayeshaptic.report.numbers.hidden import FEW, db, interval_of, reach, size, strength
-from bayeshaptic.report.numbers.quantities import percent, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

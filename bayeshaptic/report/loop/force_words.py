@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.inference.time_domain.fit import NAMES
-from bayeshaptic.report.numbers.quantities import pure, quantity, scale
+from bayeshaptic.quantities import pure, quantity, scale
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

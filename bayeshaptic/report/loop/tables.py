@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.quantities import estimate, quantity, scale
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
-from bayeshaptic.report.numbers.quantities import estimate, quantity, scale
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
 from bayeshaptic.report.numbers.titles import question, title_of
 from bayeshaptic.report.numbers.unstated import errors as stated_errors

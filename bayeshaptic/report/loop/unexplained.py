@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayeshaptic.report.numbers.quantities import interval, pure, quantity
+from bayeshaptic.quantities import interval, pure, quantity
 from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:

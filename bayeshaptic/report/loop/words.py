@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.traced import CONSISTENT, UNEXPLAINED
-from bayeshaptic.report.loop import force_words
-from bayeshaptic.report.loop.unexplained import remainder, worst
-from bayeshaptic.report.numbers.estimates import decibel
-from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
-from bayeshaptic.report.numbers.quantities import (
+from bayeshaptic.quantities import (
     estimate,
     pretty_unit,
     pure,
     quantity,
     scale,
 )
+from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.loop.unexplained import remainder, worst
+from bayeshaptic.report.numbers.estimates import decibel
+from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
 from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:

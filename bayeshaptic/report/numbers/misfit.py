@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bayeshaptic.report.numbers.quantities import pure
+from bayeshaptic.quantities import pure
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.quantities import estimate, percent
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.hidden import in_short
-from bayeshaptic.report.numbers.quantities import estimate, percent
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
 

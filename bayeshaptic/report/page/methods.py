@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.numbers.quantities import interval, quantity
+from bayeshaptic.quantities import interval, quantity
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.version import __version__
 

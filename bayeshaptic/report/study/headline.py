@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from bayeshaptic.quantities import percent, quantity
 from bayeshaptic.report.headline import Headline, headline, rounded_down
 from bayeshaptic.report.numbers.cases import is_free
-from bayeshaptic.report.numbers.quantities import percent, quantity
 from bayeshaptic.report.study.words import Z90, listed, missing
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 

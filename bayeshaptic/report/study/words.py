@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.quantities import estimate, percent, pure
 from bayeshaptic.report.numbers.bands import band_of
 from bayeshaptic.report.numbers.cases import is_free
 from bayeshaptic.report.numbers.estimates import decibel
-from bayeshaptic.report.numbers.quantities import estimate, percent, pure
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case

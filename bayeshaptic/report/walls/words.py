@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bayeshaptic.report.numbers.quantities import Scale, percent, percents, pure, quantity, scale
+from bayeshaptic.quantities import Scale, percent, percents, pure, quantity, scale
 
 if TYPE_CHECKING:
     from bayeshaptic.report.numbers.rules import Rules

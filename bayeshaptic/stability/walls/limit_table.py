@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
+from bayeshaptic.quantities import percent, quantity
+from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.walls.damping import Damping
@@ -100,8 +102,8 @@ class FilterLimits:
         return None if boundary is None else width_of(boundary)
 
 
-@dataclass(frozen=True)
-class LimitTable:
+@dataclass(frozen=True, repr=False)
+class LimitTable(Shown):
     """Limits at given risks over the cases of a device.
 
     Attributes
@@ -235,6 +237,35 @@ class LimitTable:
                 for risk, b in found.items()
             },
         }
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a way to get the velocity, a damping and a risk."""
+        return data_frame(
+            {
+                "velocity": part.kind.label,
+                "damping": float(damping),
+                "damping_unit": self.damping_unit,
+                "risk": risk,
+                "stiffness": float(stiffness),
+                "stiffness_unit": self.unit,
+            }
+            for part in self.filters
+            for risk in self.risks
+            if (boundary := part.boundary(risk)) is not None
+            for damping, stiffness in zip(boundary.damping, boundary.stiffness, strict=True)
+        )
+
+    def _lines(self) -> tuple[str, ...]:
+        stated = [
+            f"{quantity(value, self.unit, digits=4)} at {percent(risk)}"
+            for risk, value in zip(self.risks, self.stiffness, strict=True)
+            if value is not None
+        ]
+        return (
+            f"Limits of walls over {len(self.cases)} case{'s' if len(self.cases) > 1 else ''}",
+            f"without damping: {', '.join(stated) or 'too few draws to say'}",
+            f"with damping, velocity by: {', '.join(part.kind.label for part in self.filters)}",
+        )
 
 
 @at_the_door

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bayeshaptic.quantities import Scale, scale
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.hover import Reading, note
-from bayeshaptic.report.numbers.quantities import Scale, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

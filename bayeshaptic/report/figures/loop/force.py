@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bayeshaptic.quantities import scale
 from bayeshaptic.recordings.response.etfe import RandomSpectra
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.numbers.quantities import scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

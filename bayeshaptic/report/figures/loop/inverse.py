@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bayeshaptic.quantities import scale
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.numbers.quantities import scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bayeshaptic.quantities import estimate
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
-from bayeshaptic.report.numbers.quantities import estimate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

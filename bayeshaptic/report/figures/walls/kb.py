@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.quantities import Scale, percent, scale
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.hover import Reading, note
-from bayeshaptic.report.numbers.quantities import Scale, percent, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
