@@ -10,6 +10,7 @@ from fake_analysis import fake_analysis, fake_closed
 from fake_study import fake_study
 
 import bayeshaptic as bh
+from bayeshaptic.inference.rank_statistics import split_rhat
 from bayeshaptic.report.walls.section import case_of, table_of
 
 ANALYSIS = fake_analysis("free", spread=0.01)
@@ -94,4 +95,11 @@ def test_arviz_sees_what_the_report_says() -> None:
     assert data.posterior["m1"].attrs["units"] == "kg"
     quantile = float(data.posterior["m1"].quantile(0.5))
     assert quantile == pytest.approx(ANALYSIS.posterior.quantile(0.5)[0], rel=1e-12)
+    by_ensemble = ANALYSIS.posterior.to_arviz(chains="ensembles")
+    assert by_ensemble.posterior.sizes["chain"] == len(ANALYSIS.posterior.chains)
+    rhat = float(arviz.rhat(by_ensemble)["m1"])
+    ours = split_rhat(by_ensemble.posterior["m1"].values)
+    assert rhat == pytest.approx(ours, rel=1e-6)
+    assert data.posterior["m1"].attrs["rhat"] == ANALYSIS.posterior.rhat[0]
+    assert set(data.observed_data.data_vars) == set(data.posterior_predictive.data_vars)
     assert set(arviz.summary(data, var_names=["m1", "kc"]).index) == {"m1", "kc"}

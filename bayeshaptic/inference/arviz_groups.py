@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from bayeshaptic.errors import InputError
 from bayeshaptic.inference.archive import model_to_dict
+from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.netcdf import Group, Variable, dataset, write
 from bayeshaptic.models import Model, draw
@@ -37,6 +41,8 @@ class Sampled(Protocol):
     @property
     def log_likelihood(self) -> Floats: ...
     @property
+    def diagnostics(self) -> Diagnostics: ...
+    @property
     def converged(self) -> bool: ...
     @property
     def message(self) -> str: ...
@@ -50,20 +56,33 @@ class Sampled(Protocol):
     def etfe(self) -> Etfe | None: ...
 
 
-def to_arviz(posterior: Sampled) -> Any:
-    """The posterior as ArviZ keeps it, each walker a chain.
+def to_arviz(posterior: Sampled, chains: str = "walkers") -> Any:
+    """The posterior as ArviZ keeps it.
+
+    With each walker a chain ArviZ counts effective draws as we do; but its R-hat compares walkers
+    of one ensemble, which know of each other and are short. With each ensemble a chain its R-hat is
+    ours, and it counts far too many effective draws. Ours stand in the attributes ``rhat`` and
+    ``effective_draws`` of each variable either way.
 
     Groups: ``posterior`` (a variable a parameter, its unit in ``attrs["units"]``),
     ``sample_stats`` (log likelihood), ``prior``, and, where the measurement is at hand,
     ``log_likelihood`` (a window each), ``observed_data`` and ``posterior_predictive`` (real and
-    imaginary part of the response, noise included).
+    imaginary part of the response, noise included), and ``constant_data`` (the noise's sd).
+
+    Parameters
+    ----------
+    posterior : Posterior
+    chains : {"walkers", "ensembles"}
 
     Returns
     -------
     arviz.InferenceData (0.x) or xarray.DataTree (1.x)
     """
+    if chains not in _ARRANGED:
+        raise InputError(f'chains is "walkers" or "ensembles", not {chains!r}.')
     az = _arviz()
-    groups = {name: dataset(group) for name, group in _groups(posterior).items()}
+    arranged = _groups(posterior, _ARRANGED[chains])
+    groups = {name: dataset(group) for name, group in arranged.items()}
     if int(az.__version__.split(".")[0]) < 1:  # 1.x has the old name too, but not the old thing
         return az.InferenceData(**groups)
     import xarray
@@ -92,16 +111,26 @@ def _by_walker(values: Floats) -> Floats:
     return moved.reshape(-1, *moved.shape[2:])
 
 
-def _groups(posterior: Sampled) -> dict[str, Group]:
+def _by_ensemble(values: Floats) -> Floats:
+    """(ensembles, steps, walkers, ...) to (chain, draw, ...), step by step."""
+    return values.reshape(len(values), -1, *values.shape[3:])
+
+
+_ARRANGED = {"walkers": _by_walker, "ensembles": _by_ensemble}
+
+
+def _groups(
+    posterior: Sampled, arranged: Callable[[Floats], Floats] = _by_walker
+) -> dict[str, Group]:
     """The groups, alike for the file and for both versions."""
     model = posterior.model
-    by_walker = _by_walker(posterior.chains)
+    by_walker = arranged(posterior.chains)
     draws = _numbered(by_walker)
     rng = np.random.default_rng(posterior.seed)
     prior = np.stack([draw(model.prior(n), rng, _PRIOR_DRAWS) for n in model.names], axis=-1)[None]
-    level = Variable(("chain", "draw"), _by_walker(posterior.log_likelihood))
+    level = Variable(("chain", "draw"), arranged(posterior.log_likelihood))
     groups = {
-        "posterior": Group(_parameters(posterior, by_walker), draws, _about(posterior)),
+        "posterior": Group(_sampled(posterior, by_walker), draws, _about(posterior)),
         "sample_stats": Group({"log_likelihood": level}, draws),
         "prior": Group(_parameters(posterior, prior), _numbered(prior)),
     }
@@ -130,6 +159,24 @@ def _parameters(posterior: Sampled, values: Floats) -> dict[str, Variable]:
             {"units": model.unit(name), "long_name": model.parameter(name).title},
         )
         for i, name in enumerate(model.names)
+    }
+
+
+def _sampled(posterior: Sampled, values: Floats) -> dict[str, Variable]:
+    """The same with R-hat and effective draws as the report has them."""
+    found = _parameters(posterior, values)
+    known = posterior.diagnostics
+    least = np.minimum(known.ess_bulk, known.ess_tail)
+    return {
+        name: replace(
+            variable,
+            attributes={
+                **variable.attributes,
+                "rhat": float(known.rhat[i]),
+                "effective_draws": float(least[i]),
+            },
+        )
+        for i, (name, variable) in enumerate(found.items())
     }
 
 
@@ -184,9 +231,10 @@ def _predictive(
     observed = {
         "response_real": Variable(("frequency",), etfe.value.real, unit),
         "response_imag": Variable(("frequency",), etfe.value.imag, unit),
-        "sd": Variable(("frequency",), np.sqrt(etfe.variance), unit),
     }
+    sd = Variable(("frequency",), np.sqrt(etfe.variance), unit)
     return {
         "posterior_predictive": Group(predicted, _numbered(some) | where),
         "observed_data": Group(observed, where),
+        "constant_data": Group({"response_sd": sd}, where),
     }

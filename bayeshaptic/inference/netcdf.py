@@ -30,7 +30,7 @@ class Variable:
 
     dims: tuple[str, ...]
     values: NDArray[Any] = field(repr=False)
-    attributes: Mapping[str, str] = field(default_factory=dict)
+    attributes: Mapping[str, str | float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

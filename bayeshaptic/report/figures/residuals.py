@@ -9,8 +9,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.figures.octaves import noise_band, rms_axis
-from bayeshaptic.report.numbers.octaves import third_octaves
+from bayeshaptic.report.numbers.octaves import BandResidual, third_octaves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,3 +84,30 @@ def _symlog(axes: Axes, worst: float) -> None:
     axes.yaxis.set_major_locator(FixedLocator([*(-t for t in reversed(tens)), -2, 0, 2, *tens]))
     axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+
+
+def noise_band(axes: Axes, bands: BandResidual) -> None:
+    """What 99 % of pure noise stays within, in grey."""
+    axes.fill_between(
+        bands.frequency_hz,
+        bands.low,
+        bands.high,
+        color="#bdbdbd",
+        alpha=0.45,
+        linewidth=0,
+        label="99 % of pure noise",
+    )
+
+
+def rms_axis(axes: Axes, lowest: float, highest: float) -> None:
+    """From zero; logarithmic where the residual is many times the noise."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if highest <= 6:
+        axes.set_ylim(0, 1.1 * highest)
+        return
+    axes.set_yscale("log")
+    axes.set_ylim(0.9 * lowest, 1.3 * highest)
+    axes.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+    axes.yaxis.set_minor_formatter(NullFormatter())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.figures.octaves import noise_band, rms_axis
+from bayeshaptic.report.figures.residuals import noise_band, rms_axis
 from bayeshaptic.report.numbers.octaves import third_octaves
 
 if TYPE_CHECKING:
