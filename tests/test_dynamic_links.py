@@ -188,6 +188,16 @@ def test_one_link_is_compiled_as_it_is_written():
     np.testing.assert_allclose(one.on_axis(omega), one.at(1j * omega[:, None]), rtol=1e-12)
 
 
+def test_vectors_that_are_no_numbers_leave_the_others_alone():
+    system = linked("lhifam", "grasped").rows(np.zeros(3, int))
+    broken = system.mechanism.masses[0] * [1.0, np.nan, 1.0]
+    mechanism = replace(system.mechanism, masses=(broken, *system.mechanism.masses[1:]))
+    with np.errstate(all="ignore"):
+        found = replace(system, mechanism=mechanism).sampled_response(FREQUENCY_HZ, T)
+    assert np.isnan(found[1]).all()
+    np.testing.assert_allclose(found[[0, 2]], system.sampled_response(FREQUENCY_HZ, T)[:2])
+
+
 def test_mechanism_too_fast_for_the_series():
     system = linked("lhifam", "grasped")
     mass = 0.1 * system.mechanism.masses[0]

@@ -231,10 +231,12 @@ def sampled_remainder(
     top = float(np.max(theta))
     fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
     few = len(theta) <= _TERMS
-    nearest = np.where(few, 0, 1 + np.ceil((fastest + top - _REACH) / (2 * np.pi)))
-    nearest = np.where(nearest > _MOST_ALONE, 0, np.maximum(nearest, 1)).astype(int)
-    for first in np.unique(nearest):  # 0: no series converges
-        rows = nearest == first
+    nearest = np.maximum(1 + np.ceil((fastest + top - _REACH) / (2 * np.pi)), 1)
+    series_from = np.zeros(len(fastest), int)  # 0: no series converges, or nothing is a number
+    converges = (nearest <= _MOST_ALONE) & (not few)
+    series_from[converges] = nearest[converges]
+    for first in np.unique(series_from):
+        rows = series_from == first
         part = remainder if rows.all() else remainder.rows(rows)
         late = delay_s[rows]
         if first == 0:
