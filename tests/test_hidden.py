@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fake_analysis import fake_analysis
 from linear_bench import RIGID, Device
 
 from bayeshaptic.diagnosis.closed import close_loop
@@ -23,6 +25,7 @@ from bayeshaptic.inference import least_squares, sample
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import build_model
+from bayeshaptic.models.response.remainder import alias_sums
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.recordings.study import read_study
@@ -181,3 +184,14 @@ def test_probabilities_of_a_study(tmp_path: Path) -> None:
         read_study(file)
     with pytest.raises(InputError, match="did you mean extra_delay"):
         HiddenPrior.from_table({"extra_dela": 0.1})
+
+
+def test_a_lossy_transmission_without_any_alias_to_sum_sums_none() -> None:
+    """Steps may go so far on their way that the series begins behind the last one."""
+    model = replace(build_model("free", "lhifam"), period_s=1e-3)
+    loss = effect_class("structural_damping").candidates(model, fake_analysis("free").etfe)[0]
+    full = model.with_effect(loss)
+    values = dict(model.reference) | {"loss_factor": 0.1}
+    system = full.system(np.array([values[name] for name in full.names]))
+    none = alias_sums(system.remainder, np.linspace(0.1, 1.0, 16), system.delay_s, 1e-3, 9)
+    assert none.shape == (16, 1) and np.all(none == 0)

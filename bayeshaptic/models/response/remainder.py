@@ -205,7 +205,8 @@ def _shared_alias_sums(
     omega = ((theta + 2 * np.pi * k[:, None]) / period_s).ravel()
     values = remainder.on_axis(omega) / (1j * omega[:, None])
     turned = np.exp(-2j * np.pi * k[:, None] * delay_s / period_s)
-    return np.einsum("kb,klb->lb", turned, values.reshape(len(k), len(theta), -1))
+    # By name: where a series reaches everything there is no alias, and nothing to count from.
+    return np.einsum("kb,klb->lb", turned, values.reshape(len(k), len(theta), values.shape[-1]))
 
 
 def _numbers(nearest: int, furthest: int) -> NDArray[np.int_]:
