@@ -16,9 +16,10 @@ from bayeshaptic.diagnosis.hidden.hidden import Hidden
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
 from bayeshaptic.diagnosis.measured import device_of, measurement_of
 from bayeshaptic.diagnosis.options import Options, options_from
+from bayeshaptic.diagnosis.overdispersion import noise_scale
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.choose import Choice, choose_model
-from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
+from bayeshaptic.inference.least_squares import Fit, least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model, build_model
@@ -64,8 +65,8 @@ class Analysis(Shown):
     seconds : mapping
         Stage to the time it took.
     noise_scale : float
-        Factor on the noise variance in the posterior: the reduced chi-square where the model
-        misfits, 1 elsewhere.
+        Factor on the noise variance in the posterior where the model misfits
+        (`bayeshaptic.diagnosis.overdispersion`), 1 elsewhere.
     lever_m : float or None
     hidden : Hidden or None
         What could hide, where the limit allows for it.
@@ -234,7 +235,7 @@ def finish(
         Whether the stiffness at a small risk is to be known, too.
     """
     clock = _Clock(dict(begun.seconds))
-    scale = fit.reduced_chi_square if fit.reduced_chi_square > MISFIT else 1.0
+    scale = noise_scale(fit)
     # A misfit's tail means nothing, and a limit for comparison needs none.
     watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
     with clock.stage("sampling"):
@@ -262,7 +263,7 @@ def finish(
         posterior=posterior,
         limit=limit,
         etfe_limit=etfe_limit,
-        notices=begun.notices + limit.notices + _misfit_notice(scale),
+        notices=begun.notices + limit.notices + _misfit_notice(fit.reduced_chi_square, scale),
         seconds=clock.seconds,
         noise_scale=scale,
         lever_m=begun.lever_m,
@@ -318,13 +319,16 @@ def _residual_notice(begun: Begun) -> tuple[Notice, ...]:
     return (Notice("warning", "residual", text),)
 
 
-def _misfit_notice(scale: float) -> tuple[Notice, ...]:
+def _misfit_notice(chi_square: float, scale: float) -> tuple[Notice, ...]:
     if scale == 1.0:
         return ()
+    length = scale / chi_square
+    alike = f", and {length:.2g} windows count as one, because their residuals are alike"
     text = (
-        f"The residual is {scale**0.5:.3g} times the noise (reduced chi-square {scale:.3g}): the "
-        "model lacks something that this device has. The posterior takes that much noise, so that "
-        "its intervals are not narrower than the misfit allows, but the misfit is not noise: the "
-        "critical stiffness may be wrong by more than its interval."
+        f"The residual is {chi_square**0.5:.3g} times the noise (reduced chi-square "
+        f"{chi_square:.3g}): the model lacks something that this device has. The posterior takes "
+        f"that much noise{alike if length > 1.05 else ''}, so that its intervals are not narrower "
+        "than the misfit allows, but the misfit is not noise: the critical stiffness may be wrong "
+        "by more than its interval."
     )
     return (Notice("warning", "misfit", text),)
