@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.models import rigid
 from bayeshaptic.recordings import read_frf, read_measurement
 from bayeshaptic.recordings.response.etfe import Etfe
 
@@ -151,3 +152,32 @@ def test_a_table_needs_a_period(tmp_path: Path) -> None:
         read_frf(path, -1.0)
     with pytest.raises(InputError, match="position over force"):
         read_frf(path, 1e-3, "gain_db=gain_db[m]")
+
+
+@pytest.mark.parametrize(
+    ("kind", "derivatives", "unit"),
+    [("receptance_db", 0, "m/N"), ("mobility_db", 1, "m/s/N"), ("accelerance_db", 2, "mm/s^2/N")],
+)
+def test_the_response_of_a_structure_gets_the_hold(
+    tmp_path: Path, kind: str, derivatives: int, unit: str
+) -> None:
+    """Beside the exact sampled response of the same mass and damper."""
+    of = RESPONSE * (2j * np.pi * FREQUENCY) ** derivatives * (1e3 if unit[:2] == "mm" else 1)
+    sd = 1e-3 * np.abs(of)
+    gain, phase = 20 * np.log10(np.abs(of)), np.degrees(np.angle(of))
+    columns = {"frequency_hz": FREQUENCY, kind: gain, "phase_deg": phase, "sd": sd}
+    mapping = f"{kind}={kind}[{unit}]"
+    etfe = read_frf(write(tmp_path / "a.csv", **columns), period_s=1e-3, columns=mapping)
+    model = rigid(delay_s=0.0).with_period(1e-3)
+    exact = model.response(np.array([5.0, 7.0]), FREQUENCY)
+    assert np.all(np.abs(etfe.value - exact) < 2 * np.sqrt(etfe.variance))
+    low = FREQUENCY < 30  # aliases are (30 / 970)^3 there
+    np.testing.assert_allclose(etfe.value[low], exact[low], rtol=1e-4)
+    np.testing.assert_allclose(np.sqrt(etfe.variance[low]), 1e-3 * abs(exact[low]), rtol=1e-3)
+    assert any("structure" in note.text for note in etfe.notices)
+
+
+def test_a_response_is_of_one_kind(tmp_path: Path) -> None:
+    both = write(tmp_path / "a.csv", **base(receptance_db=GAIN_DB, sd=0.1))
+    with pytest.raises(InputError, match="there is gain_db and receptance_db"):
+        read_frf(both, period_s=1e-3)

@@ -175,6 +175,19 @@ def test_inverse_dynamics_finds_the_friction_first() -> None:
     assert np.all(np.diff([step.held_out_rms for step in found.steps]) < 0)
 
 
+def test_inverse_dynamics_of_less_than_a_second_is_not_certain() -> None:
+    """A mass in white noise of force: no sd may be far below that of ordinary least squares."""
+    rng = np.random.default_rng(1)
+    force = rng.standard_normal(900)
+    velocity = np.cumsum(force) * 1e-3 / 5.0
+    position = np.cumsum(velocity) * 1e-3
+    recording = recording_from_arrays(force, position, period_s=1e-3)
+    found = inverse_dynamics(recording, cutoff_hz=100.0)
+    value, sd = found["mass"]
+    assert sd > found.rms / np.sqrt(np.sum(found.path.acceleration**2)) / 2
+    assert value == pytest.approx(5.0, rel=0.1)
+
+
 def test_inverse_dynamics_refuses_in_one_line() -> None:
     recording = servo(0.0)
     with pytest.raises(InputError, match="no term nonsense"):

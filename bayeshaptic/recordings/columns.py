@@ -17,7 +17,9 @@ from bayeshaptic.recordings.readers import Arrays
 from bayeshaptic.recordings.units import base_unit, is_unit
 
 RECORDING_ROLES = ("time", "force", "position")
-FRF_ROLES = ("frequency", "gain_db", "phase_deg", "sd", "coherence", "averages")
+# Of what a frequency response is: `bayeshaptic.recordings.response.frf_kinds`.
+FRF_KINDS = ("gain_db", "receptance_db", "mobility_db", "accelerance_db")
+FRF_ROLES = ("frequency", *FRF_KINDS, "phase_deg", "sd", "coherence", "averages")
 ROLES = (*RECORDING_ROLES, *FRF_ROLES)
 
 # Headers that need no mapping, with the unit they say.

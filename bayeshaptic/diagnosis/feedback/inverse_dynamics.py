@@ -30,6 +30,10 @@ from bayeshaptic.types import Floats
 _BAND = 0.05  # of the sampling rate: the usual cut-off
 _FEWEST = 100  # samples left after decimation
 _BLOCK_S = 1.0  # residuals further apart are taken to be independent
+_BLOCKS_A_TERM = 5  # of a recording that has fewer seconds, shorter blocks
+_ITS_OWN = (
+    1e-3  # of a column's power that no others make, or it is no new term: a tone's spring is a mass
+)
 _WORTH = 0.02  # a term must lower the held-out error by so much, in both halves
 
 
@@ -262,13 +266,22 @@ def _grow(
         found = {
             name: _held_out(columns, [*chosen, name], force)
             for name in columns
-            if name not in chosen
+            if name not in chosen and _says_more(columns, chosen, name)
         }
         order = sorted(found, key=lambda name: found[name][0])
         if not order or np.any(found[order[0]][1] > (1 - _WORTH) * halves):
             return [Addition(name, found[name][0]) for name in order]
         chosen.append(order[0])
         steps.append(Addition(order[0], found[order[0]][0]))
+
+
+def _says_more(columns: dict[str, Floats], chosen: list[str], name: str) -> bool:
+    """Whether a column is more than a combination of those chosen."""
+    design = np.stack([columns[one] for one in chosen], axis=1)
+    scale = np.linalg.norm(design, axis=0) + np.finfo(float).tiny
+    column = columns[name]
+    left = column - design / scale @ np.linalg.lstsq(design / scale, column, rcond=None)[0]
+    return bool(left @ left > _ITS_OWN * (column @ column))
 
 
 def _held_out(columns: dict[str, Floats], names: list[str], force: Floats) -> tuple[float, Floats]:
@@ -288,9 +301,13 @@ def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:
     Sandwich of the scores summed over blocks (K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986).
     """
     value = np.linalg.lstsq(design, force, rcond=None)[0]
+    block = max(min(block, len(force) // (_BLOCKS_A_TERM * design.shape[1])), 1)
     scores = design * (force - design @ value)[:, None]
     sums = np.add.reduceat(scores, np.arange(0, len(force), block))
     bread = np.linalg.inv(design.T @ design)
     covariance = bread @ (sums.T @ sums) @ bread
     sd = np.sqrt(np.diag(covariance) * len(sums) / max(len(sums) - design.shape[1], 1))
+    # No less than without correlation.
+    left = force - design @ value
+    sd = np.maximum(sd, np.sqrt(np.diag(bread) * (left @ left) / (len(force) - design.shape[1])))
     return np.asarray(value, dtype=np.float64), np.asarray(sd, dtype=np.float64)

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.recordings.columns import FRF_ROLES, Column, parse_columns, pick
+from bayeshaptic.recordings.columns import FRF_KINDS, FRF_ROLES, Column, parse_columns, pick
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.frf_kinds import PER_TIME, STRUCTURAL, as_sampled, told
 from bayeshaptic.recordings.response.spectra import TableSpectra
 from bayeshaptic.recordings.units import base_unit, choose_units
+from bayeshaptic.types import Complexes
 
 FEWEST_ROWS = 10
 
@@ -46,6 +48,10 @@ def read_frf(
 
       (for large n Bendat and Piersol, *Random Data*, section 9.2: their relative error of the
       magnitude, :math:`\sqrt{1 - \gamma^2} / (|\gamma| \sqrt{2 n})`, is one of two components).
+
+    ``receptance_db``, ``mobility_db`` or ``accelerance_db`` (position, velocity or acceleration
+    over a measured force) in the place of ``gain_db`` say that the response is that of a continuous
+    structure, as a hammer or a shaker finds it: it is turned into that of a loop with a hold.
 
     Parameters
     ----------
@@ -96,16 +102,22 @@ def frf_from_arrays(
     frequency = columns["frequency"]
     _check_frequencies(path, frequency, period_s)
     factor = 1.0
-    written = mapping["gain_db"].unit if "gain_db" in mapping else None
+    (of,) = (role for role in FRF_KINDS if role in columns)
+    derivatives = STRUCTURAL.get(of, 0)
+    written = mapping[of].unit if of in mapping else None
     if written is not None:
-        position_unit, force_unit, factor = _units_of_gain(path, written)
+        position_unit, force_unit, factor = _units_of_gain(path, written, derivatives)
     units = choose_units(force_unit, position_unit, kind)
     notices: tuple[Notice, ...] = ()
     if force_unit is None and position_unit is None:
         text = f"No units were given: the gain is taken to be in {units[1]}/{units[0]}."
         notices = (Notice("note", "units", text),)
-    value = 10 ** (columns["gain_db"] / 20) * np.exp(1j * np.radians(columns["phase_deg"]))
+    phase = np.exp(1j * np.radians(columns["phase_deg"]))
+    value: Complexes = np.asarray(10 ** (columns[of] / 20) * phase)
     variance, averages = _variance(path, columns, value)
+    if of in STRUCTURAL:
+        value, variance = as_sampled(value, variance, frequency, period_s, derivatives)
+        notices = (*notices, told(of))
     spectra = TableSpectra(frequency, value * factor, variance * factor**2, averages)
     return Etfe(
         frequency_hz=frequency,
@@ -132,9 +144,16 @@ def _columns(
         raise InputError(f"{path}: '{role}' belongs to a recording, not to a frequency response")
     columns: dict[str, NDArray[np.float64]] = {}
     for role in FRF_ROLES:
-        found = pick(arrays, role, mapping, path, required=role in FRF_ROLES[:3])
+        found = pick(arrays, role, mapping, path, required=role in ("frequency", "phase_deg"))
         if found is not None:
             columns[role] = found[0]
+    kinds = [role for role in FRF_KINDS if role in columns]
+    if len(kinds) != 1:
+        there = " and ".join(kinds) or "none"
+        raise InputError(
+            f"{path}: the response needs one column of {', '.join(FRF_KINDS)}; there is {there}; "
+            "name it, as in --columns gain_db=mag[m/N]"
+        )
     if "sd" not in columns and not {"coherence", "averages"} <= set(columns):
         there = "coherence without averages" if "coherence" in columns else "neither"
         raise InputError(
@@ -195,13 +214,17 @@ def _variance(
     return np.abs(value) ** 2 * (1 - coherence) / (coherence * (averages - 1)), averages
 
 
-def _units_of_gain(path: Path, written: str) -> tuple[str, str, float]:
+def _units_of_gain(path: Path, written: str, derivatives: int) -> tuple[str, str, float]:
     """Base units of position and force, and the factor to them, for ``mm/N`` and the like."""
-    position, slash, force = written.partition("/")
-    if not slash:
+    motion, slash, force = written.replace(" ", "").rpartition("/")
+    endings = [end for end in PER_TIME[derivatives] if motion.endswith(end)]
+    if not (slash and endings):
+        what = ("position", "velocity", "acceleration")[derivatives]
         raise InputError(
-            f"{path}: the gain's unit is position over force, as in [m/N], not [{written}]"
+            f"{path}: the gain's unit is {what} over force, as in [m{PER_TIME[derivatives][0]}/N], "
+            f"not [{written}]"
         )
+    position = motion.removesuffix(endings[0])
     position_unit, position_factor = base_unit("position", position)
     force_unit, force_factor = base_unit("force", force)
     return position_unit, force_unit, position_factor / force_factor
