@@ -124,3 +124,12 @@ def test_every_refusal_has_an_entry() -> None:
     assert all((ROOT / "bayeshaptic" / place).exists() for place in places)
     refusing = [path.as_posix() for path in calls_of("InputError")]
     assert not [path for path in refusing if not path.startswith(tuple(places))]
+
+
+def test_the_gallery_is_light_and_needs_nothing() -> None:
+    pages = sorted((ROOT / "docs" / "gallery").glob("*.html"))
+    assert [page.stem for page in pages] == ["clean", "explained", "refused", "unexplained"]
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert len(text) < 2_000_000 and text.rstrip().endswith("</html>")
+        assert 'src="http' not in text and "/tmp/" not in text
