@@ -19,7 +19,6 @@ extensions = [
 html_theme = "furo"
 html_title = f"bayeshaptic {__version__}"
 exclude_patterns = ["README.md", "study", "gallery"]
-html_extra_path = ["gallery"]
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
