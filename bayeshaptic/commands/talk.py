@@ -36,7 +36,9 @@ class Talk:
             from tqdm import tqdm
 
             form = "{percentage:3.0f} % |{bar}| {elapsed}, {remaining} to go; {desc}"
-            self._bar = tqdm(total=1.0, leave=False, dynamic_ncols=True, bar_format=form)
+            self._bar = tqdm(
+                total=1.0, leave=False, dynamic_ncols=True, bar_format=form, smoothing=0
+            )
 
     def __enter__(self) -> Talk:
         when_compiling(self._compiling)

@@ -98,6 +98,8 @@ class _Loop:
     rejected: tuple[Trial, ...] = ()
     path: list[State] = field(default_factory=list)
     number: int = 0
+    told: int = 0  # the round that progress was told of last, and how many candidates of it
+    tried: int = 0
 
     def run(self) -> Traced:
         state = self.kind.first
@@ -183,8 +185,11 @@ class _Loop:
 
     def _tick(self, what: str) -> None:
         if self.progress:
-            # Each round is half of what is left: nobody knows how many there will be.
-            share = 1 - 0.5 ** (self.number - 1)
+            # Each round is half of what is left, and each candidate a fifth of what is left of it:
+            # nobody knows how many there will be.
+            self.tried = 1 if self.number != self.told else self.tried + 1
+            self.told = self.number
+            share = 1 - 0.5 ** (self.number - 1) * (1 - 0.5 * (1 - 0.8 ** (self.tried - 1)))
             self.progress(share, f"round {self.number}: trying {what}")
 
 
