@@ -25,6 +25,7 @@ from bayeshaptic.stability.crossings import find_crossings
 from bayeshaptic.types import Floats
 
 _LEANS = 3.0  # standard deviations from its wall, from where a parameter may be moved
+_LEAST, _MOST = 1e-3, 30.0  # times its value: no parameter gives way further than that
 _RIDGE = 1e-12
 _IMPOSSIBLE = 1e6
 
@@ -117,8 +118,14 @@ class Around:
         return np.maximum(power, 0.0)
 
     def moved(self, changes: Floats) -> Floats:
-        """How far the parameters give way, in `here`, shape (C, P)."""
-        return -(changes @ self.pull.T) @ self.root
+        """How far the parameters give way, in `here`, shape (C, P); no further than makes sense."""
+        there = self.centre - (changes @ self.pull.T) @ self.root
+        far = np.abs(self.centre) * np.array([[_LEAST], [_MOST]])
+        low = np.where(
+            self.here.log, self.centre - np.log(_MOST), np.maximum(far[0], self.here.low)
+        )
+        high = np.where(self.here.log, self.centre + np.log(_MOST), far[1])
+        return np.clip(there, np.minimum(low, self.centre), high) - self.centre
 
     def overlap(self, one: Floats, other: Floats) -> Floats:
         """What two effects at once take off the sum of their log evidences, shape (A, B)."""

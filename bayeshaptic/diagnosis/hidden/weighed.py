@@ -85,7 +85,8 @@ def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
     weight = np.exp(log_weight - top) if np.isfinite(top) else np.full(len(phi), 1.0)
     evidence = top + float(np.log(weight.mean()))
     kept = rng.permutation(systematic(weight, KEPT, rng))
-    factor = _log_factor(suspect, known, vectors, theta, kept)
+    excluded = not np.isfinite(top)  # no draw is possible
+    factor = np.zeros(KEPT) if excluded else _log_factor(suspect, known, vectors, theta, kept)
     return Weighed(
         suspect.name,
         suspect.title,
