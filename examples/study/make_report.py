@@ -1,7 +1,7 @@
 """Make the report of the example study again: python examples/study/make_report.py
 
-Writes docs/study: the page without the recordings' own pages, and its numbers. What a user would
-run is `bayeshaptic report examples/study/study.toml -o out/`, which has those as well.
+Writes docs/study: the page without the recordings' own pages, its numbers and its figures. What a
+user would run is `bayeshaptic report examples/study/study.toml -o out/`, which has those as well.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from bayeshaptic.threads import one_thread_from_the_start
 
 FOLDER = Path(__file__).parent
 REPORT = FOLDER.parents[1] / "docs" / "study"
-KEPT = {"report.html", "population.json", "limits.json", "limits.csv", "study_people.png"}
 
 
 def main() -> None:
@@ -29,9 +28,6 @@ def main() -> None:
         bh.read_study(FOLDER / "study.toml"), close_loop=True, executor=executor
     )
     print(write_study_report(study, given.output))
-    for path in given.output.glob("*.png"):  # they are in the page
-        if path.name not in KEPT:
-            path.unlink()
 
 
 if __name__ == "__main__":
