@@ -372,8 +372,6 @@ def test_warnings_are_one_line_each(run: Run, monkeypatch: pytest.MonkeyPatch) -
 # A shell's background processes ignore interrupts, and so would their children.
 WAITING = """
 import signal, sys, time
-from fake_analysis import fake_analysis
-
 from bayeshaptic import cli
 from bayeshaptic.jobs import batch
 
@@ -486,6 +484,7 @@ class TestReport:
             configuration = 0.25
             [[recording]]
             file = "bad.csv"
+            level = 2
             [[recording]]
             file = "{phantom.as_posix()}"
             """

@@ -129,3 +129,7 @@ def test_a_study_joins_what_nothing_tells_apart(tmp_path: Path) -> None:
     assert read("pool = false\n") == [1, 1, 1]
     with pytest.raises(bh.InputError, match="pool"):
         read('pool = "yes"\n')
+    (tmp_path / "1.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
+    assert read("pool = true\n") == [2]  # one that cannot be read takes none with it
+    joined = bh.read_study(path).read_all()[0]
+    assert any(n.level == "warning" and "1.csv" in n.text for n in joined.notices)

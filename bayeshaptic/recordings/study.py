@@ -101,7 +101,7 @@ class Study:
         """The measurement of one `entry`, with what the study declares about it.
 
         Time stamps come before the device's period, which serves where a file has none. What
-        counts together is joined (`join_recordings`).
+        counts together is joined (`join_recordings`), less what cannot be read.
 
         Raises
         ------
@@ -110,14 +110,28 @@ class Study:
         """
         if not entry.more:
             return self._read_one(entry)
-        found = [self._read_one(one) for one in (entry, *entry.more)]
+        found, lost = [], []
+        for one in (entry, *entry.more):
+            try:
+                found.append(self._read_one(one))
+            except InputError as error:
+                lost.append(error)
+        if not found:
+            raise lost[0]
         recordings = [one for one in found if isinstance(one, Recording)]
         if len(recordings) < len(found):
             raise InputError(
                 f"{self.path}: {entry.path.name} and what counts together with it are tables of a "
                 "response, which cannot be joined; write pool = false at the top of the study"
             )
-        return join_recordings(recordings)
+        joined = join_recordings(recordings)
+        if not lost:
+            return joined
+        why = "; ".join(str(error) for error in lost)
+        text = (
+            f"{len(lost)} of {len(found) + len(lost)} recordings that count as one left out: {why}"
+        )
+        return replace(joined, notices=(*joined.notices, Notice("warning", "pieces", text)))
 
     def _read_one(self, entry: StudyEntry) -> Recording | Etfe:
         columns = entry.columns if entry.columns is not None else self.columns

@@ -88,7 +88,8 @@ def _within(density: Density, phi: Floats, widths: Floats) -> Floats:
     """
     here = density.coordinates
     low = np.where(here.walls, -np.inf, here.low + _MARGIN * widths)
-    return np.clip(phi, low, here.high - _MARGIN * widths)
+    own = here.own(phi)  # the support is that of each parameter by itself
+    return phi + np.clip(own, low, here.high - _MARGIN * widths) - own
 
 
 def _climb(

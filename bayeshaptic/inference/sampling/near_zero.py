@@ -22,6 +22,7 @@ from bayeshaptic.types import Floats
 Redraw = Callable[[Floats, np.random.Generator], tuple[Floats, Floats]]
 """From points (B, P) to proposed points, with log density of proposing the way back over there."""
 _SEEN = 5.0  # standard deviations from zero, from which a parameter is sampled as it is
+_LONGEST = 10.0  # coordinate units, of a ridge that is straight: a factor of e^10 in a logarithm
 _BEGIN = 0.3  # quantile of the prior at which to begin: zero is an end
 
 
@@ -37,12 +38,17 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
     found = {i: p for i, p in enumerate(priors) if isinstance(p, NearZero) and not seen[i]}
     if not found:
         return here
-    small = list(found)
-    others = np.setdiff1d(np.arange(len(priors)), small)
     slope = jacobian(weighted_residuals(fit.likelihood, here), here.coordinate(fit.theta)[None])[0]
-    known = slope[:, others].T @ slope[:, others] + np.eye(len(others))
-    follow = np.zeros((len(priors), len(small)))
-    follow[others] = -np.linalg.solve(known, slope[:, others].T @ slope[:, small])
+    small = sorted(found, key=lambda index: fit.theta[index])
+    follow = _followed(slope, small)
+    # Of several whose sum is known, the largest may be far from zero.
+    while small and np.abs(follow @ (fit.theta / here.scale)[small]).max() > _LONGEST:
+        small = small[:-1]
+        follow = _followed(slope, small)
+    if not small:
+        return here
+    small = sorted(small)
+    follow = _followed(slope, small)
     chosen = np.isin(np.arange(len(priors)), small)
     return replace(
         here,
@@ -52,9 +58,18 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
         high=np.where(chosen, np.inf, here.high),
         walls=here.walls & ~chosen,
         near_zero=tuple(small),
-        floor=np.array([prior.floor for prior in found.values()]),
+        floor=np.array([found[index].floor for index in small]),
         follow=follow / here.scale[small],
     )
+
+
+def _followed(slope: Floats, small: list[int]) -> Floats:
+    """How far the others move for each unit of the small ones, shape (P, len(small))."""
+    others = np.setdiff1d(np.arange(slope.shape[1]), small)
+    known = slope[:, others].T @ slope[:, others] + np.eye(len(others))
+    follow = np.zeros((slope.shape[1], len(small)))
+    follow[others] = -np.linalg.solve(known, slope[:, others].T @ slope[:, small])
+    return follow
 
 
 def start_of(here: Coordinates, fit: Fit) -> Floats:
