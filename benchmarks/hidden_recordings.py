@@ -53,17 +53,18 @@ _GRIP = 0.5  # log change of a grip that the tests see
 
 @dataclass(frozen=True)
 class Job:
-    """One recording."""
+    """One recording; `file` is whether the analysis has the device's file."""
 
     case: str
     seconds: float
     effect: str
     share: float
     seed: int
+    file: bool
 
 
 def jobs(count: int, seed: int) -> list[Job]:
-    """`count` recordings, the devices and lengths in turn."""
+    """`count` recordings, the devices, lengths, and device file or none in turn."""
     rng = np.random.default_rng([seed, 15])
     out = []
     for number in range(count):
@@ -72,8 +73,9 @@ def jobs(count: int, seed: int) -> list[Job]:
         possible = [e for e in EFFECTS if e not in (HIDDEN_BY_A_HAND if held else NEEDS_A_HAND)]
         effect = NONE if rng.uniform() < 1 / 3 else str(rng.choice(possible))
         share = float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
-        length = LENGTHS_S[(number // len(CASES)) % len(LENGTHS_S)]
-        out.append(Job(case, length, effect, share, seed + 100 + number))
+        turn = number // len(CASES)
+        length, file = LENGTHS_S[turn % 2], turn // 2 % 2 == 0
+        out.append(Job(case, length, effect, share, 1000 * seed + number, file))
     return out
 
 

@@ -183,31 +183,52 @@ def close_loop(
     notices = analysis.notices + _notices(traced)
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds)
-    if chosen.hidden and force is None and traced.verdict != UNEXPLAINED:
-        analysis = _with_hidden(analysis, traced, prior, chosen)
-    return Closed(base, analysis, traced, _error(base), _error(analysis), force)
+    closed = Closed(base, analysis, traced, _error(base), _error(analysis), force)
+    return with_average(closed, prior, chosen) if chosen.hidden else closed
 
 
-def _with_hidden(
-    analysis: Analysis, traced: Traced, prior: HiddenPrior, options: Options
-) -> Analysis:
-    """With a limit that allows for what tests cannot see; as it is where nothing can be said."""
+def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed:
+    """With a limit that allows for what tests cannot see; as it is where nothing can be said.
+
+    Parameters
+    ----------
+    closed : Closed
+        Without.
+    prior : HiddenPrior
+    options : Options
+    """
+    analysis, traced = closed.analysis, closed.traced
+    if closed.force is not None or traced.verdict == UNEXPLAINED:
+        return closed
     if not analysis.posterior.converged or analysis.noise_scale > 1:
-        return analysis
+        return closed
     began = time.perf_counter()
-    found = with_hidden(
-        analysis.limit,
-        analysis.posterior,
-        analysis.etfe,
-        traced.after,
-        [effect.name for effect in traced.state.accepted],
-        prior,
-        options.seed,
-    )
+    try:
+        found = with_hidden(
+            analysis.limit,
+            analysis.posterior,
+            analysis.etfe,
+            traced.after,
+            [effect.name for effect in traced.state.accepted],
+            prior,
+            options.seed,
+        )
+    except Exception as error:  # the declared limit stands, whatever happens to what is beside it
+        return replace(closed, analysis=_declared_alone(analysis, error))
     if found is None:
-        return analysis
+        return closed
     seconds = {**analysis.seconds, "what could hide": time.perf_counter() - began}
-    return replace(analysis, limit=found[0], hidden=found[1], seconds=seconds)
+    analysis = replace(analysis, limit=found[0], hidden=found[1], seconds=seconds)
+    return replace(closed, analysis=analysis, after=_error(analysis))
+
+
+def _declared_alone(analysis: Analysis, error: Exception) -> Analysis:
+    text = (
+        f"What could hide was not found out ({type(error).__name__}: {error}): the limit is that "
+        "of the model if it is exact, with no allowance for effects too small to be seen. Please "
+        "report this with the recording."
+    )
+    return replace(analysis, notices=(*analysis.notices, Notice("warning", "hidden", text)))
 
 
 def _stages(
