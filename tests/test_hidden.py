@@ -10,7 +10,7 @@ import pytest
 from fake_analysis import fake_analysis
 from linear_bench import RIGID, Device
 
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average
 from bayeshaptic.diagnosis.hidden.average import average, looked_at
 from bayeshaptic.diagnosis.hidden.forces import slope_of
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
@@ -19,6 +19,7 @@ from bayeshaptic.diagnosis.hidden.regression import around
 from bayeshaptic.diagnosis.hidden.sizes import sizes_of
 from bayeshaptic.diagnosis.hidden.suspects import ForceSaid, Suspect, linear_suspects
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, weigh
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference import least_squares, sample
@@ -29,6 +30,7 @@ from bayeshaptic.models.response.remainder import alias_sums
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.recordings.study import read_study
+from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.critical import critical_stiffness
 
@@ -134,8 +136,9 @@ def test_with_no_probability_the_limit_is_the_declared_one(rigid: Posterior) -> 
     assert np.array_equal(tiny[0].samples, limit.samples) and tiny[1].nothing > 0.999999
 
 
-def test_a_lag_that_no_test_sees_is_allowed_for() -> None:
-    """The declared interval lies beside the truth, on the unsafe side."""
+@pytest.fixture(scope="module")
+def lagging() -> tuple[Bench, Closed]:
+    """A held PHANToM with a lag that no test sees."""
     bench = Bench.from_device("phantom", held=True)
     bench = bench.with_effect("actuator_lag", time_constant_s=15e-6)
     noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 10.0)
@@ -148,13 +151,34 @@ def test_a_lag_that_no_test_sees_is_allowed_for() -> None:
         position_unit=made.position_unit,
         encoder_resolution=bench.encoder_resolution,
     )
-    closed = close_loop(recording, "grasped", device="phantom")
+    return bench, close_loop(recording, "grasped", device="phantom")
+
+
+def test_a_lag_that_no_test_sees_is_allowed_for(lagging: tuple[Bench, Closed]) -> None:
+    """The declared interval lies beside the truth, on the unsafe side."""
+    bench, closed = lagging
     assert closed.verdict == "consistent"
     truth, analysis = bench.true_critical_stiffness(), closed.analysis
     assert truth < analysis.declared.quantile(0.01)
     assert analysis.limit.quantile(0.05) < truth < analysis.limit.quantile(0.95)
     assert analysis.limit.safe(0.01) < truth
     assert analysis.hidden is not None and analysis.hidden.nothing < 0.5
+
+
+def test_a_report_survives_its_average(
+    lagging: tuple[Bench, Closed], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, closed = lagging
+    exact = replace(closed.analysis, hidden=None, limit=closed.analysis.declared)
+
+    def fail(*_: object) -> None:
+        raise FloatingPointError("a draw is nowhere")
+
+    monkeypatch.setattr("bayeshaptic.diagnosis.closed.with_hidden", fail)
+    found = with_average(replace(closed, analysis=exact), HiddenPrior(), Options())
+    assert found.analysis.limit is exact.limit and found.analysis.hidden is None
+    assert "a draw is nowhere" in found.analysis.notices[-1].text
+    assert headline(found).status == "caution" and headline(found).stiffness is not None
 
 
 @pytest.mark.parametrize(
