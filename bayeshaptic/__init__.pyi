@@ -40,7 +40,7 @@ from .inference.choose import (
 from .inference.choose import (
     choose_model as choose_model,
 )
-from .inference.least_squares import (
+from .inference.fit import (
     Fit as Fit,
 )
 from .inference.least_squares import (

@@ -145,7 +145,7 @@ def fit_peers(rounds: int) -> dict[str, float]:
     from peers_jobs import starts
     from scipy import optimize
 
-    from bayeshaptic.inference.least_squares import search_box, weighted_residuals
+    from bayeshaptic.inference.fit import search_box, weighted_residuals
     from bayeshaptic.inference.likelihood import Likelihood
 
     fit, start = starts()

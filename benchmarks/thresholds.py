@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from blind_recordings import CASES, HIDDEN_BY_A_HAND, LISTED, NEEDS_A_HAND, SINGLE
 
-from bayeshaptic.diagnosis.analysis import begin
 from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.begun import begin
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.rig import Bench, WhiteNoise, simulate

@@ -11,7 +11,8 @@ import numpy as np
 
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effect_class
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.read import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe

@@ -15,7 +15,7 @@ from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.diagnosis.traced import Candidate, Traced
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.diagnostics import Diagnostics
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import build_model
 from bayeshaptic.models.model import Model

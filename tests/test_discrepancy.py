@@ -12,7 +12,7 @@ from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _fall
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.stability.critical import critical_stiffness
 
 

@@ -16,7 +16,7 @@ from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effect_class, effects
 from bayeshaptic.effects.registry import register
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.archive import model_from_dict, model_to_dict
+from bayeshaptic.inference.saved.archive import model_from_dict, model_to_dict
 from bayeshaptic.models import HalfNormal, Model, Parameter, build_model, rigid
 from bayeshaptic.models.response.mechanism import Link
 from bayeshaptic.models.start import informed

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.inference.least_squares import least_squares, summarise
+from bayeshaptic.inference.fit import summarise
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.next_experiment import information, next_experiment
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.read import recording_from_arrays

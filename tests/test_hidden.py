@@ -29,7 +29,7 @@ from bayeshaptic.models import build_model
 from bayeshaptic.models.response.remainder import alias_sums
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
-from bayeshaptic.recordings.study import read_study
+from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.critical import critical_stiffness

@@ -14,12 +14,8 @@ from bayeshaptic.diagnosis.residuals.residual import smooth_columns
 from bayeshaptic.diagnosis.state import held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.inference.coordinates import coordinates
-from bayeshaptic.inference.least_squares import (
-    Fit,
-    least_squares,
-    summarise,
-    weighted_residuals,
-)
+from bayeshaptic.inference.fit import Fit, summarise, weighted_residuals
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.recordings import recording_from_arrays

@@ -14,7 +14,8 @@ from bayeshaptic.diagnosis.samples.clipped import clipped
 from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
 from bayeshaptic.diagnosis.samples.prediction import as_recorded
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.overdispersion import correlation_length, noise_scale
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.diagnosis.residuals.overdispersion import correlation_length, noise_scale
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import rigid
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe

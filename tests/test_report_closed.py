@@ -17,7 +17,7 @@ from fake_analysis import fake_analysis, fake_closed
 from bayeshaptic import read_recording, write_report
 from bayeshaptic.diagnosis.residuals.columns import motions
 from bayeshaptic.diagnosis.residuals.force_curve import force_curve
-from bayeshaptic.inference.least_squares import summarise
+from bayeshaptic.inference.fit import summarise
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
 from bayeshaptic.report import summary

@@ -15,7 +15,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
-from bayeshaptic.inference.least_squares import MISFIT
+from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.stability.critical import critical_stiffness
 
 _NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit

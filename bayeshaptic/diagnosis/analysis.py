@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.begun import Begun, Clock, begin, measurement_of
 from bayeshaptic.diagnosis.feedback.in_loop import InLoop
 from bayeshaptic.diagnosis.hidden.hidden import Hidden
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
-from bayeshaptic.diagnosis.measured import device_of, measurement_of
 from bayeshaptic.diagnosis.options import Options, options_from
-from bayeshaptic.diagnosis.overdispersion import noise_scale
-from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.inference.choose import Choice, choose_model
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
+from bayeshaptic.errors import Notice
+from bayeshaptic.inference.choose import Choice
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
-from bayeshaptic.models import Model, build_model
+from bayeshaptic.models import Model
 from bayeshaptic.quantities import quantity
-from bayeshaptic.recordings.checks import check_recording
-from bayeshaptic.recordings.feedback import has_feedback, told
-from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
-from bayeshaptic.recordings.sufficiency import refuse_too_little
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
@@ -39,7 +33,6 @@ from bayeshaptic.threads import single_threaded
 _MOST_EVALUATIONS = 400_000
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
 _MISFIT_EVALUATIONS = 100_000
-_WIDEST = 0.4  # of the sampling rate: a band's upper end
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,7 +59,7 @@ class Analysis(Shown):
         Stage to the time it took.
     noise_scale : float
         Factor on the noise variance in the posterior where the model misfits
-        (`bayeshaptic.diagnosis.overdispersion`), 1 elsewhere.
+        (`bayeshaptic.diagnosis.residuals.overdispersion`), 1 elsewhere.
     lever_m : float or None
     hidden : Hidden or None
         What could hide, where the limit allows for it.
@@ -123,19 +116,6 @@ class Analysis(Shown):
         )
 
 
-@dataclass
-class _Clock:
-    """How long each stage took."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        began = time.perf_counter()
-        yield
-        self.seconds[name] = time.perf_counter() - began
-
-
 @single_threaded
 def analyse(
     measurement: Recording | Etfe | str | Path,
@@ -170,49 +150,6 @@ def analyse(
     return replace(done, notices=done.notices + _residual_notice(begun))
 
 
-@dataclass(frozen=True)
-class Begun:
-    """A measurement with a base model fitted to it: what an analysis, or the loop, begins with.
-
-    Attributes are those of `Analysis`.
-    """
-
-    etfe: Etfe
-    device: Device | None
-    fit: Fit
-    choice: Choice | None
-    notices: tuple[Notice, ...]
-    seconds: dict[str, float]
-    lever_m: float | None
-
-
-@single_threaded
-def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -> Begun:
-    """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
-    clock = _Clock()
-    device = device_of(options, model)
-    notices: tuple[Notice, ...] = ()
-    if isinstance(measurement, Recording):
-        with clock.stage("checks"):
-            options.report(0.0, "checking the recording")
-            whole = unbroken(measurement)
-            notices = told(measurement.feedback, check_recording(whole, device))
-            if not any(notice.topic == "feedback" for notice in notices):
-                refuse_too_little(whole)
-        with clock.stage("frequency response"):
-            options.report(0.03, "estimating the frequency response")
-            etfe = _response(measurement, options.band_hz, has_feedback(notices))
-    else:
-        etfe = measurement
-    with clock.stage("least squares"):
-        options.report(0.06, "fitting")
-        fit, choice = _fit(etfe, model, device, options)
-    lever_m = options.lever_m
-    if lever_m is None and device is not None:
-        lever_m = device.lever_m
-    return Begun(etfe, device, fit, choice, notices + etfe.notices, clock.seconds, lever_m)
-
-
 @single_threaded
 def finish(
     begun: Begun,
@@ -234,7 +171,7 @@ def finish(
     small_risks : bool
         Whether the stiffness at a small risk is to be known, too.
     """
-    clock = _Clock(dict(begun.seconds))
+    clock = Clock(dict(begun.seconds))
     scale = noise_scale(fit)
     # A misfit's tail means nothing, and a limit for comparison needs none.
     watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
@@ -268,36 +205,6 @@ def finish(
         noise_scale=scale,
         lever_m=begun.lever_m,
     )
-
-
-def _response(recording: Recording, band_hz: tuple[float, float] | None, biased: bool) -> Etfe:
-    """The response; one that feedback biases is for comparison only, and any band will do."""
-    try:
-        return estimate_etfe(recording, band_hz)
-    except InputError:
-        if not biased or band_hz is not None:
-            raise
-    longest = max(piece.duration_s for piece in recording.pieces)
-    widest = (1 / longest, _WIDEST / recording.period_s)
-    return estimate_etfe(recording, widest)
-
-
-def _fit(
-    etfe: Etfe,
-    model: str | Model,
-    device: Device | None,
-    options: Options,
-) -> tuple[Fit, Choice | None]:
-    """The fit of the model that was asked for, or of the chosen one."""
-    prior, seed = dict(options.prior), options.seed
-    if isinstance(model, Model):
-        return least_squares(model.with_prior(prior), etfe, seed=seed), None
-    delay = options.delay_s, options.delay_sd_s
-    if model == "auto":
-        choice = choose_model(etfe, device, *delay, prior, options.held, seed)
-        return choice.fit, choice
-    built = build_model(model, device, *delay, etfe.period_s, prior)
-    return least_squares(built, etfe, seed=seed), None
 
 
 def _with_noise(fit: Fit, scale: float) -> Fit:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from bayeshaptic.diagnosis.analysis import Begun
+from bayeshaptic.diagnosis.begun import Begun
 from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
-from bayeshaptic.inference.least_squares import MISFIT
+from bayeshaptic.inference.fit import MISFIT
 
 
 def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced]:

@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.residuals.residual import (
     smooth_columns,
 )
 from bayeshaptic.diagnosis.samples.mend import SampleLook, measurement_tests
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
 

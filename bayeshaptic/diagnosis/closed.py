@@ -10,12 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.analysis import (
-    Analysis,
-    begin,
-    finish,
-)
+from bayeshaptic.diagnosis.analysis import Analysis, finish
 from bayeshaptic.diagnosis.base_model import traced_from_best_base
+from bayeshaptic.diagnosis.begun import begin, measurement_of
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
@@ -24,7 +21,6 @@ from bayeshaptic.diagnosis.feedback.explain import (
 )
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
-from bayeshaptic.diagnosis.measured import measurement_of
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced

@@ -17,7 +17,7 @@ import numpy as np
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness

@@ -18,7 +18,7 @@ from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import CHOOSE, State, Trial, held_out_rms
 from bayeshaptic.diagnosis.traced import Candidate, Traced
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.numerics.spending import BUDGET_S, RATE, Meter, metered
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Progress, Tick

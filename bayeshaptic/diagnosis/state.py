@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.inference.least_squares import Fit, polish
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.model import Extension

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from bayeshaptic.diagnosis.analysis import Analysis, Begun
+from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.diagnosis.begun import Begun
 from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop, open_questions
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
-from bayeshaptic.inference.least_squares import MISFIT
+from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.model import rigid_with_friction

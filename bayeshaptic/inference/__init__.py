@@ -1,6 +1,7 @@
 """Likelihood, least squares, sampling, and the posterior."""
 
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.load import load_posterior
 from bayeshaptic.inference.posterior import Posterior

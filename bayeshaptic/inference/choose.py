@@ -9,7 +9,8 @@ import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
-from bayeshaptic.inference.least_squares import MISFIT, Fit, least_squares
+from bayeshaptic.inference.fit import MISFIT, Fit
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.recordings.response.etfe import Etfe

@@ -10,10 +10,10 @@ import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.archive import model_from_dict
-from bayeshaptic.inference.arviz_groups import MARK
 from bayeshaptic.inference.diagnostics import diagnose
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.inference.saved.archive import model_from_dict
+from bayeshaptic.inference.saved.arviz_groups import MARK
 from bayeshaptic.types import Floats
 
 

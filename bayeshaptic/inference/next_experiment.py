@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.coordinates import Coordinates, coordinates
-from bayeshaptic.inference.least_squares import Fit, weighted_residuals
+from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.structures import FREE, GRASPED, HAND

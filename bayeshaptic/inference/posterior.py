@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
-from bayeshaptic.inference.arviz_groups import save_posterior, to_arviz
 from bayeshaptic.inference.diagnostics import Diagnostics
+from bayeshaptic.inference.saved.arviz_groups import save_posterior, to_arviz
 from bayeshaptic.models import Model
 from bayeshaptic.quantities import scale
 from bayeshaptic.recordings.response.etfe import Etfe

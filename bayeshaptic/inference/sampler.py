@@ -11,12 +11,8 @@ import numpy as np
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.coordinates import reach, sampling_coordinates
-from bayeshaptic.inference.least_squares import (
-    REACH_SDS,
-    Fit,
-    least_squares,
-    weighted_residuals,
-)
+from bayeshaptic.inference.fit import REACH_SDS, Fit, weighted_residuals
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.ensembles import (

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.inference.coordinates import coordinates
-from bayeshaptic.inference.least_squares import weighted_residuals
+from bayeshaptic.inference.fit import weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.model import Extension

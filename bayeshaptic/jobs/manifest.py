@@ -12,7 +12,7 @@ from typing import Any
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs.job import Job
-from bayeshaptic.recordings.study import read_study
+from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.draft import write_whole
 from bayeshaptic.report.provenance import sha256, versions
 

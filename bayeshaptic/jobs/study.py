@@ -15,7 +15,8 @@ from bayeshaptic.jobs.executors import Executor, Outcome
 from bayeshaptic.jobs.job import Job, refuse_file
 from bayeshaptic.jobs.recording import reported
 from bayeshaptic.recordings.read import recording_name
-from bayeshaptic.recordings.study import Study, read_study
+from bayeshaptic.recordings.study import Study
+from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.provenance import provenance
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline

@@ -67,9 +67,30 @@ class Terms:
     over_x: bool = False
     shift: float = 0.0
 
+    def __call__(self, x: ArrayLike) -> Floats:
+        """The log density at `x`, of any shape."""
+        x = np.asarray(x, float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            log = np.log(x + self.shift)
+            u = ((log if self.logarithmic else x) - self.centre) / self.sd
+            density = self.constant - 0.5 * u * u - (log if self.over_x else 0.0)
+        return np.where((x >= self.low) & (x <= self.high), density, -np.inf)
+
+
+class _ByTerms(Prior):
+    """A prior whose density is of the form of `Terms`."""
+
+    @property
+    def terms(self) -> Terms:
+        """What the density is made of."""
+        raise NotImplementedError
+
+    def log_density(self, x: ArrayLike) -> Floats:
+        return self.terms(x)
+
 
 @dataclass(frozen=True)
-class LogNormal(Prior):
+class LogNormal(_ByTerms):
     """log(x) is normal around log(median) with standard deviation `log_sd`."""
 
     median: float
@@ -89,14 +110,6 @@ class LogNormal(Prior):
         centre = float(np.log(self.median))
         return Terms(smallest, np.inf, constant, centre, self.log_sd, True, True)
 
-    def log_density(self, x: ArrayLike) -> Floats:
-        x = np.asarray(x, float)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            log_x = np.log(x)
-            u = (log_x - np.log(self.median)) / self.log_sd
-            density = -0.5 * u * u - log_x - np.log(self.log_sd) - _LOG_SQRT_2PI
-        return np.where(x > 0, density, -np.inf)
-
     def quantile(self, p: ArrayLike) -> Floats:
         return self.median * np.exp(self.log_sd * ndtri(np.asarray(p, float)))
 
@@ -105,7 +118,7 @@ class LogNormal(Prior):
 
 
 @dataclass(frozen=True)
-class HalfNormal(Prior):
+class HalfNormal(_ByTerms):
     """abs(z), z normal around zero with standard deviation `scale`: for dampers, which may be 0."""
 
     scale: float
@@ -122,11 +135,6 @@ class HalfNormal(Prior):
         constant = np.log(2 / self.scale) - _LOG_SQRT_2PI
         return Terms(0.0, np.inf, constant, sd=self.scale)
 
-    def log_density(self, x: ArrayLike) -> Floats:
-        x = np.asarray(x, float)
-        density = np.log(2 / self.scale) - _LOG_SQRT_2PI - 0.5 * (x / self.scale) ** 2
-        return np.where(x >= 0, density, -np.inf)
-
     def quantile(self, p: ArrayLike) -> Floats:
         return self.scale * ndtri(0.5 + 0.5 * np.asarray(p, float))
 
@@ -135,7 +143,7 @@ class HalfNormal(Prior):
 
 
 @dataclass(frozen=True)
-class NearZero(Prior):
+class NearZero(_ByTerms):
     """Density proportional to exp(-x^2 / (2 scale^2)) / (x + floor): for dampers seen as zero.
 
     A published zero says that nothing was seen, not how little there is.  Between `floor` and
@@ -159,13 +167,6 @@ class NearZero(Prior):
     def terms(self) -> Terms:
         constant = -np.log(_near_zero(self.floor / self.scale)[0])
         return Terms(0.0, np.inf, constant, sd=self.scale, over_x=True, shift=self.floor)
-
-    def log_density(self, x: ArrayLike) -> Floats:
-        x = np.asarray(x, float)
-        area, _, _ = _near_zero(self.floor / self.scale)
-        safe = np.maximum(x, 0.0)
-        density = -0.5 * (safe / self.scale) ** 2 - np.log(safe + self.floor) - np.log(area)
-        return np.where(x >= 0, density, -np.inf)
 
     def quantile(self, p: ArrayLike) -> Floats:
         _, factors, below = _near_zero(self.floor / self.scale)
@@ -192,7 +193,7 @@ def _near_zero(ratio: float) -> tuple[float, Floats, Floats]:
 
 
 @dataclass(frozen=True)
-class Normal(Prior):
+class Normal(_ByTerms):
     """Normal around `mean` with standard deviation `sd`, cut off below `low` (by default not)."""
 
     mean: float
@@ -218,12 +219,6 @@ class Normal(Prior):
         constant = -np.log(self.sd) - _LOG_SQRT_2PI - np.log1p(-self._mass_below)
         return Terms(self.low, np.inf, constant, self.mean, self.sd)
 
-    def log_density(self, x: ArrayLike) -> Floats:
-        x = np.asarray(x, float)
-        u = (x - self.mean) / self.sd
-        norm = np.log(self.sd) + _LOG_SQRT_2PI + np.log1p(-self._mass_below)
-        return np.where(x >= self.low, -0.5 * u * u - norm, -np.inf)
-
     def quantile(self, p: ArrayLike) -> Floats:
         below = self._mass_below
         return self.mean + self.sd * ndtri(below + np.asarray(p, float) * (1 - below))
@@ -234,7 +229,7 @@ class Normal(Prior):
 
 
 @dataclass(frozen=True)
-class Uniform(Prior):
+class Uniform(_ByTerms):
     """Every value between `low` and `high` alike."""
 
     low: float
@@ -254,11 +249,6 @@ class Uniform(Prior):
     def terms(self) -> Terms:
         return Terms(self.low, self.high, -np.log(self.high - self.low))
 
-    def log_density(self, x: ArrayLike) -> Floats:
-        x = np.asarray(x, float)
-        inside = (x >= self.low) & (x <= self.high)
-        return np.where(inside, -np.log(self.high - self.low), -np.inf)
-
     def quantile(self, p: ArrayLike) -> Floats:
         return self.low + (self.high - self.low) * np.asarray(p, float)
 
@@ -267,7 +257,7 @@ class Uniform(Prior):
 
 
 @dataclass(frozen=True)
-class LogUniform(Prior):
+class LogUniform(_ByTerms):
     """Every factor between `low` and `high` alike."""
 
     low: float
@@ -287,12 +277,6 @@ class LogUniform(Prior):
     def terms(self) -> Terms:
         constant = -np.log(np.log(self.high / self.low))
         return Terms(self.low, self.high, constant, over_x=True)
-
-    def log_density(self, x: ArrayLike) -> Floats:
-        x = np.asarray(x, float)
-        inside = (x >= self.low) & (x <= self.high)
-        safe = np.where(inside, x, self.low)
-        return np.where(inside, -np.log(safe) - np.log(np.log(self.high / self.low)), -np.inf)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return self.low * (self.high / self.low) ** np.asarray(p, float)

@@ -13,7 +13,8 @@ from bayeshaptic.recordings.signals.raw_signals import (
     increment_unit,
     repeats,
 )
-from bayeshaptic.recordings.study import Study, StudyEntry, read_study
+from bayeshaptic.recordings.study import Study, StudyEntry
+from bayeshaptic.recordings.study_file import read_study
 
 __all__ = [
     "Clipping",

@@ -10,8 +10,8 @@ from typing import Any
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analysis import analyse
+from bayeshaptic.diagnosis.begun import device_of
 from bayeshaptic.diagnosis.closed import close_loop
-from bayeshaptic.diagnosis.measured import device_of
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, describe

@@ -11,7 +11,7 @@ from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.effects.library import effects
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe

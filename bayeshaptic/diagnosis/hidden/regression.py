@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.inference.coordinates import Coordinates, coordinates, sampling_coordinates
-from bayeshaptic.inference.least_squares import weighted_residuals
+from bayeshaptic.inference.fit import weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model, NearZero

@@ -33,7 +33,8 @@ from bayeshaptic.diagnosis.state import (
 from bayeshaptic.diagnosis.trials.linear import sieve
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
-from bayeshaptic.inference.least_squares import Fit, least_squares, refine
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares, refine
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress

@@ -15,7 +15,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import COMMAND, LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording

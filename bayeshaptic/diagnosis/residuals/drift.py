@@ -7,7 +7,7 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import line_transform
 from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 

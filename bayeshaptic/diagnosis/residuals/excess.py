@@ -7,7 +7,7 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, RandomSpectra
 from bayeshaptic.recordings.response.local_polynomial import leakage_terms

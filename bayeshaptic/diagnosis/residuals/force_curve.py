@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.diagnosis.residuals.columns import line_transform, response_to
-from bayeshaptic.inference.least_squares import Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Complexes, Floats
 

@@ -15,7 +15,7 @@ from scipy.stats import chi2, f, norm
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.inference.coordinates import coordinates
-from bayeshaptic.inference.least_squares import Fit, weighted_residuals
+from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 

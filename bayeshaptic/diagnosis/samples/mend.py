@@ -20,7 +20,8 @@ from bayeshaptic.diagnosis.samples.repeated import held
 from bayeshaptic.diagnosis.samples.resolution import resolution
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.inference.least_squares import Fit, least_squares
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe

@@ -14,7 +14,7 @@ from bayeshaptic.diagnosis.state import FIT, share
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
-from bayeshaptic.inference.least_squares import search_box
+from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.recordings.response.windows import Windows

@@ -24,13 +24,8 @@ from bayeshaptic.diagnosis.state import (
 )
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
-from bayeshaptic.inference.least_squares import (
-    least_squares,
-    polish,
-    refine,
-    search_box,
-    weighted_residuals,
-)
+from bayeshaptic.inference.fit import search_box, weighted_residuals
+from bayeshaptic.inference.least_squares import least_squares, polish, refine
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.screening import promising_starts, starting_bases
 from bayeshaptic.models import Model

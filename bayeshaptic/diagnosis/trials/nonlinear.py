@@ -18,7 +18,8 @@ from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
-from bayeshaptic.inference.least_squares import Fit, polish, summarise
+from bayeshaptic.inference.fit import Fit, summarise
+from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.least_squares import weighted_residuals
+from bayeshaptic.inference.fit import weighted_residuals
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.numerics.mixture import StudentMixture, student

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayeshaptic.inference.coordinates import Coordinates
-from bayeshaptic.inference.least_squares import Fit, weighted_residuals
+from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.models import NearZero, draw
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from bayeshaptic.inference.least_squares import AT_BOUND, CONVERGED, Fit
+from bayeshaptic.inference.fit import AT_BOUND, CONVERGED, Fit
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit
 from bayeshaptic.inference.time_domain.widths import FREEDOM

@@ -9,7 +9,8 @@ from bayeshaptic.quantities import Scale, percent, percents, pure, quantity, sca
 
 if TYPE_CHECKING:
     from bayeshaptic.report.numbers.rules import Rules
-    from bayeshaptic.stability.walls.limit_table import FilterLimits, LimitTable
+    from bayeshaptic.stability.walls.filter_limits import FilterLimits
+    from bayeshaptic.stability.walls.limit_table import LimitTable
     from bayeshaptic.stability.walls.width import ZWidth
 
 _DASH = "\N{EN DASH}"

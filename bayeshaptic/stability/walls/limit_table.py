@@ -6,13 +6,10 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.quantities import percent, quantity
@@ -20,86 +17,19 @@ from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.walls.damping import Damping
+from bayeshaptic.stability.walls.filter_limits import FilterLimits, filter_limits
 from bayeshaptic.stability.walls.joint import (
-    INSIDE,
-    JointRegion,
-    Lowest,
     filtered,
     joint_region,
-    lowest,
     usual_dampings,
 )
 from bayeshaptic.stability.walls.region import DRAWS
-from bayeshaptic.stability.walls.source import loops_of
-from bayeshaptic.stability.walls.tail import Tail, lower_tail
-from bayeshaptic.stability.walls.width import Boundary, ZWidth, width_of
 from bayeshaptic.types import Floats
 from bayeshaptic.version import __version__
 
 RISKS = (0.05, 0.01, 0.001)
-ROWS = 25  # dampings a filter
 _FORMAT = "bayeshaptic limits 1"
 _DIGITS = 6
-
-
-@dataclass(frozen=True)
-class FilterLimits:
-    """The stiffness that a wall may have over its damping, with one way to get the velocity.
-
-    Attributes
-    ----------
-    region : JointRegion
-    damping : ndarray, shape (J,)
-        Ascending from zero; the end of the boundary at each risk is among them.
-    limits : tuple of ndarray, shapes (n_c, J)
-        Limits of some draws of each case, each column in ascending order.
-    tails : tuple of Tail, or None
-        The lowest limits of more draws of each case, for small risks.
-    undamped : mapping
-        Risk to the stiffness without damping that is stated from all draws, or None: the boundary
-        begins there, and is not stated where that is not.
-    """
-
-    region: JointRegion = field(repr=False)
-    damping: Floats = field(repr=False)
-    limits: tuple[Floats, ...] = field(repr=False)
-    tails: tuple[Tail, ...] | None = field(repr=False, default=None)
-    undamped: Mapping[float, float | None] = field(repr=False, default_factory=dict)
-
-    @property
-    def kind(self) -> Damping:
-        return self.region.kind
-
-    def quantile(self, risk: float) -> Floats:
-        """The stiffness at that risk whether or not the draws are enough for it, shape (J,)."""
-        return self._lowest.quantile(risk)
-
-    def boundary(self, risk: float) -> Boundary | None:
-        """The stiffness at that risk; None where the draws are too few to state it."""
-        found = self._boundary(risk)
-        if found is None or risk not in self.undamped or self.damping[0] != 0:
-            return found
-        first = self.undamped[risk]
-        if first is None:
-            return None
-        return replace(found, stiffness=np.r_[first, found.stiffness[1:]])
-
-    def _boundary(self, risk: float) -> Boundary | None:
-        if self.region.says(risk):
-            return Boundary(risk, self.damping, self.quantile(risk))
-        if self.tails is None or risk > min(tail.risk for tail in self.tails):
-            return None
-        tails = lowest([tail.limits for tail in self.tails], [tail.total for tail in self.tails])
-        return Boundary(risk, self.damping, tails.quantile(risk))
-
-    @cached_property
-    def _lowest(self) -> Lowest:
-        return lowest(self.limits, [len(part) for part in self.limits])
-
-    def width(self, risk: float) -> ZWidth | None:
-        """How wide the range of walls is at that risk; None where the draws are too few."""
-        boundary = self.boundary(risk)
-        return None if boundary is None else width_of(boundary)
 
 
 @dataclass(frozen=True, repr=False)
@@ -316,48 +246,10 @@ def limit_table(
         stated,
         tuple(tuple(case.limit.safe(risk) for risk in risks) for case in cases),
         tuple(
-            replace(_filter_limits(cases, filtered(region, kind), risks, draws), undamped=undamped)
+            replace(filter_limits(cases, filtered(region, kind), risks, draws), undamped=undamped)
             for kind in kinds
         ),
     )
-
-
-def _filter_limits(
-    cases: Sequence[Case], region: JointRegion, risks: tuple[float, ...], draws: int
-) -> FilterLimits:
-    levels = region.dampings(risks, ROWS)
-    limits = region.limits(levels)
-    tails = None
-    if not region.says(min(risks)):
-        tails = _tails(cases, region, levels, limits, min(risks), draws)
-    if tails is not None:  # the table has the end of this boundary, too
-        ends = [tail.ends[:, None] for tail in tails]
-        end = INSIDE * lowest(ends, [tail.total for tail in tails]).quantile(min(risks))[0]
-        place = int(np.searchsorted(levels, end))
-        levels, there = np.insert(levels, place, end), region.limits([end])
-        limits = tuple(
-            np.insert(own, place, new[:, 0], axis=1) for own, new in zip(limits, there, strict=True)
-        )
-        tails = tuple(tail.at(levels) for tail in tails)
-    return FilterLimits(region, levels, tuple(np.sort(part, axis=0) for part in limits), tails)
-
-
-def _tails(
-    cases: Sequence[Case],
-    region: JointRegion,
-    levels: Floats,
-    limits: tuple[Floats, ...],
-    risk: float,
-    draws: int,
-) -> tuple[Tail, ...] | None:
-    """The lowest limits of every case, or None as soon as one of them cannot say it."""
-    found = []
-    for case, own, part in zip(cases, limits, region.regions, strict=True):
-        tail = lower_tail(case, part, loops_of(case, draws=draws).draws, levels, own, risk)
-        if tail is None:
-            return None
-        found.append(tail)
-    return tuple(found)
 
 
 def _plain(value: float | None) -> float | None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bayeshaptic.diagnosis.closed import Closed
-    from bayeshaptic.inference.least_squares import Fit
+    from bayeshaptic.inference.fit import Fit
 
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.OTHER, "marker": "s", "linestyle": "--", "markerfacecolor": "none"},

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bayeshaptic.report.numbers.rules import Rules
-    from bayeshaptic.stability.walls.limit_table import FilterLimits, LimitTable
+    from bayeshaptic.stability.walls.filter_limits import FilterLimits
+    from bayeshaptic.stability.walls.limit_table import LimitTable
 
 # Stable with at least these probabilities, from the surest on.
 PROBABILITIES = (0.999, 0.99, 0.95, 0.75, 0.5, 0.25, 0.05, 0.01, 0.001)

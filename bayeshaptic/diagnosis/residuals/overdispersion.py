@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.inference.least_squares import MISFIT, Fit
+from bayeshaptic.inference.fit import MISFIT, Fit
 
 _FURTHEST = 0.25  # of the windows: how far apart neighbours may be
 

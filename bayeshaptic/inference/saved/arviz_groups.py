@@ -16,10 +16,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.archive import model_to_dict
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.netcdf import Group, Variable, dataset, write
+from bayeshaptic.inference.saved.archive import model_to_dict
+from bayeshaptic.inference.saved.netcdf import Group, Variable, dataset, write
 from bayeshaptic.models import Model, draw
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows

@@ -1,0 +1,153 @@
+"""What an analysis, or the loop, begins with: a measurement checked, a base model fitted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bayeshaptic.arguments import instance
+from bayeshaptic.devices import Device, load_device
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.choose import Choice, choose_model
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import Model, build_model
+from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.feedback import has_feedback, told
+from bayeshaptic.recordings.join import unbroken
+from bayeshaptic.recordings.read import read_measurement
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.sufficiency import refuse_too_little
+from bayeshaptic.threads import single_threaded
+
+_WIDEST = 0.4  # of the sampling rate: a band's upper end
+
+
+def device_of(options: Options, model: str | Model) -> Device | None:
+    """The device, loaded; by default that of `model`."""
+    if isinstance(options.device, str | Path):
+        return load_device(options.device)
+    if options.device is None and isinstance(model, Model):
+        return model.device
+    return options.device
+
+
+def measurement_of(measurement: Any, model: Any, options: Options) -> Recording | Etfe:
+    """The measurement, read where a path was given.
+
+    Raises
+    ------
+    InputError
+        Where it is none, or cannot be read, or the model is none.
+    """
+    if isinstance(model, Recording | Etfe):
+        raise InputError("the measurement comes first: close_loop(recording, model).")
+    instance("model", model, (str, Model), "its name, as in 'auto' or 'free', or a Model")
+    if isinstance(measurement, str | Path):
+        device = device_of(options, model)
+        if device is None:
+            return read_measurement(Path(measurement))
+        return read_measurement(
+            Path(measurement),
+            encoder_resolution=device.encoder_resolution,
+            kind=device.kind,
+            default_period_s=device.period_s,
+        )
+    if not isinstance(measurement, Recording | Etfe):
+        raise InputError(
+            f"a measurement is a recording, an ETFE or a path, not {type(measurement).__name__}; "
+            "see bayeshaptic.read_recording."
+        )
+    return measurement
+
+
+@dataclass
+class Clock:
+    """How long each stage took."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        began = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - began
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A measurement with a base model fitted to it: what an analysis, or the loop, begins with.
+
+    Attributes are those of `Analysis`.
+    """
+
+    etfe: Etfe
+    device: Device | None
+    fit: Fit
+    choice: Choice | None
+    notices: tuple[Notice, ...]
+    seconds: dict[str, float]
+    lever_m: float | None
+
+
+@single_threaded
+def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -> Begun:
+    """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
+    clock = Clock()
+    device = device_of(options, model)
+    notices: tuple[Notice, ...] = ()
+    if isinstance(measurement, Recording):
+        with clock.stage("checks"):
+            options.report(0.0, "checking the recording")
+            whole = unbroken(measurement)
+            notices = told(measurement.feedback, check_recording(whole, device))
+            if not any(notice.topic == "feedback" for notice in notices):
+                refuse_too_little(whole)
+        with clock.stage("frequency response"):
+            options.report(0.03, "estimating the frequency response")
+            etfe = _response(measurement, options.band_hz, has_feedback(notices))
+    else:
+        etfe = measurement
+    with clock.stage("least squares"):
+        options.report(0.06, "fitting")
+        fit, choice = _fit(etfe, model, device, options)
+    lever_m = options.lever_m
+    if lever_m is None and device is not None:
+        lever_m = device.lever_m
+    return Begun(etfe, device, fit, choice, notices + etfe.notices, clock.seconds, lever_m)
+
+
+def _response(recording: Recording, band_hz: tuple[float, float] | None, biased: bool) -> Etfe:
+    """The response; one that feedback biases is for comparison only, and any band will do."""
+    try:
+        return estimate_etfe(recording, band_hz)
+    except InputError:
+        if not biased or band_hz is not None:
+            raise
+    longest = max(piece.duration_s for piece in recording.pieces)
+    widest = (1 / longest, _WIDEST / recording.period_s)
+    return estimate_etfe(recording, widest)
+
+
+def _fit(
+    etfe: Etfe,
+    model: str | Model,
+    device: Device | None,
+    options: Options,
+) -> tuple[Fit, Choice | None]:
+    """The fit of the model that was asked for, or of the chosen one."""
+    prior, seed = dict(options.prior), options.seed
+    if isinstance(model, Model):
+        return least_squares(model.with_prior(prior), etfe, seed=seed), None
+    delay = options.delay_s, options.delay_sd_s
+    if model == "auto":
+        choice = choose_model(etfe, device, *delay, prior, options.held, seed)
+        return choice.fit, choice
+    built = build_model(model, device, *delay, etfe.period_s, prior)
+    return least_squares(built, etfe, seed=seed), None

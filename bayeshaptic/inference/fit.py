@@ -1,0 +1,197 @@
+"""A weighted least-squares fit: what it is, and what is known at its optimum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models import Model
+from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.quantities import quantity, scale
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.shown import Shown, data_frame, listed
+from bayeshaptic.types import Floats
+
+CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
+_CHANCE_SDS = 4.0
+MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
+REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
+
+
+@dataclass(frozen=True, repr=False)
+class Fit(Shown):
+    """A weighted least-squares fit.
+
+    Attributes
+    ----------
+    model : Model
+        With the priors, period and units that the fit used.
+    theta : ndarray, shape (P,)
+        Best parameters, natural values.
+    covariance : ndarray, shape (P, P)
+        In natural values, scaled by the reduced chi-square where that exceeds 1; nan in the rows
+        of parameters at a bound.
+    outcome : mapping
+        Name to "converged", "at a bound", or "prior-dominated" (the data alone say less than the
+        prior: the sd exceeds the prior's).
+    reduced_chi_square : float
+        1 where the residual is noise.
+    log_likelihood : float
+    windows : Windows
+        Compressed around this very fit.
+    frequency_hz : ndarray, shape (L,)
+    residual : complex ndarray, shape (L,)
+        Normalised deviations: E|.|^2 = 1 where the model is true.
+    starts : int
+        How many starting points ended within 0.5 of the best half chi-square, of those refined.
+    elsewhere : ndarray, shape (V, P)
+        Where many starting points ended that did not end here: a model that lacks something may fit
+        best when bent far from the truth.
+    """
+
+    model: Model
+    theta: Floats
+    covariance: Floats
+    outcome: Mapping[str, str]
+    reduced_chi_square: float
+    log_likelihood: float
+    windows: Windows = field(repr=False)
+    frequency_hz: Floats = field(repr=False)
+    residual: NDArray[np.complex128] = field(repr=False)
+    starts: int = 0
+    elsewhere: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False, kw_only=True)
+
+    @property
+    def by_chance(self) -> float:
+        """Reduced chi-square that noise alone hardly reaches.
+
+        It scatters by one over the root of the number of points.
+        """
+        return 1.0 + _CHANCE_SDS / math.sqrt(max(len(self.residual), 1))
+
+    @property
+    def misfits(self) -> bool:
+        """Whether the model lacks something: a residual far beyond the noise, and not by chance."""
+        return not self.reduced_chi_square <= max(MISFIT, self.by_chance)
+
+    @property
+    def sd(self) -> Floats:
+        """Standard deviations, shape (P,); nan for parameters at a bound."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def likelihood(self) -> Likelihood:
+        return Likelihood(self.model, self.windows)
+
+    def at(self, theta: Floats) -> Fit:
+        """The fit of the same data at other values.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (P,)
+        """
+        return summarise(self.model, self.windows, theta, self.starts)
+
+    def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
+        """The fitted sampled response at `frequency_hz`, shape (L,)."""
+        return self.model.response(self.theta, frequency_hz)
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a parameter: value, sd, unit, outcome."""
+        return data_frame(
+            (
+                {
+                    "parameter": name,
+                    "value": float(self.theta[i]),
+                    "sd": float(self.sd[i]),
+                    "unit": self.model.unit(name),
+                    "outcome": self.outcome[name],
+                }
+                for i, name in enumerate(self.model.names)
+            ),
+            "parameter",
+        )
+
+    def to_control(self) -> Any:
+        """The sampled response of the fit for python-control: see `Model.to_control`."""
+        return self.model.to_control(self.theta)
+
+    def _lines(self) -> tuple[str, ...]:
+        found = []
+        for name, value, sd in zip(self.model.names, self.theta, self.sd, strict=True):
+            row = scale(float(value), self.model.unit(name))
+            found.append(f"{name} {row.with_error(float(value), float(sd))} {row.unit}".rstrip())
+        return (
+            f"Least-squares fit of the model {self.model.name}",
+            f"reduced chi-square {quantity(self.reduced_chi_square, '')}, where 1 is pure noise",
+            listed(found, 4),
+        )
+
+
+def search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
+    """The coordinates of a fit, and its bounds in them."""
+    here = coordinates(model)
+    low, high = (here.coordinate(bound) for bound in reach(model, REACH_SDS))
+    return here, low, high
+
+
+def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[Floats], Floats]:
+    """Real residuals of unit variance, as a function of coordinates: (B, P) to (B, N).
+
+    A window after the other, of each number the real part and then the imaginary one.
+    """
+
+    def residuals(phi: Floats) -> Floats:
+        left = likelihood.normalised(here.natural(phi))
+        return np.sqrt(2) * left.view(float).reshape(len(phi), -1)
+
+    return residuals
+
+
+def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) -> Fit:
+    """The fit at `theta`, with its covariance and outcomes."""
+    here, low, high = search_box(model)
+    likelihood = Likelihood(model, windows)
+    phi = here.coordinate(theta[None])
+    slope = jacobian(weighted_residuals(likelihood, here), phi)[0]
+    width = high - low
+    bound = (phi[0] - low < 1e-6 * width) | (high - phi[0] < 1e-6 * width)
+    chi_square = float(likelihood.reduced_chi_square(theta[None])[0])
+    covariance = np.full((model.size, model.size), np.nan)
+    inner = np.flatnonzero(~bound)
+    # A direction that the data do not see at all gets a width of 50 coordinate units, not zero.
+    curvature = slope[:, inner].T @ slope[:, inner] + np.eye(len(inner)) / 50.0**2
+    within = np.linalg.inv(curvature)
+    stretch = np.where(here.log, theta, here.scale)[inner]
+    covariance[np.ix_(inner, inner)] = within * np.outer(stretch, stretch) * max(1.0, chi_square)
+    return Fit(
+        model,
+        theta,
+        covariance,
+        _outcomes(model, theta, np.sqrt(np.diag(covariance)), bound),
+        chi_square,
+        float(likelihood(theta[None])[0]),
+        windows,
+        windows.frequency_hz.ravel(),
+        likelihood.normalised(theta[None])[0].ravel(),
+        agreeing,
+    )
+
+
+def _outcomes(model: Model, theta: Floats, sd: Floats, bound: NDArray[np.bool_]) -> dict[str, str]:
+    outcome = {}
+    for i, name in enumerate(model.names):
+        prior = model.prior(name)
+        spread = 0.5 * float(prior.quantile(0.84) - prior.quantile(0.16))
+        if bound[i]:
+            outcome[name] = AT_BOUND
+        else:
+            outcome[name] = PRIOR_DOMINATED if sd[i] > spread else CONVERGED
+    return outcome

@@ -1,0 +1,1 @@
+"""Posteriors in files: groups as ArviZ has them, in netCDF."""
