@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,7 +17,7 @@ from linear_bench import (
     tremor,
     tremor_density,
 )
-from scipy.stats import chi2
+from scipy.stats import chi2, f, kstest
 
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import TableSpectra, compress, estimate_etfe
@@ -84,6 +85,8 @@ def test_windows_equal_dense_least_squares():
             device.response(f) * ratio
         )
         leakage = np.stack([x**0, x, x**2, f[0] / f, (f[0] / f) ** 2], axis=1)
+        weight = (f / windows.frequency_hz[w, 1]) ** (spectra.noise_slope[w] / 2)
+        rest, leakage = weight * rest, weight[:, None] * leakage
         rest = rest - leakage @ np.linalg.lstsq(leakage, rest, rcond=None)[0]
         assert windows.scatter[w] + short[w] == pytest.approx(np.sum(np.abs(rest) ** 2), rel=1e-7)
         assert windows.lines[w] == stop - start - 5
@@ -153,6 +156,30 @@ def test_pulls_have_unit_rms_and_widths_are_near_cramer_rao(chain, force, encode
     # A rigid device in white noise is known from its lowest lines, where leakage costs most.
     limit = 1.15 if hand else 1.5
     assert np.all(np.median(widths, axis=0) < limit), np.median(widths, axis=0)
+
+
+def test_noise_that_falls_steeply_in_the_lowest_window_is_no_misfit():
+    """A hand that wanders: noise with power 8 of the frequency, where windows span an octave.
+
+    Deviation over scatter at the truth is an F variable, in the lowest window too.
+    """
+    device, ratios = Device(LHIFAM_HELD), []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        recording = record(device, rng, 20000, hand=0.0)
+        corner = np.fft.rfftfreq(20000 * 2, PERIOD) / 0.3
+        wander = np.fft.irfft(np.fft.rfft(rng.normal(size=40000)) / np.sqrt(1 + corner**8))[:20000]
+        moved = device.simulate(0.5 * wander / wander.std(), device.n - 1)
+        recording = replace(recording, position=recording.position + moved)
+        etfe = estimate_etfe(recording)
+        windows = compress(etfe, device.response)
+        short = windows.target - np.einsum(
+            "wij,wj->wi", windows.design, device.response(windows.frequency_hz)
+        )
+        power = np.mean(np.abs(short) ** 2, axis=1) / windows.scatter * (windows.lines - 3)
+        ratios.append(f.sf(power[0], 6, 2 * (windows.lines[0] - 3)))
+    assert kstest(ratios, "uniform").pvalue > 1e-3, np.sort(ratios)[:5]
+    assert min(ratios) > 1e-4
 
 
 @pytest.mark.parametrize("chain", [LHIFAM_FREE, LHIFAM_HELD], ids=["free", "held"])

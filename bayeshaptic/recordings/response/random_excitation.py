@@ -12,6 +12,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band
 from bayeshaptic.recordings.response.local_polynomial import window_edges
+from bayeshaptic.recordings.response.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
 from bayeshaptic.recordings.response.spectra import RandomSpectra
@@ -174,12 +175,16 @@ def _too_short(
 
 
 def _with_reference(spectra: RandomSpectra) -> RandomSpectra:
-    """With a local rational reference where it explains a window better than a unit mass."""
+    """With a local rational reference where it explains a window better than a unit mass.
+
+    And with the slope of the noise around it.
+    """
     plain = spectra.windows()
     rational = fit_local_rational(plain)
     fitted = spectra.windows(rational)
     gain = (plain.lines - 1) * np.log(plain.scatter / fitted.scatter)
-    return replace(spectra, reference=rational.where(gain > BETTER))
+    spectra = replace(spectra, reference=rational.where(gain > BETTER))
+    return replace(spectra, noise_slope=noise_slopes(spectra))
 
 
 def _detrended(values: NDArray[Any]) -> NDArray[Any]:

@@ -36,11 +36,11 @@ class _Block(NamedTuple):
 
     window: slice
     line: NDArray[Any]  # (W, w) which line; padding repeats the last
-    force: NDArray[Any]  # (W, w) zero in the padding
+    whitened: NDArray[Any]  # (W, w) weight of a line by its noise; zero in the padding
+    force: NDArray[Any]  # (W, w) whitened, as are the next two
     position: NDArray[Any]  # (W, w) leakage projected out
     leakage: NDArray[Any]  # (W, w, 5) orthonormal
     weights: NDArray[Any]  # (W, w, 3) of the nodes
-    inside: NDArray[Any]  # (W, w) False in the padding
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,8 @@ class RandomSpectra:
         Variance of a line that rounding alone leaves.
     reference : callable
         The reference to use when none is given.
+    noise_slope : ndarray, shape (W,), or None
+        The power with which the noise falls over the frequency in each window; None: zero.
     """
 
     frequency_hz: NDArray[Any] = field(repr=False)
@@ -67,6 +69,7 @@ class RandomSpectra:
     edges: NDArray[Any] = field(repr=False)
     floor: float
     reference: Reference = field(repr=False)
+    noise_slope: NDArray[Any] | None = field(default=None, repr=False)
 
     @property
     def lines(self) -> int:
@@ -102,18 +105,32 @@ class RandomSpectra:
         line = start + np.minimum(offset, width - 1)
         x = 2 * (line - start) / (width - 1) - 1
         frequency = self.frequency_hz[line]
-        terms = leakage_terms(x, frequency, frequency.mean(axis=1, keepdims=True))
-        leakage = np.linalg.qr(terms * inside[..., None])[0]
-        position = self.position[line] * inside
+        centre = frequency.mean(axis=1, keepdims=True)
+        whitened = inside.astype(float)
+        if self.noise_slope is not None:
+            middle = self.nodes_hz[window, 1:2]
+            whitened *= (frequency / middle) ** (self.noise_slope[window, None] / 2)
+        terms = leakage_terms(x, frequency, centre)
+        leakage = np.linalg.qr(terms * whitened[..., None])[0]
+        position = self.position[line] * whitened
         return _Block(
             window=window,
             line=line,
-            force=self.force[line] * inside,
+            whitened=whitened,
+            force=self.force[line] * whitened,
             position=_project_out(leakage, position[..., None])[..., 0],
             leakage=leakage,
             weights=interpolation(x),
-            inside=inside,
         )
+
+    def columns(self, window: int) -> tuple[slice, NDArray[Any]]:
+        """The lines of a window, and what response and leakage may make of it, (w, 8)."""
+        lines = slice(int(self.edges[window]), int(self.edges[window + 1]))
+        frequency = self.frequency_hz[lines]
+        x = np.linspace(-1, 1, len(frequency))
+        ratio = self.reference(frequency)[:, None] / self.reference(self.nodes_hz[window])
+        answer = self.force[lines, None] * interpolation(x) * ratio
+        return lines, np.concatenate([leakage_terms(x, frequency, frequency.mean()), answer], 1)
 
     def windows(
         self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
@@ -146,7 +163,7 @@ class RandomSpectra:
             response = at_lines[block.line, None] * block.weights / at_nodes[block.window, None, :]
             columns = [block.force[..., None] * response]
             # The padding of a block has no force and must have no input either.
-            columns += [(row[block.line] * block.inside)[..., None] for row in further]
+            columns += [(row[block.line] * block.whitened)[..., None] for row in further]
             column = _project_out(block.leakage, np.concatenate(columns, axis=-1))
             q, design[block.window] = np.linalg.qr(column)
             z = np.einsum("wlk,wl->wk", q.conj(), block.position)
