@@ -14,10 +14,6 @@ from bayeshaptic.effects.unseen import Unseen, alone, combined
 from bayeshaptic.models import LinearSystem, LogNormal, Model, Parameter
 from bayeshaptic.recordings.response.etfe import Etfe
 
-# Equal stages are moved apart so far, relative to their time constant: poles and residues of a
-# multiple pole are ill-conditioned, and the response changes by 1e-7 only.
-_APART = 3e-4
-
 
 @register
 @dataclass(frozen=True)
@@ -58,9 +54,8 @@ class ActuatorLag(LinearEffect):
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         (lag,) = self.own(values)
-        stages = np.arange(self.order) - (self.order - 1) / 2
-        for stage in stages:
-            system = system.with_filter(*_first_order(lag * (1 + _APART * stage)))
+        for _ in range(self.order):
+            system = system.with_filter(*_first_order(lag))
         return system
 
 

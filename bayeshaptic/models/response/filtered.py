@@ -14,10 +14,10 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.models.response.filter import Filter
+from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.types import Bools, Complexes, Floats
 
-_APART = 1e-4  # poles of one filter nearer to each other than this, relatively, are moved apart
 _FAST = 1.0  # |q| T
 
 
@@ -54,26 +54,13 @@ def parted(
     poles, residues : ndarray of complex, shape (n, B)
     """
     numerator, bottom = filtered(numerator, np.ones((1, denominator.shape[1])), filters)
-    poles = np.concatenate([_simple_roots(factor.denominator) for factor in filters])
-    gaps = poles[:, None] - poles[None, :]
-    gaps[np.arange(len(poles)), np.arange(len(poles))] = 1.0
-    slope = bottom[-1] * gaps.prod(axis=1)
-    residues = evaluate(numerator, poles) / (evaluate(denominator, poles) * slope)
+    own = moved_apart(np.concatenate([roots(factor.denominator) for factor in filters], axis=1))
+    poles, parts = own.T, residues(numerator, bottom[-1], own).T
+    parts /= evaluate(denominator, poles)
     rest = _divided(
-        _difference(numerator, multiply(denominator, _sum(poles, residues, bottom[-1]))), bottom
+        _difference(numerator, multiply(denominator, _sum(poles, parts, bottom[-1]))), bottom
     )
-    return rest[: len(denominator) - 1], poles, residues
-
-
-def _simple_roots(polynomial: Polynomial) -> Complexes:
-    """Its roots, moved apart about their mean where two coincide, shape (degree, B)."""
-    found = roots(polynomial).T
-    for j in range(1, len(found)):
-        mean = 0.5 * (found[j] + found[j - 1])
-        near = np.abs(found[j] - found[j - 1]) < _APART * np.abs(mean)
-        found[j - 1] = np.where(near, mean * (1 - _APART / 2), found[j - 1])
-        found[j] = np.where(near, mean * (1 + _APART / 2), found[j])
-    return found
+    return rest[: len(denominator) - 1], poles, parts
 
 
 def _sum(poles: Complexes, residues: Complexes, lead: Floats) -> Polynomial:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayeshaptic.models.response.filtered import filtered
 from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.polynomial import evaluate
-from bayeshaptic.types import Floats
+from bayeshaptic.numerics.partial_fractions import moved_apart, residues
+from bayeshaptic.types import Complexes, Floats
 
-_GAP = 1e-5  # between poles, rad/s
+_SLOW = 1e-5  # rad/s: what a pole at zero may be moved by, 6e-8 of the motion after a minute
 
 
 def linear_motion(
@@ -45,7 +45,8 @@ def linear_motions(
     """
     from bayeshaptic.models.response.motion_kernel import modal_motion
 
-    poles = _apart(system.poles()[0][0])
+    own = moved_apart(system.poles()[0], _SLOW)
+    poles = own[0]
     h = period_s / substeps
     delay = float(system.delay_s[0])
     whole = int(np.floor(delay / h + 1e-9))
@@ -54,7 +55,7 @@ def linear_motions(
     twice = np.where(kept.imag > 0, 2.0, 1.0)
     rows = []
     for mass in masses:
-        position = twice * _residues(system, poles, mass)[poles.imag >= 0]
+        position = twice * _residues(system, own, mass)[poles.imag >= 0]
         rows += [position, position * kept]
     # One step: the old force until `late`, the new one after it.
     new = (h - late) * phi(kept * (h - late))
@@ -64,28 +65,6 @@ def linear_motions(
     return np.asarray(motion.reshape(len(masses), 2, -1))
 
 
-def _apart(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """The poles, coinciding real ones moved apart by what decays 0.06 % in a minute.
-
-    A rigid device without damping has two poles at zero, and the sum over poles has no term for a
-    double one.
-    """
-    moved = poles.copy()
-    for index in range(1, len(moved)):
-        if moved[index].imag == 0 and np.abs(moved[:index] - moved[index]).min() < _GAP:
-            moved[index] = moved[:index].real.min() - _GAP
-    return moved
-
-
-def _residues(
-    system: LinearSystem, poles: NDArray[np.complex128], mass: int
-) -> NDArray[np.complex128]:
-    numerator, denominator = system.mechanism.transfer_to(mass)
-    leading = denominator[-1, 0]
-    values = evaluate(numerator, poles[:, None])[:, 0]
-    for factor in system.filters:
-        values = values * evaluate(factor.numerator, poles[:, None])[:, 0]
-        leading = leading * factor.denominator[-1, 0]
-    gaps = poles[:, None] - poles[None, :]
-    np.fill_diagonal(gaps, 1.0)
-    return np.asarray(values / (leading * gaps.prod(axis=1)))
+def _residues(system: LinearSystem, poles: Complexes, mass: int) -> Complexes:
+    numerator, denominator = filtered(*system.mechanism.transfer_to(mass), system.filters)
+    return residues(numerator, denominator[-1], poles)[0]

@@ -6,24 +6,21 @@ import numpy as np
 
 from bayeshaptic.models.response.filtered import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
-from bayeshaptic.numerics.polynomial import evaluate, roots
+from bayeshaptic.numerics.partial_fractions import moved_apart, residues
+from bayeshaptic.numerics.polynomial import roots
 from bayeshaptic.types import Complexes, Floats
 
 
 def poles_and_residues(mechanism: Mechanism, filters: Filters) -> tuple[Complexes, Complexes]:
     """Poles and residues without the delay, each of shape (B, n).
 
-    The residues assume simple poles; beside a double pole they blow up.
+    Poles that coincide are moved apart, but for two at zero: their residues blow up.
     """
     poles = [_eigenvalues(mechanism.state_matrix())]
     poles += [roots(factor.denominator) for factor in filters]
-    p = np.concatenate(poles, axis=1)
+    p = moved_apart(np.concatenate(poles, axis=1))
     numerator, denominator = filtered(*mechanism.transfer(), filters)
-    gaps = p[:, :, None] - p[:, None, :]
-    gaps[:, np.arange(p.shape[1]), np.arange(p.shape[1])] = 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        residues = evaluate(numerator, p.T).T / (denominator[-1][:, None] * gaps.prod(axis=2))
-    return p, residues
+    return p, residues(numerator, denominator[-1], p)
 
 
 def _eigenvalues(matrices: Floats) -> Complexes:

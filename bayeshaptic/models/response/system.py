@@ -80,8 +80,8 @@ class LinearSystem:
     def poles(self) -> tuple[Complexes, Complexes]:
         """Poles and residues of the rational part without the delay, each of shape (B, n).
 
-        The residues assume simple poles; beside a double pole they blow up (`sampled_response`
-        does not use them there).
+        Poles that coincide are moved apart, but for two at zero: their residues blow up
+        (`sampled_response` does not use them there).
         """
         return poles_and_residues(self.mechanism, self.filters)
 

@@ -22,13 +22,13 @@ from bayeshaptic.models.response.filtered import filtered
 from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.models.response.transfer import transfer
-from bayeshaptic.numerics.polynomial import Polynomial, evaluate
+from bayeshaptic.numerics.partial_fractions import moved_apart, residues
+from bayeshaptic.numerics.polynomial import Polynomial
 from bayeshaptic.types import Complexes, Floats
 
 Rows = NDArray[np.int_]
 
-_DOUBLE = 1e-6  # poles closer than this, relative to their size, are moved apart to it
-_SLOW = 1e-10  # and closer than this in radians a sample, beside zero
+_SLOW = 1e-10  # radians a sample: what a pole at zero may be moved by
 
 
 class Response(Protocol):
@@ -141,8 +141,8 @@ class PoleResponse:
 
 def pole_response(system: LinearSystem, period_s: float, exact: bool = True) -> PoleResponse:
     """The response of `system` from its poles: exact, or the continuous approximation."""
-    poles, residues, integrators = _simple_poles(system, period_s)
-    p, r = poles * period_s, residues * period_s
+    poles, parts, integrators = _simple_poles(system, period_s)
+    p, r = poles * period_s, parts * period_s
     delay = system.delay_s / period_s
     if not exact:
         none = np.zeros_like(r)
@@ -158,11 +158,7 @@ def pole_response(system: LinearSystem, period_s: float, exact: bool = True) -> 
 def _simple_poles(
     system: LinearSystem, period_s: float
 ) -> tuple[Complexes, Complexes, NDArray[np.int_]]:
-    """Poles, residues and the number of integrators, with double poles moved apart.
-
-    Moving a double pole to p +- h changes the denominator by h^2 relative to |s - p|^2, and costs
-    eps |s - p| / h in rounding: both far below 1e-6 wherever a crossing can be.
-    """
+    """Poles, residues and the number of integrators, with double poles moved apart."""
     top, bottom = (polynomial.T for polynomial in transfer(system.mechanism))
     numerator, denominator = filtered(top, bottom, system.filters)
     poles = _poles(system, bottom)
@@ -170,19 +166,10 @@ def _simple_poles(
     integrators = np.cumprod(denominator == 0, axis=0).sum(axis=0)
     at_zero = np.arange(poles.shape[1]) < integrators[:, None]
     poles[at_zero] = 0.0
-    gaps = _gaps(poles)
-    apart = np.maximum(_DOUBLE * np.abs(poles), _SLOW / period_s)
-    near = np.abs(gaps) < apart[:, :, None]
-    rows = np.flatnonzero(near.any(axis=(1, 2)))
-    if rows.size:
-        near = near[rows]
-        rank = np.tril(near, -1).sum(axis=2) - 0.5 * near.sum(axis=2)
-        poles[rows] += 2j * rank * apart[rows]
-        gaps[rows] = _gaps(poles[rows])
+    poles = moved_apart(poles, _SLOW / period_s)
     # Nothing may sit on the line where the response is read.
     poles.real = np.where((poles.real == 0) & ~at_zero, -1e-14 * np.abs(poles), poles.real)
-    residues = evaluate(numerator, poles.T).T / (denominator[-1][:, None] * gaps.prod(axis=2))
-    return poles, residues, integrators
+    return poles, residues(numerator, denominator[-1], poles), integrators
 
 
 def _poles(system: LinearSystem, denominator: Polynomial) -> Complexes:
@@ -206,11 +193,3 @@ def _poles(system: LinearSystem, denominator: Polynomial) -> Complexes:
     if unsettled.size:
         poles[unsettled] = system.rows(unsettled).poles()[0]
     return poles
-
-
-def _gaps(poles: Complexes) -> Complexes:
-    """p_i - p_j, and 1 on the diagonal, shape (B, n, n)."""
-    gaps = poles[:, :, None] - poles[:, None, :]
-    diagonal = np.arange(poles.shape[1])
-    gaps[:, diagonal, diagonal] = 1.0
-    return gaps
