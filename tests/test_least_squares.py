@@ -7,9 +7,9 @@ import pytest
 from linear_bench import LHIFAM_FREE, Device
 
 from bayeshaptic.inference.least_squares import _other_valleys, _valleys, least_squares
-from bayeshaptic.inference.sampling.laplace import _truncated_moments as truncated_moments
 from bayeshaptic.models import LogNormal, free, grasped, rigid
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
+from bayeshaptic.numerics.truncated_normal import moments_above
 from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -164,7 +164,7 @@ def test_gauss_newton_on_a_problem_with_a_known_answer():
 def test_moments_of_a_truncated_normal(mean):
     from scipy.stats import truncnorm
 
-    found, spread = truncated_moments(np.array([2 * mean]), np.array([[4.0]]), np.zeros(1))
+    found, spread = moments_above(np.zeros(1), np.array([2 * mean]), np.array([[4.0]]), 2000)
     truth = truncnorm(-mean, np.inf, loc=2 * mean, scale=2.0)
     # 2000 draws.
     assert found[0] == pytest.approx(truth.mean(), abs=5 * truth.std() / np.sqrt(2000))
@@ -174,7 +174,7 @@ def test_moments_of_a_truncated_normal(mean):
 def test_moments_of_two_truncated_normals():
     rng = np.random.default_rng(0)
     mean, covariance = np.array([0.3, -0.5]), np.array([[1.0, -0.8], [-0.8, 1.0]])
-    found, spread = truncated_moments(mean, covariance, np.zeros(2))
+    found, spread = moments_above(np.zeros(2), mean, covariance, 2000)
     draws = rng.multivariate_normal(mean, covariance, 2_000_000)
     draws = draws[np.all(draws > 0, axis=1)]
     assert found == pytest.approx(draws.mean(axis=0), abs=5 * draws.std() / np.sqrt(2000))

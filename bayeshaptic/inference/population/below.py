@@ -8,9 +8,9 @@ import numpy as np
 
 from bayeshaptic.inference.population.hierarchy import Hierarchy, inverse
 from bayeshaptic.inference.population.hyperparameters import Hyperparameters
+from bayeshaptic.numerics.truncated_normal import draw_above
 from bayeshaptic.types import Floats
 
-_SWEEPS = 20
 _CHUNK = 256
 
 
@@ -58,7 +58,7 @@ def _draw(
     given = hierarchy.given(phi)
     order = np.concatenate([hierarchy.hand, *[hierarchy.device] * (int(hierarchy.place.max()) + 1)])
     low = (walls - hierarchy.prior_mean)[order]
-    beta = walled(given.beta, inverse(given.precision), low, rng)
+    beta = draw_above(low, given.beta, inverse(given.precision), rng)
     people = given.draw_people(beta, rng)
     x = np.einsum("rip,bp->bri", hierarchy.design, beta)
     x[:, :, hierarchy.hand] += people[:, hierarchy.user]
@@ -70,38 +70,3 @@ def _draw(
     off = np.einsum("brij,brj->bri", given.weight, hierarchy.mean - guess - noise)
     x = guess + given.spread[:, None, :] * off
     return beta + hierarchy.prior_mean[order], x + hierarchy.prior_mean
-
-
-def walled(mean: Floats, covariance: Floats, low: Floats, rng: np.random.Generator) -> Floats:
-    """A draw of each normal distribution, shapes (B, q), (B, q, q), with entries not below `low`.
-
-    The entries with a wall by Gibbs sampling of their own distribution, then the others given them.
-    """
-    draw = mean + np.einsum(
-        "bij,bj->bi", np.linalg.cholesky(covariance), rng.standard_normal(mean.shape)
-    )
-    walled = np.flatnonzero(np.isfinite(low))
-    if walled.size == 0 or np.all(draw[:, walled] >= low[walled]):
-        return draw
-    own = covariance[:, walled][:, :, walled]
-    precision = inverse(own)
-    inside = np.maximum(draw[:, walled], low[walled])
-    for _ in range(_SWEEPS):
-        for i in range(len(walled)):
-            off = inside - mean[:, walled]
-            off[:, i] = 0.0
-            sd = 1 / np.sqrt(precision[:, i, i])
-            centre = mean[:, walled[i]] - sd**2 * np.einsum("bj,bj->b", precision[:, i], off)
-            inside[:, i] = _above(low[walled[i]], centre, sd, rng)
-    change = np.einsum("bij,bj->bi", precision, inside - draw[:, walled])
-    draw = draw + np.einsum("bij,bj->bi", covariance[:, :, walled], change)
-    draw[:, walled] = inside
-    return draw
-
-
-def _above(low: float, centre: Floats, sd: Floats, rng: np.random.Generator) -> Floats:
-    """A draw of each normal distribution above `low`."""
-    from scipy.special import log_ndtr, ndtri_exp
-
-    log_tail = log_ndtr((centre - low) / sd)
-    return centre - sd * ndtri_exp(log_tail + np.log(rng.uniform(size=len(centre))))

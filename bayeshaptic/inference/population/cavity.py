@@ -15,12 +15,14 @@ from scipy.special import logsumexp
 
 from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, at_peak
 from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.numerics.weights import tempered
 from bayeshaptic.types import Floats
 
 _COMPONENTS = 120  # draws of the hyperparameters that a cavity is a mixture over
 _CHUNK = 2000
 _LOOKED_AT = 2000
 _VAGUE = 1e3  # prior standard deviations of a recording that says nothing
+_COUNT = 0.2  # share of the hyperparameters that must count: a few vectors say nothing
 _LEAST = 0.02  # curvature of a description, in units of the tilted distribution's
 
 
@@ -89,20 +91,9 @@ def cavity(hierarchy: Hierarchy, r: int, phi: Floats, rng: np.random.Generator) 
     seen = covariance + own.covariance
     off = own.mean - mean
     far = np.einsum("bi,bi->b", off, np.linalg.solve(seen, off[..., None])[..., 0])
-    weight = flattened(0.5 * far + 0.5 * np.linalg.slogdet(seen)[1], 0.2)
+    weight = tempered(0.5 * far + 0.5 * np.linalg.slogdet(seen)[1], _COUNT * len(phi))
     chosen = rng.choice(len(phi), min(_COMPONENTS, len(phi)), p=weight)
     return Cavity(mean[chosen], np.linalg.inv(np.linalg.cholesky(covariance[chosen])))
-
-
-def flattened(log_weight: Floats, least: float) -> Floats:
-    """Weights, flattened until a share of `least` of them counts: a few vectors say nothing."""
-    log_weight = log_weight - log_weight.max()
-    for power in 0.7 ** np.arange(20):
-        weight = np.exp(power * log_weight)
-        weight /= weight.sum()
-        if 1 / np.sum(weight**2) >= least * len(weight):
-            break
-    return np.asarray(weight, float)
 
 
 def described(x: Floats, rest: Cavity) -> GaussianLikelihood:

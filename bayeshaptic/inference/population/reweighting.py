@@ -20,7 +20,7 @@ import numpy as np
 
 from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.population.below import Below, draw_below
-from bayeshaptic.inference.population.cavity import Cavity, cavity, described, flattened
+from bayeshaptic.inference.population.cavity import Cavity, cavity, described
 from bayeshaptic.inference.population.gaussian_likelihood import exact_likelihood
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.sampler import TOLERABLE, run_ensembles
@@ -29,6 +29,7 @@ from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.inference.sampling.importance import adapt
 from bayeshaptic.numerics.mixture import student
 from bayeshaptic.numerics.pareto import pareto_k
+from bayeshaptic.numerics.weights import effective, normalised, tempered
 from bayeshaptic.types import Floats
 
 POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
@@ -214,16 +215,15 @@ def _resampled(
     how: str,
 ) -> Reweighted:
     """Each of `x` as often as its weight says (systematic resampling)."""
-    weight = np.exp(log_weight - log_weight.max())
-    weight /= weight.sum()
-    effective = float(1 / np.sum(weight**2))
+    weight = normalised(log_weight)
+    number = effective(weight)
     # No more than there are to choose from: draws that come again and again would count as many.
-    count = int(np.ceil(min(count, effective, _MOST)))
+    count = int(np.ceil(min(count, number, _MOST)))
     steps = (np.arange(count) + rng.uniform()) / count
     chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(x) - 1)
     draws = here.natural(x[rng.permutation(chosen)])
     k = pareto_k(log_weight[np.isfinite(log_weight)])
-    return Reweighted(user, draws, effective, k, how, effective / len(x))
+    return Reweighted(user, draws, number, k, how, number / len(x))
 
 
 def _sampled(
@@ -248,7 +248,7 @@ def _sampled(
         return value
 
     x = _own(posterior, here, _START)
-    weight = flattened(_own_weight(posterior, rest, here, x), 0.05)
+    weight = tempered(_own_weight(posterior, rest, here, x), 0.05 * len(x))
     mean = weight @ x
     off = x - mean
     first = student(mean, (weight[:, None] * off).T @ off, 8.0)

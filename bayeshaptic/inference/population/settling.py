@@ -9,11 +9,11 @@ from typing import TypeVar
 import numpy as np
 
 from bayeshaptic.inference.coordinates import Coordinates
-from bayeshaptic.inference.population.below import walled
 from bayeshaptic.inference.population.gaussian_likelihood import STEP, linearised
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.numerics.truncated_normal import moments_above
 from bayeshaptic.types import Floats
 
 L = TypeVar("L", Hierarchy, Trend)
@@ -68,9 +68,5 @@ def _expected(level: Hierarchy | Trend, phi: Floats, walls: Floats) -> Floats:
     mean, covariance = level.expected(phi)
     if not np.isfinite(walls).any():
         return mean
-    rng = np.random.default_rng(0)  # the same numbers in every round, which must come to rest
-    many = [
-        walled(np.tile(m, (_DRAWS, 1)), np.tile(c, (_DRAWS, 1, 1)), walls, rng).mean(axis=0)
-        for m, c in zip(mean, covariance, strict=True)
-    ]
-    return np.stack(many)
+    every = zip(mean, covariance, strict=True)
+    return np.stack([moments_above(walls, m, c, _DRAWS)[0] for m, c in every])

@@ -9,10 +9,12 @@ from bayeshaptic.inference.fit import weighted_residuals
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.numerics.mixture import StudentMixture, student
+from bayeshaptic.numerics.truncated_normal import moments_above
 from bayeshaptic.types import Floats
 
 _STEP = 0.1  # of finite differences, in conditional standard deviations
 _SETTLED = 1e-2  # gain of log density that is none
+_DRAWS = 2000  # for the moments of a truncated normal
 _MARGIN = 2.5 * _STEP  # from where second differences stay inside the support
 
 
@@ -48,7 +50,7 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
         return _possible(density, peak, phi), student(peak, covariance)
 
     block = covariance[np.ix_(leaning, leaning)]
-    mean, spread = _truncated_moments(peak[leaning], block, here.low[leaning])
+    mean, spread = moments_above(here.low[leaning], peak[leaning], block, _DRAWS)
     # Along the ridge: across it, the others would not find their way back.
     along = np.linalg.solve(block, mean - peak[leaning])
     inside = peak + covariance[:, leaning] @ along
@@ -150,27 +152,3 @@ def _inverse(curvature: Floats) -> Floats:
     """
     eigenvalues, vectors = np.linalg.eigh(curvature)
     return (vectors / np.maximum(eigenvalues, 1.0)) @ vectors.T
-
-
-def _truncated_moments(mean: Floats, covariance: Floats, low: Floats) -> tuple[Floats, Floats]:
-    """Mean and covariance of a normal distribution cut off below `low`, by Gibbs sampling."""
-    rng = np.random.default_rng(0)
-    precision = np.linalg.inv(covariance)
-    points = np.tile(np.maximum(mean, low + 0.1 * np.sqrt(np.diag(covariance))), (2000, 1))
-    for _ in range(30):
-        for i in range(len(mean)):
-            sd = 1 / np.sqrt(precision[i, i])
-            others = points - mean
-            others[:, i] = 0.0
-            centre = mean[i] - (others @ precision[i]) / precision[i, i]
-            points[:, i] = _truncated_normal(centre, sd, low[i], rng)
-    return points.mean(axis=0), np.atleast_2d(np.cov(points.T))
-
-
-def _truncated_normal(centre: Floats, sd: float, low: float, rng: np.random.Generator) -> Floats:
-    """One draw a row from a normal distribution cut off below `low`."""
-    from scipy.special import log_ndtr, ndtri_exp
-
-    # In the upper tail, through logarithms: the wall may be many standard deviations above.
-    log_tail = log_ndtr((centre - low) / sd)
-    return centre - sd * ndtri_exp(log_tail + np.log(rng.uniform(size=len(centre))))

@@ -1,0 +1,33 @@
+"""Importance weights from their logarithms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.types import Floats
+
+
+def normalised(log_weights: Floats) -> Floats:
+    """Weights that sum to one, shape (n,); all alike where none is possible."""
+    top = log_weights.max()
+    if not np.isfinite(top):
+        return np.full(len(log_weights), 1 / len(log_weights))
+    weights = np.exp(log_weights - top)
+    return np.asarray(weights / weights.sum())
+
+
+def effective(weights: Floats) -> float:
+    """Kish's effective number of weighted points."""
+    return float(weights.sum() ** 2 / max(np.sum(weights**2), 1e-300))
+
+
+def tempered(log_weights: Floats, least: float) -> Floats:
+    """Weights, flattened until at least `least` points count: what fits five points means nothing.
+
+    In logarithms, because one point may outweigh the others by more than a number can hold.
+    """
+    for power in 0.7 ** np.arange(60):
+        weights = normalised(power * log_weights)
+        if effective(weights) >= least:
+            break
+    return weights
