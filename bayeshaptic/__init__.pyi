@@ -95,6 +95,9 @@ from .models import (
     Uniform as Uniform,
 )
 from .models import (
+    chain as chain,
+)
+from .models import (
     free as free,
 )
 from .models import (

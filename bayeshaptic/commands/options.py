@@ -38,7 +38,7 @@ def count(text: str) -> int:
     return int(text)
 
 
-def seed(text: str) -> int:
+def whole(text: str) -> int:
     """A whole number, zero or above."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} must be a whole number, zero or above")
@@ -108,10 +108,11 @@ ANALYSIS = (
     Flag("--delay-sd-s", "delay_sd_s", {"type": non_negative, "metavar": "SECONDS"}),
     Flag("--band", "band_hz", {"type": band, "metavar": "LOW,HIGH"}),
     Flag("--held", "held", {"type": yes_or_no, "metavar": "yes|no"}),
+    Flag("--modes", "modes", {"type": whole, "metavar": "N"}),
     Flag("--loop", "close_loop", {"action": argparse.BooleanOptionalAction}),
     Flag("--hidden", "hidden", {"type": yes_or_no, "metavar": "yes|no"}),
     Flag("--budget", "budget_s", {"type": positive, "metavar": "SECONDS"}),
-    Flag("--seed", "seed", {"type": seed, "metavar": "N"}),
+    Flag("--seed", "seed", {"type": whole, "metavar": "N"}),
 )
 _NOT_BOTH = ("rows", "seconds")
 

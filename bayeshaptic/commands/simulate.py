@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.commands.options import add_quiet, band, non_negative, positive, seed
+from bayeshaptic.commands.options import add_quiet, band, non_negative, positive, whole
 from bayeshaptic.errors import InputError
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "help": "of a posterior.nc: draw from the priors of its model instead",
     },
     "--seed": {
-        "type": seed,
+        "type": whole,
         "default": 0,
         "metavar": "N",
         "help": "the same seed gives the same recording (default: 0)",

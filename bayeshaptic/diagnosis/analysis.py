@@ -130,6 +130,7 @@ def analyse(
     measurement : Recording, Etfe or path
         An `Etfe` where there is no recording (a table of a frequency response).
     model : {"auto", "rigid", "free", "grasped"} or Model
+        With the option `modes` a chain of masses.
     options : Options, optional
     **changes
         Single options by name: device, delay_s, delay_sd_s, band_hz, prior, held, lever_m, ess,

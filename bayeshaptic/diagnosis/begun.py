@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.arguments import instance
+from bayeshaptic.arguments import instance, shown
 from bayeshaptic.devices import Device, load_device
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
@@ -17,6 +17,7 @@ from bayeshaptic.inference.choose import Choice, choose_model
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model, build_model
+from bayeshaptic.models.structures import chain
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.join import unbroken
@@ -36,6 +37,25 @@ def device_of(options: Options, model: str | Model) -> Device | None:
     if options.device is None and isinstance(model, Model):
         return model.device
     return options.device
+
+
+def base_model(model: str | Model, options: Options) -> str | Model:
+    """The base model that is asked for: `model`, or the chain with the modes of the options.
+
+    Raises
+    ------
+    InputError
+        Where they contradict each other.
+    """
+    if options.modes is None:
+        return model
+    if options.held or model not in ("auto", "free"):
+        what = "somebody holds it" if options.held else f"the model is {shown(model)}"
+        raise InputError(
+            f"modes is {options.modes}, which is for a device that nobody holds, and {what}; leave "
+            "one of them out"
+        )
+    return chain(options.modes).name
 
 
 def measurement_of(measurement: Any, model: Any, options: Options) -> Recording | Etfe:
@@ -99,6 +119,7 @@ class Begun:
 @single_threaded
 def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -> Begun:
     """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
+    model = base_model(model, options)
     clock = Clock()
     device = device_of(options, model)
     notices: tuple[Notice, ...] = ()

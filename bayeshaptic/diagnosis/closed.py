@@ -12,7 +12,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.analysis import Analysis, finish
 from bayeshaptic.diagnosis.base_model import traced_from_best_base
-from bayeshaptic.diagnosis.begun import begin, measurement_of
+from bayeshaptic.diagnosis.begun import base_model, begin, measurement_of
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
@@ -127,6 +127,7 @@ def close_loop(
     ----------
     measurement : Recording, Etfe or path
     model : {"auto", "rigid", "free", "grasped"} or Model
+        With the option `modes` a chain of masses.
     options : Options, optional
     **changes
         Single options by name, as in `bayeshaptic.analyse`.
@@ -151,7 +152,8 @@ def close_loop(
         begun, traced = traced_from_best_base(begun, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
     if force is not None:
-        one_mass = (model.name if isinstance(model, Model) else model) == "rigid"
+        asked = base_model(model, chosen)
+        one_mass = (asked.name if isinstance(asked, Model) else asked) == "rigid"
         found = analyse_in_loop(begun, one_mass, chosen.within(0.3, 0.95))
         if found is not None:
             error = _limit_alone(found)

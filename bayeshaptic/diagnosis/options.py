@@ -44,6 +44,10 @@ class Options:
     held : bool or None
         Whether somebody held the device: the base model is then chosen among those of held, or of
         free, devices; by default from the data, in a study from its users.
+    modes : int or None
+        Vibration modes of a device that nobody holds: 0 is one rigid mass, 1 two masses and a
+        transmission, N a chain of N + 1 masses, 8 modes at most; by default at most one, chosen
+        from the data.
     lever_m : float or None
         From the axis to the tip, in metres; by default the device's.
     ess : float or None
@@ -68,6 +72,7 @@ class Options:
     band_hz: tuple[float, float] | None = None
     prior: Mapping[str, Prior] = field(default_factory=dict)
     held: bool | None = None
+    modes: int | None = None
     lever_m: float | None = None
     ess: float | None = None
     hidden: bool = True

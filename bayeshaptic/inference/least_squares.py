@@ -18,6 +18,7 @@ from bayeshaptic.inference.fit import (
 )
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
+from bayeshaptic.models.chains import shorter_chain, with_one_more_mode
 from bayeshaptic.models.start import informed, starting_points
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.recordings.response.etfe import Etfe, compress
@@ -59,7 +60,7 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
     """
     model = informed(model, etfe)
     if start is None:
-        start = starting_points(model, etfe, np.random.default_rng(seed))
+        start = _starts(model, etfe, seed)
     found = refine(model, compress(etfe), start)
     theta = found.theta
     for _ in range(_REWINDOWINGS):
@@ -67,6 +68,14 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
         theta = polish(model, windows, theta)
     fit = summarise(model, windows, theta, found.agreeing)
     return replace(fit, elsewhere=found.elsewhere)
+
+
+def _starts(model: Model, etfe: Etfe, seed: int) -> Floats:
+    """Where to begin; a chain grows from the fit of the one with a mode less."""
+    shorter = shorter_chain(model)
+    if shorter is None:
+        return starting_points(model, etfe, np.random.default_rng(seed))
+    return with_one_more_mode(shorter, least_squares(shorter, etfe, seed=seed).theta, model, etfe)
 
 
 @dataclass(frozen=True)

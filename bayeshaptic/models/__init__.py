@@ -1,6 +1,6 @@
 """Parameters and priors, mechanisms, the sampled response, and the rigid, free, grasped models."""
 
-from bayeshaptic.models.build import build_model, free, grasped, rigid
+from bayeshaptic.models.build import build_model, chain, free, grasped, rigid
 from bayeshaptic.models.model import Extension, Model
 from bayeshaptic.models.parameter import Parameter
 from bayeshaptic.models.prior import (
@@ -30,6 +30,7 @@ __all__ = [
     "Uniform",
     "build_model",
     "draw",
+    "chain",
     "free",
     "grasped",
     "prior_from_table",

@@ -18,9 +18,10 @@ from bayeshaptic.models.structures import (
     HAND,
     QUANTITIES,
     RIGID,
-    STRUCTURES,
     Structure,
+    structure_named,
 )
+from bayeshaptic.models.structures import chain as chain_of_masses
 
 # How well a device file is believed, as log standard deviations: configurations, assembly and
 # above all people differ.
@@ -56,6 +57,33 @@ def free(
 ) -> Model:
     """Two masses and a transmission, G1 of the paper's (3).  For the parameters see `grasped`."""
     return _build(FREE, device, delay_s, delay_sd_s, period_s, prior)
+
+
+@at_the_door
+def chain(
+    modes: int,
+    device: str | Device | None = None,
+    delay_s: float | None = None,
+    delay_sd_s: float | None = None,
+    period_s: float | None = None,
+    prior: Mapping[str, Prior] | None = None,
+) -> Model:
+    """Masses in a row that nobody holds, with so many vibration modes.
+
+    Parameters
+    ----------
+    modes : int
+        0 is `rigid`, 1 is `free`; N has N + 1 masses: beside those of `free` m3, c3, k3 and so on,
+        the mass and what joins it to the one before.
+    device, delay_s, delay_sd_s, period_s, prior
+        See `grasped`.  A device file gives the parameters of two masses at most; the priors of a
+        longer chain come from the data at the first fit.
+
+    Returns
+    -------
+    Model
+    """
+    return _build(chain_of_masses(modes), device, delay_s, delay_sd_s, period_s, prior)
 
 
 @at_the_door
@@ -102,10 +130,8 @@ def build_model(
     period_s: float | None = None,
     prior: Mapping[str, Prior] | None = None,
 ) -> Model:
-    """The model called `name` ("rigid", "free", "grasped").  For the rest see `grasped`."""
-    if name not in STRUCTURES:
-        raise InputError(f"no model {name!r}; there are {', '.join(STRUCTURES)}.")
-    return _build(STRUCTURES[name], device, delay_s, delay_sd_s, period_s, prior)
+    """The model called `name`: rigid, free, grasped, chain-N; the rest is as in `grasped`."""
+    return _build(structure_named(name), device, delay_s, delay_sd_s, period_s, prior)
 
 
 def device_priors(structure: Structure, values: Mapping[str, float]) -> dict[str, Prior]:

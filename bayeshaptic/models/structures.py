@@ -1,16 +1,19 @@
-"""The three base structures of Diaz and Gil (2010): rigid, free, grasped."""
+"""The base structures of Diaz and Gil (2010), rigid, free, grasped, and chains of more masses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
+from bayeshaptic.errors import InputError
 from bayeshaptic.models.response.mechanism import Link, Mechanism
 from bayeshaptic.types import Floats
 
 Values = Mapping[str, Floats]
+_CHAIN = "chain-"  # and the number of its vibration modes
 
 # name: (dimension, title)
 QUANTITIES: dict[str, tuple[str, str]] = {
@@ -29,6 +32,13 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "kh": ("stiffness", "spring from the hand to the ground"),
     "delay_s": ("time", "loop delay"),
 }
+MOST_MODES = 8
+for _number in range(3, MOST_MODES + 2):
+    QUANTITIES |= {
+        f"m{_number}": ("mass", f"mass number {_number} of the chain"),
+        f"c{_number}": ("damping", f"damper between masses {_number - 1} and {_number}"),
+        f"k{_number}": ("stiffness", f"spring between masses {_number - 1} and {_number}"),
+    }
 HAND = ("bs", "ks", "mh", "bh", "kh")
 GROUND_DAMPERS = ("b", "b1", "b2")  # hardly seen by the data, and zero in the paper's tables
 
@@ -75,3 +85,47 @@ FREE = Structure(
 )
 GRASPED = Structure("grasped", FREE.names + HAND, _grasped, "held by a user, equation (11)")
 STRUCTURES = {structure.name: structure for structure in (RIGID, FREE, GRASPED)}
+
+
+@cache
+def chain(modes: int) -> Structure:
+    """The device by itself with so many vibration modes: masses in a row, nobody holds it.
+
+    With none it is rigid, with one free; each further mass hangs on the one before.
+
+    Raises
+    ------
+    InputError
+        For fewer than none, or more than eight.
+    """
+    if not 0 <= modes <= MOST_MODES:
+        raise InputError(f"a chain has 0 to {MOST_MODES} vibration modes, not {modes}.")
+    if modes < 2:
+        return (RIGID, FREE)[modes]
+    further = tuple(range(3, modes + 2))
+    names = tuple(f"{part}{number}" for number in further for part in "mck")
+
+    def build(v: Values) -> Mechanism:
+        mechanism = _free(v)
+        for n in further:
+            mechanism = mechanism.with_mass(v[f"m{n}"], n - 2, v[f"c{n}"], v[f"k{n}"])
+        return mechanism
+
+    title = f"{modes + 1} masses in a row, nobody holds it"
+    return Structure(f"{_CHAIN}{modes}", FREE.names + names, build, title)
+
+
+def structure_named(name: str) -> Structure:
+    """The structure called `name`: one of `STRUCTURES`, or "chain-2" for two vibration modes.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    number = name.removeprefix(_CHAIN)
+    if number != name and number.isdecimal():
+        return chain(int(number))
+    if name not in STRUCTURES:
+        raise InputError(f"no model {name!r}; there are {', '.join(STRUCTURES)}, and {_CHAIN}N.")
+    return STRUCTURES[name]

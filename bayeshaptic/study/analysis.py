@@ -206,7 +206,9 @@ def analyse_study(
 
 def analyse_entry(task: Task, progress: Progress | None = None) -> Result:
     """Read and analyse one recording of a study."""
-    options = replace(task.options, held=task.entry.user is not None, progress=progress)
+    held = task.entry.user is not None
+    modes = None if held else task.options.modes  # of the device by itself
+    options = replace(task.options, held=held, modes=modes, progress=progress)
     run = close_loop if task.close_loop else analyse
     return run(task.study.read(task.entry), task.model, options)
 

@@ -18,7 +18,7 @@ from bayeshaptic.models import (
     Parameter,
     Uniform,
 )
-from bayeshaptic.models.structures import STRUCTURES
+from bayeshaptic.models.structures import structure_named
 
 _PRIORS: dict[str, type] = {
     kind.__name__: kind for kind in (HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform)
@@ -51,7 +51,7 @@ def model_from_dict(data: dict[str, Any]) -> Model:
     """The model that `model_to_dict` described."""
     device = data["device"]
     return Model(
-        STRUCTURES[data["structure"]],
+        structure_named(data["structure"]),
         tuple(_parameter_from_dict(entry) for entry in data["parameters"]),
         data["fixed"],
         data["period_s"],
