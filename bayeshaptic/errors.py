@@ -35,9 +35,19 @@ class Notice:
     text: str
 
 
+def printable(text: str) -> str:
+    """`text` without line breaks and signs that would steer a terminal: names from files."""
+    return "".join(sign if sign.isprintable() else "?" for sign in text)
+
+
+def one_line(text: str) -> str:
+    """`text` in one line, printable: what libraries say of damaged files."""
+    return printable(" ".join(text.split()))
+
+
 def describe(error: BaseException) -> str:
     """One line that says what went wrong, for people: no traceback, no line breaks."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    text = " ".join(str(error).split())
+    text = one_line(str(error))
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"

@@ -5,7 +5,9 @@
 
 Each case is a good file with bytes changed, moved, repeated or cut off, read in a process that this
 one watches. What is not a one-line refusal (`InputError`) or a result is printed with the seed that
-makes it again (`--only SEED`). Needs a system with `fork`.
+makes it again (`--only SEED`). Readers that run in a process of their own are forked here from one
+that has their libraries loaded, under the same bounds; every twentieth is started as users have it.
+Needs a system with `fork`.
 """
 
 from __future__ import annotations
@@ -15,7 +17,9 @@ import contextlib
 import importlib
 import io
 import multiprocessing
+import os
 import resource
+import subprocess
 import sys
 import tempfile
 import time
@@ -24,6 +28,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -31,6 +36,7 @@ from bayeshaptic import cli, load_posterior
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import read_frf, read_recording, read_study
+from bayeshaptic.recordings.readers import apart, reader_for
 
 # In the place of this folder, whose coverage.py would be taken for the library of that name.
 sys.path[0] = str(Path(__file__).parents[1] / "tests")
@@ -38,6 +44,8 @@ test_readers = importlib.import_module("test_readers")
 
 MOST_SECONDS = 10.0
 MOST_KB = 2 << 20
+AS_USERS_HAVE_IT = 20  # every so many files are read by a process that is started, not forked
+LIBRARIES = ("h5py", "matio", "nptdms", "openpyxl", "scipy.io")
 Door = Callable[[Path], Any]
 
 STUDY = """
@@ -138,13 +146,38 @@ def mutated(content: bytes, rng: np.random.Generator) -> bytes:
     return bytes(changed)
 
 
+def forked(words: list[str], **how: Any) -> subprocess.CompletedProcess[bytes]:
+    """In the place of `subprocess.run` in `read_apart`: the same work in a fork of this process."""
+    *_, title, file, seconds = words
+    reader = reader_for(Path(file))
+    assert reader.title == title
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as said:
+        child = os.fork()
+        if child == 0:
+            with contextlib.suppress(BaseException):
+                os.dup2(out.fileno(), 1)
+                os.dup2(said.fileno(), 2)
+                texts = open(1, "w"), open(2, "w")  # noqa: SIM115
+                sys.stdout, sys.stderr = texts
+                apart.write_arrays(reader, Path(file), int(seconds))
+            os._exit(1)
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        out.seek(0), said.seek(0)
+        return subprocess.CompletedProcess(words, status, out.read(), said.read())
+
+
 def attempt(name: str, door: Door, path: Path, content: bytes, seed: int) -> str:
     """ "read", "refused", or what went wrong."""
     rng = np.random.default_rng(seed)
     began = time.perf_counter()
     said = io.StringIO()
+    fork = seed % AS_USERS_HAVE_IT != 0
     try:
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+        with (
+            contextlib.redirect_stderr(said),
+            contextlib.redirect_stdout(said),
+            mock.patch("subprocess.run", forked) if fork else contextlib.nullcontext(),
+        ):
             warnings.simplefilter("ignore")
             if name == "command":
                 result = command(rng)
@@ -232,6 +265,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
         folder = Path(place)
         cases = doors(folder)
+        for library in LIBRARIES:
+            importlib.import_module(library)
         test_readers.write_csv(folder / "a.csv")
         (folder / "study.toml").write_text(STUDY)
         for name in arguments.formats or cases:

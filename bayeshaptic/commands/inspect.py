@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, printable
 
 if TYPE_CHECKING:
     from bayeshaptic.recordings.overview import Overview
@@ -66,7 +66,7 @@ def lines(found: Overview) -> list[str]:
 
     roles = {name: role for role, name in found.roles.items()}
     shown = found.columns[:_MOST_COLUMNS]
-    width = max((len(_safe(one.name)) for one in shown), default=4)
+    width = max((len(printable(one.name)) for one in shown), default=4)
     table = [f"{'name':{width}}  samples         low to high       resolution"]
     for one in shown:
         step = f"{one.resolution:.4g}" if one.resolution else "-"
@@ -74,7 +74,7 @@ def lines(found: Overview) -> list[str]:
         picture = "" if one.period else f"  {_sparkline(found.arrays[one.name])}"
         role = f"  {roles[one.name]}?" if one.name in roles else ""
         table.append(
-            f"{_safe(one.name):{width}}  {one.samples:7d}  {one.low:10.4g} to {one.high:<10.4g}  "
+            f"{printable(one.name):{width}}  {one.samples:7d}  {one.low:10.4g} to {one.high:<10.4g}  "
             f"{step:>10}{rate}{picture}{role}"
         )
     if len(found.columns) > len(shown):
@@ -82,11 +82,11 @@ def lines(found: Overview) -> list[str]:
     by_name = {one.name: one for one in found.columns}
     for role, name in found.roles.items():
         if doubt := doubts(by_name[name], role):
-            table.append(f"{role}: {_safe(name)}: {doubt}")
+            table.append(f"{role}: {printable(name)}: {doubt}")
     if found.mapping is None:
         table.append("no force and position were recognised; name them with --columns")
     else:
-        table.append(f'--columns "{_safe(found.mapping)}"')
+        table.append(f'--columns "{printable(found.mapping)}"')
     return table
 
 
@@ -99,14 +99,14 @@ def asked(found: Overview) -> str:
     print("Which columns are these? NAME, NAME*FACTOR or NAME*FACTOR[UNIT]; empty for the guess.")
     for role in ("time", "force", "position"):
         while True:
-            answer = input(f"  {role} [{_safe(guesses.get(role, '-'))}]: ").strip()
+            answer = input(f"  {role} [{printable(guesses.get(role, '-'))}]: ").strip()
             term = answer or guesses.get(role, "")
             if not term and role == "time":
                 break  # the period is given instead
             try:
                 pick(found.arrays, role, parse_columns({role: term}), found.path)
             except InputError as error:
-                print(f"  {_safe(str(error))}")
+                print(f"  {printable(str(error))}")
                 continue
             chosen[role] = term
             break
@@ -149,14 +149,14 @@ def draw(found: Overview, path: Path) -> None:
         axes = figure.add_subplot(len(shown), 1, number)
         values = found.arrays[one.name]
         over = clock if clock is not None and len(clock) == len(values) else range(len(values))
-        panel(axes, unit if number == len(shown) else "", title=_safe(one.name).replace("$", "S"))
+        panel(axes, unit if number == len(shown) else "", title=printable(one.name).replace("$", "S"))
         axes.plot(over, values, linewidth=0.5)
     figure.savefig(path, format="png")
 
 
 def _clock(found: Overview) -> tuple[Any, str]:
     name = found.roles.get("time")
-    return (None, "row") if name is None else (found.arrays[name], _safe(name))
+    return (None, "row") if name is None else (found.arrays[name], printable(name))
 
 
 def _sparkline(values: Any) -> str:
@@ -171,7 +171,3 @@ def _sparkline(values: Any) -> str:
     level = (some - low) / (high - low or 1.0)
     return "".join(_BARS[int(round(7 * share))] for share in level)
 
-
-def _safe(name: str) -> str:
-    """A name from a file without the signs that would steer a terminal."""
-    return "".join(sign if sign.isprintable() else "?" for sign in name)

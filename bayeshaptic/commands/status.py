@@ -6,7 +6,7 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, one_line
 
 NAME = "status"
 SUMMARY = "how far a batch is, from another shell"
@@ -36,5 +36,5 @@ def run(arguments: argparse.Namespace) -> int:
     )
     for entry in entries:
         if entry.error:
-            print(f"  {entry.error}")
+            print(f"  {one_line(entry.error)}")
     return 0 if count["done"] == len(entries) else 1

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.compiled import when_compiling
+from bayeshaptic.errors import one_line
 
 if TYPE_CHECKING:
     from bayeshaptic.report.reported import Reported
@@ -16,7 +17,7 @@ MOST_WARNINGS = 3
 
 def complain(message: str) -> None:
     """One line on stderr, with the program's name before it."""
-    print(f"bayeshaptic: {message}", file=sys.stderr)
+    print(f"bayeshaptic: {one_line(message)}", file=sys.stderr)
 
 
 class Talk:

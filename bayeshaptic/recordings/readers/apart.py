@@ -16,7 +16,7 @@ from typing import IO
 
 import numpy as np
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, one_line
 from bayeshaptic.recordings.readers.reader import Arrays, Reader
 
 MOST_BYTES = 2 << 30
@@ -57,7 +57,8 @@ def read_apart(reader: Reader, path: Path) -> Arrays:
     except subprocess.TimeoutExpired:
         raise InputError(f"{path}: reading it took more than {10 * seconds} s") from None
     if done.returncode == _REFUSED:
-        raise InputError(done.stderr.decode("utf-8", "replace").strip())
+        # Not by stderr, where libraries say what they think of a file.
+        raise InputError(one_line(done.stdout.decode("utf-8", "replace")))
     if done.returncode != 0:
         raise InputError(
             f"{path}: not a readable {reader.title} file: its reader gave up on it (damaged, or "
@@ -67,7 +68,7 @@ def read_apart(reader: Reader, path: Path) -> Arrays:
 
 
 def write_arrays(reader: Reader, path: Path, seconds: int) -> None:
-    """In the process apart: read, and write the arrays to stdout; an error to stderr."""
+    """In the process apart: read, and write the arrays to stdout; or the error there."""
     _limit(seconds)
     out, sys.stdout = sys.stdout.buffer, sys.stderr
     try:
@@ -82,8 +83,8 @@ def write_arrays(reader: Reader, path: Path, seconds: int) -> None:
         out.flush()
     except (InputError, MemoryError) as error:
         what = str(error) if isinstance(error, InputError) else f"{path}: too large to be read"
-        sys.stderr.buffer.write(what.encode("utf-8", "replace"))
-        sys.stderr.flush()
+        out.write(what.encode("utf-8", "replace"))
+        out.flush()
         os._exit(_REFUSED)
     # Libraries may crash while they tidy up.
     os._exit(0)
