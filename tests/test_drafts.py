@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from bayeshaptic.report.draft import draft_in, move_all, remove_dead_drafts, write_whole
+from bayeshaptic.files import remove_dead_drafts, write_whole
+from bayeshaptic.report.draft import draft_in, move_all
 
 
 def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
@@ -107,12 +108,12 @@ def test_half_written_files_of_the_dead_are_removed(tmp_path: Path) -> None:
     code = f"""
 import os, sys
 from pathlib import Path
-from bayeshaptic.report import draft
+from bayeshaptic import files
 os.replace = lambda *_: os.kill(os.getpid(), 9)
-draft.write_whole(Path({str(tmp_path / "index.html")!r}), "half")
+files.write_whole(Path({str(tmp_path / "index.html")!r}), "half")
 """
     subprocess.run([sys.executable, "-c", code], check=False)
     (left,) = os.listdir(tmp_path)
-    assert left.startswith(".index.html.part-")
+    assert left.startswith(".part-")
     remove_dead_drafts(tmp_path)
     assert not os.listdir(tmp_path)

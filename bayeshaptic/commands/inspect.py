@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.errors import InputError, printable
+from bayeshaptic.files import whole_file, write_whole
 
 if TYPE_CHECKING:
     from bayeshaptic.recordings.overview import Overview
@@ -55,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.write is not None:
         mapping = asked(found) if sys.stdin.isatty() and sys.stdout.isatty() else found.mapping
         text = study_text(found, arguments.write, mapping)
-        arguments.write.write_text(text, encoding="utf-8")
+        write_whole(arguments.write, text)
         print(f"study: {arguments.write}")
     return 0
 
@@ -73,10 +74,8 @@ def lines(found: Overview) -> list[str]:
         rate = f"  every {one.period:.6g}" if one.period else ""
         picture = "" if one.period else f"  {_sparkline(found.arrays[one.name])}"
         role = f"  {roles[one.name]}?" if one.name in roles else ""
-        table.append(
-            f"{printable(one.name):{width}}  {one.samples:7d}  {one.low:10.4g} to {one.high:<10.4g}  "
-            f"{step:>10}{rate}{picture}{role}"
-        )
+        name, span = printable(one.name), f"{one.low:10.4g} to {one.high:<10.4g}"
+        table.append(f"{name:{width}}  {one.samples:7d}  {span}  {step:>10}{rate}{picture}{role}")
     if len(found.columns) > len(shown):
         table.append(f"and {len(found.columns) - len(shown)} more")
     by_name = {one.name: one for one in found.columns}
@@ -149,9 +148,12 @@ def draw(found: Overview, path: Path) -> None:
         axes = figure.add_subplot(len(shown), 1, number)
         values = found.arrays[one.name]
         over = clock if clock is not None and len(clock) == len(values) else range(len(values))
-        panel(axes, unit if number == len(shown) else "", title=printable(one.name).replace("$", "S"))
+        panel(
+            axes, unit if number == len(shown) else "", title=printable(one.name).replace("$", "S")
+        )
         axes.plot(over, values, linewidth=0.5)
-    figure.savefig(path, format="png")
+    with whole_file(path) as partial:
+        figure.savefig(partial, format="png")
 
 
 def _clock(found: Overview) -> tuple[Any, str]:
@@ -170,4 +172,3 @@ def _sparkline(values: Any) -> str:
     low, high = some.min(), some.max()
     level = (some - low) / (high - low or 1.0)
     return "".join(_BARS[int(round(7 * share))] for share in level)
-

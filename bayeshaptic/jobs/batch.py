@@ -15,6 +15,7 @@ from pathlib import Path
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
+from bayeshaptic.files import remove_dead_drafts
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
 from bayeshaptic.jobs.index import row_of, write_index
@@ -24,7 +25,6 @@ from bayeshaptic.jobs.recording import report_recording
 from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.jobs.study import report_study
 from bayeshaptic.recordings.read import recording_name
-from bayeshaptic.report.draft import remove_dead_drafts
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.types import Progress
 

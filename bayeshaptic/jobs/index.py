@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.report.draft import write_whole
+from bayeshaptic.files import write_whole
 
 COLUMNS = {
     "name": "Recording",

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.files import write_whole
 from bayeshaptic.jobs.job import Job
 from bayeshaptic.recordings.study_file import read_study
-from bayeshaptic.report.draft import write_whole
 from bayeshaptic.report.provenance import sha256, versions
 
 NAME = "manifest.json"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.files import whole_file
 from bayeshaptic.rig.bench import Bench
 from bayeshaptic.rig.dynamics.plant import Array
 
@@ -77,15 +78,11 @@ def write_recording(path: str | os.PathLike[str], recording: SimulatedRecording)
     suffix = next((end for end in WRITERS if path.name.lower().endswith(end)), None)
     if suffix is None:
         raise InputError(f"{path}: cannot write this kind of file; use {', '.join(WRITERS)}")
-    # The temporary name keeps the ending, by which the writers know what to write.
-    partial = path.with_name(f".partial-{os.getpid()}-{path.name}")
     try:
-        WRITERS[suffix](partial, recording)
-        os.replace(partial, path)
+        with whole_file(path) as partial:
+            WRITERS[suffix](partial, recording)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        partial.unlink(missing_ok=True)
     return path
 
 

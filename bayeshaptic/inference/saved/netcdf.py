@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.files import whole_file
+
 _ROOM = 1 << 20  # bytes, beside the arrays
 
 
@@ -80,14 +82,9 @@ def write(groups: Mapping[str, Group], path: Path) -> None:
     needed = sum(group.nbytes for group in groups.values()) + _ROOM
     if shutil.disk_usage(path.absolute().parent).free < needed:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with h5netcdf.File(temporary, "w") as file:
-            for name, group in groups.items():
-                _write_group(file.create_group(name), group)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole_file(path) as partial, h5netcdf.File(partial, "w") as file:
+        for name, group in groups.items():
+            _write_group(file.create_group(name), group)
 
 
 def _write_group(into: Any, group: Group) -> None:

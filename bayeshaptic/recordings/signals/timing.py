@@ -13,6 +13,8 @@ from bayeshaptic.errors import InputError, Notice
 # at 10 % the error at a tenth of the Nyquist frequency is 3 % of the signal, more than any device
 # can be known to.
 MOST_JITTER = 0.1
+# Seconds; a later stamp is damage, even in nanoseconds since 1970, and its square is no number.
+_LATEST = 1e100
 # From here on the stamps' jitter is worth a warning.
 NOTABLE_JITTER = 0.005
 
@@ -86,7 +88,7 @@ def sampling_period(
 def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
     if len(time_s) < 3:
         raise InputError(f"{where}: {len(time_s)} time stamps; a period needs at least 3")
-    bad = np.flatnonzero(~np.isfinite(time_s))
+    bad = np.flatnonzero(~(np.abs(time_s) < _LATEST))
     if len(bad):
         raise InputError(f"{where}: the time in row {bad[0] + 1} is {time_s[bad[0]]}")
     slope, scatter = _clock(time_s)
@@ -148,7 +150,7 @@ def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None
         edges = np.concatenate([[0], gaps + 1, [len(time_s)]])
         longest = int(np.argmax(np.diff(edges)))
         raise InputError(
-            f"{where}: about {round(steps[first] / period) - 1} samples are missing after row "
+            f"{where}: about {steps[first] / period - 1:.0f} samples are missing after row "
             f"{first + 1} (a step of {steps[first]:.6g} s where the period is {period:.6g} s; "
             f"{len(gaps)} such places); the longest part without a gap is rows "
             f"{edges[longest] + 1} to {edges[longest + 1]}: read it alone with --rows "

@@ -1,0 +1,78 @@
+"""A file appears whole or not at all: written beside, flushed, and moved when complete."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_DRAFT = re.compile(
+    r"\.(?:report|part)-(?P<host>[\w-]*)-(?P<pid>\d+)-[0-9a-f]{12}(?:-.*)?", re.DOTALL
+)
+_END = 20  # of a name: long enough for its ending, by which some libraries know what to write
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A hidden file beside `path` to write, which takes that name at the end of the block.
+
+    Until then, and after an error, there is what was there before. What processes of this machine
+    left beside it when they died is removed.
+    """
+    remove_dead_drafts(path.absolute().parent)
+    partial = path.with_name(f".part-{owner()}-{path.name[-_END:]}")
+    try:
+        yield partial
+        flush(partial)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file; it is complete, or what was there before."""
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+
+
+def flush(path: Path) -> None:
+    """See to it that the content of a file is on the disk."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+def remove_dead_drafts(folder: Path) -> None:
+    """Remove what processes of this machine were writing in `folder` when they died."""
+    if not folder.is_dir():
+        return
+    for path in folder.iterdir():
+        match = _DRAFT.fullmatch(path.name)
+        if match and match["host"] == _host() and not _is_alive(int(match["pid"])):
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+
+
+def owner() -> str:
+    """A part of a draft's name, by which others know whether its process is alive."""
+    return f"{_host()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
+
+
+def _host() -> str:
+    return re.sub(r"[^\w]", "_", socket.gethostname())
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # somebody else's; on Windows, where a signal 0 is none, do not ask
+        return True
+    return True
