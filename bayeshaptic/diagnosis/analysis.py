@@ -184,6 +184,7 @@ def finish(
             seed=options.seed,
             progress=options.within(0.1, 0.8).report,
             most_evaluations=_MISFIT_EVALUATIONS if scale > 1 else _MOST_EVALUATIONS,
+            checkpoints=options.checkpoints,
             **({"rule": watch} if options.ess is None else {"ess": options.ess}),
         )
     with clock.stage("critical stiffness"):

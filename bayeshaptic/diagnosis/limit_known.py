@@ -59,6 +59,10 @@ class LimitKnown:
     limit: CriticalStiffness | None = field(default=None, init=False)
     _begun: Floats | None = field(default=None, init=False)
 
+    @property
+    def key(self) -> str:
+        return f"limit known {self.risks!r}"
+
     def __call__(self, chains: Floats) -> Verdict:
         found = diagnose(chains, EFFECTIVE)
         share = found.ess / EFFECTIVE

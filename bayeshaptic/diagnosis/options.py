@@ -62,6 +62,9 @@ class Options:
     budget_s : float
         What looking for what the model lacks may cost, in nominal seconds: evaluations are counted,
         so that the verdict is the same on every machine; by default 60.
+    checkpoints : path or None
+        Folder in which samplers that run for longer than some ten seconds keep their state, to go
+        on after an interruption; by default none, and the report's own in commands.
     progress : callable, bool or None
         Called with the share done, 0 to 1, and a word about it; True draws a bar.
     """
@@ -79,6 +82,7 @@ class Options:
     effects: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     budget_s: float = BUDGET_S
+    checkpoints: str | Path | None = field(default=None, compare=False)
     progress: Progress | bool | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:

@@ -50,6 +50,7 @@ def analyse_in_loop(begun: Begun, one_mass: bool, options: Options) -> Analysis 
         start=fit,
         seed=options.seed,
         progress=options.report,
+        checkpoints=options.checkpoints,
         **({"rule": watch} if options.ess is None else {"ess": options.ess}),
     )
     # What the response says is no part of this likelihood.

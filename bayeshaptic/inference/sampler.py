@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,31 +16,23 @@ from bayeshaptic.inference.fit import REACH_SDS, Fit, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
-from bayeshaptic.inference.sampling.ensembles import (
-    ENSEMBLES,
-    WALKERS,
-    Ensembles,
-    LogDensity,
-    refitted,
-    warmed_up,
-)
+from bayeshaptic.inference.sampling.ensembles import LogDensity, warmed_up
 from bayeshaptic.inference.sampling.importance import adapt
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
+from bayeshaptic.inference.sampling.run import Run, run_until_done
+from bayeshaptic.inference.saved.checkpoint import Arrays, Checkpoint, key_of
 from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
+from bayeshaptic.version import __version__
 
 DEFAULT_ESS = 2000
 MOST_EVALUATIONS = 1_500_000
-_FIRST_STEPS = 32
-_MARGIN = 1.1  # a forecast of the steps that are needed, and a little further
-_LEAST_GROWTH, _MOST_GROWTH = 1.3, 2.0
-_MIXED = 0.06  # effective draws a draw, an autocorrelation of 16 steps: below, a proposal is refit
-_REFITS = 4
+_PROBE = 0.01  # sampling coordinates, between points whose densities tell computations apart
 _POLISH, _SETTLED = 200, 1e-3  # steps of the fit, at most, and the gain that is none
 
 
@@ -66,6 +59,7 @@ def sample(
     progress: Progress | None = None,
     most_evaluations: int = MOST_EVALUATIONS,
     rule: Rule | None = None,
+    checkpoints: str | Path | None = None,
 ) -> Posterior:
     """Draw from the posterior of `model`'s parameters given `etfe`.
 
@@ -92,6 +86,9 @@ def sample(
     rule : callable, optional
         What to ask for instead of `ess`: judges chains of natural values, shape (ensembles, S,
         walkers, P), and returns a `bayeshaptic.inference.stopping.Verdict`.
+    checkpoints : path, optional
+        Folder in which a sampler that runs for longer than some ten seconds keeps its state: called
+        again after an interruption, it goes on, with the same draws to the last digit.
 
     Returns
     -------
@@ -117,25 +114,41 @@ def sample(
     fit = _converged(fit)
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     density = Density(fit.likelihood, here)
-    seeds = np.random.SeedSequence(seed)
-    tune, run, refit = seeds.spawn(3)
-    peak, proposal = laplace(density, start_of(here, fit))
-    report(0.1, "adapting the proposal")
+    origin = start_of(here, fit)
     counted = _Counted(density)
-    adapted = adapt(counted, proposal, np.random.default_rng(tune))
-    report(0.2, "warming up")
-    ensembles = warmed_up(counted, adapted, run, peak, redrawing(here, fit))
-    chains, found, verdict = _run(
-        ensembles,
+    redraw = redrawing(here, fit)
+    about = (seed, most_evaluations, getattr(asked, "key", None))
+    checkpoint = _checkpoint(checkpoints, density, origin, about)
+
+    def restore(arrays: Arrays) -> Run:
+        run = Run.from_arrays(arrays, counted, redraw)
+        counted.count = int(arrays["evaluations"])
+        return run
+
+    def keep(run: Run) -> None:
+        if checkpoint.due():
+            checkpoint.write({**run.to_arrays(), "evaluations": np.array(counted.count)})
+
+    run = checkpoint.read(restore)
+    if run is None:
+        tune, warm, refit = np.random.SeedSequence(seed).spawn(3)
+        peak, proposal = laplace(density, origin)
+        report(0.1, "adapting the proposal")
+        adapted = adapt(counted, proposal, np.random.default_rng(tune))
+        report(0.2, "warming up")
+        ensembles = warmed_up(counted, adapted, warm, peak, redraw)
+        run = Run(ensembles, np.random.default_rng(refit))
+    verdict = run_until_done(
+        run,
         lambda phi: asked(here.natural(phi)),
         lambda: most_evaluations - counted.count,
         report,
-        np.random.default_rng(refit),
+        keep,
     )
     return Posterior(
         fit.model,
-        here.natural(chains),
-        _log_likelihoods(density, chains, found),
+        here.natural(run.chains),
+        _log_likelihoods(density, run.chains, run.values),
         verdict.diagnostics,
         verdict.done,
         _message(verdict, counted.count),
@@ -159,41 +172,16 @@ def _converged(fit: Fit) -> Fit:
     return fit.at(here.natural(phi)[0])
 
 
-def _run(
-    ensembles: Ensembles,
-    rule: Rule,
-    left: Callable[[], int],
-    report: Progress,
-    rng: np.random.Generator,
-) -> tuple[Floats, Floats, Verdict]:
-    """Advance all ensembles until they are done, or no evaluations are `left`.
-
-    Where they mix badly, the proposal is fitted again to the draws at hand, and these are thrown
-    away: what is kept comes from one frozen proposal.  Where that does not help, only every so many
-    steps are kept: neighbours say the same.
-    """
-    kept: list[tuple[Floats, Floats]] = []
-    steps, more, every, refits = 0, _FIRST_STEPS, 1, 0
-    while True:
-        report(0.25 + 0.74 * steps / (steps + more), f"step {every * (steps + more)}")
-        kept.append(ensembles.advance(more, every))
-        chains, values = (np.concatenate(part, axis=1) for part in zip(*kept, strict=True))
-        verdict = rule(chains)
-        steps = chains.shape[1]
-        affordable = left() // (ENSEMBLES * WALKERS * every)
-        if verdict.done or affordable < _FIRST_STEPS:
-            return chains, values, verdict
-        slow = verdict.diagnostics.ess < _MIXED * values.size
-        if slow and refits < _REFITS and 2 * every * steps <= affordable * every:
-            ensembles = refitted(ensembles, chains, values, rng)
-            more, steps, every, refits = 2 * every * steps, 0, 1, refits + 1
-            kept.clear()
-            continue
-        if np.median(verdict.diagnostics.fewest) < _MIXED * values.size and steps > _FIRST_STEPS:
-            kept, steps, every = [(chains[:, 1::2], values[:, 1::2])], steps // 2, 2 * every
-        growth = _MARGIN / max(verdict.share, 1e-3)
-        growth = float(np.clip(growth, _LEAST_GROWTH, _MOST_GROWTH))
-        more = max(min(int((growth - 1) * steps), affordable), 1)
+def _checkpoint(
+    folder: str | Path | None, density: Density, start: Floats, about: tuple[Any, ...]
+) -> Checkpoint:
+    """Where a sampler keeps its state, by what it is asked for and the density around its start."""
+    if folder is None or None in about:
+        return Checkpoint(None, "")
+    places = start + np.concatenate([np.zeros((1, len(start))), _PROBE * np.eye(len(start))])
+    theta = density.coordinates.natural(places)
+    about = (__version__, np.__version__, density.likelihood.model.names, *about)
+    return Checkpoint(Path(folder), key_of(*about, theta, density(places)))
 
 
 def _log_likelihoods(density: Density, chains: Floats, values: Floats) -> Floats:

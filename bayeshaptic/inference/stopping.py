@@ -37,7 +37,11 @@ class Verdict:
 
 
 Rule = Callable[[Floats], Verdict]
-"""Judges chains of natural values, shape (ensembles, S, walkers, P)."""
+"""Judges chains of natural values, shape (ensembles, S, walkers, P).
+
+One with an attribute `key`, a text that says everything that it asks for, may be interrupted and
+gone on with.
+"""
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,10 @@ class EveryParameter:
 
     model: Model
     ess: float
+
+    @property
+    def key(self) -> str:
+        return f"every parameter {self.ess!r}"
 
     def __call__(self, chains: Floats) -> Verdict:
         found = diagnose(chains, self.ess)

@@ -59,7 +59,7 @@ class Settings(Options):
     def facts(self) -> dict[str, Any]:
         """All of it as plain JSON types, for manifests and reports."""
         found = {each.name: getattr(self, each.name) for each in fields(self)}
-        del found["progress"]
+        del found["progress"], found["checkpoints"]
         found["prior"] = {name: repr(prior) for name, prior in self.prior.items()}
         if isinstance(self.device, Device):
             found["device"] = asdict(self.device)
@@ -76,6 +76,11 @@ class Job:
     folder: Path
     settings: Settings
     command: str | None = None
+
+
+def checkpoints_of(folder: Path) -> Path:
+    """Where the samplers of a report in `folder` keep their state until it is written."""
+    return folder / ".checkpoints"
 
 
 def refuse_file(folder: Path) -> None:

@@ -12,7 +12,8 @@ from bayeshaptic.devices import Device, load_device
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.jobs.job import Job
+from bayeshaptic.inference.saved.checkpoint import kept_until_done
+from bayeshaptic.jobs.job import Job, checkpoints_of
 from bayeshaptic.recordings.read import read_measurement, recording_name
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -59,11 +60,12 @@ def _report(
     settings = job.settings
     began = time.perf_counter()
     run = close_loop if settings.close_loop else analyse
-    options = replace(settings, device=device, progress=progress)
-    result = run(measurement, settings.model, options)
-    seconds = {"read": seconds_of_reading, "analyse": time.perf_counter() - began}
-    origin = provenance(job.command, settings.facts(), settings.seed, job.source, seconds)
-    return reported(recording_name(job.source), result, job.folder, origin)
+    with kept_until_done(checkpoints_of(job.folder)) as kept:
+        options = replace(settings, device=device, progress=progress, checkpoints=kept)
+        result = run(measurement, settings.model, options)
+        seconds = {"read": seconds_of_reading, "analyse": time.perf_counter() - began}
+        origin = provenance(job.command, settings.facts(), settings.seed, job.source, seconds)
+        return reported(recording_name(job.source), result, job.folder, origin)
 
 
 def reported(

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
-from bayeshaptic.jobs.job import Job, refuse_file
+from bayeshaptic.jobs.job import Job, checkpoints_of, refuse_file
 from bayeshaptic.jobs.recording import reported
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study
@@ -132,15 +133,17 @@ def analyse_and_report(
     """
     folder = folders[task.number]
     began = time.perf_counter()
-    result = analyse(task, part)
-    origin = provenance(
-        job.command,
-        job.settings.facts(),
-        job.settings.seed,
-        task.entry.path,
-        {"analyse": time.perf_counter() - began},
-    )
-    return result, reported(folder.name, result, folder, origin)
+    with kept_until_done(checkpoints_of(folder)) as kept:
+        task = replace(task, options=replace(task.options, checkpoints=kept))
+        result = analyse(task, part)
+        origin = provenance(
+            job.command,
+            job.settings.facts(),
+            job.settings.seed,
+            task.entry.path,
+            {"analyse": time.perf_counter() - began},
+        )
+        return result, reported(folder.name, result, folder, origin)
 
 
 def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:

@@ -1,0 +1,189 @@
+"""From warm ensembles to chains that are enough."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.inference.sampling.ensembles import (
+    ENSEMBLES,
+    WALKERS,
+    Ensembles,
+    LogDensity,
+    Proposal,
+    refitted,
+)
+from bayeshaptic.inference.sampling.near_zero import Redraw
+from bayeshaptic.inference.stopping import Rule, Verdict
+from bayeshaptic.numerics.mixture import StudentMixture
+from bayeshaptic.numerics.straightening import Straightening
+from bayeshaptic.types import Floats, Progress
+
+_FIRST_STEPS = 32
+_MARGIN = 1.1  # a forecast of the steps that are needed, and a little further
+_LEAST_GROWTH, _MOST_GROWTH = 1.3, 2.0
+_MIXED = 0.06  # effective draws a draw, an autocorrelation of 16 steps: below, a proposal is refit
+_REFITS = 4
+
+
+@dataclass
+class Run:
+    """Chains so far, and everything that decides how they go on.
+
+    Attributes
+    ----------
+    ensembles : Ensembles
+    rng : Generator
+        Of refitted proposals.
+    chains : ndarray, shape (ensembles, steps, walkers, P)
+        Kept steps, in sampling coordinates.
+    values : ndarray, shape (ensembles, steps, walkers)
+        Log densities there.
+    more : int
+        Steps that are to be kept next.
+    every : int
+        Steps of which one is kept.
+    refits : int
+    """
+
+    ensembles: Ensembles
+    rng: np.random.Generator
+    chains: Floats = field(default_factory=lambda: np.empty(0))
+    values: Floats = field(default_factory=lambda: np.empty(0))
+    more: int = _FIRST_STEPS
+    every: int = 1
+    refits: int = 0
+
+    @property
+    def steps(self) -> int:
+        """Kept so far."""
+        return self.values.shape[1] if self.values.size else 0
+
+    def advance(self) -> None:
+        """Go on for as many steps as were found to be needed."""
+        found = self.ensembles.advance(self.more, self.every)
+        before = [(self.chains, self.values)] if self.steps else []
+        self.chains, self.values = (
+            np.concatenate(part, axis=1) for part in zip(*before, found, strict=True)
+        )
+
+    def go_on(self, verdict: Verdict, affordable: int) -> None:
+        """Decide how, where the `verdict` is that the chains are not enough.
+
+        Where they mix badly, the proposal is fitted again to the draws at hand, and these are
+        thrown away: what is kept comes from one frozen proposal.  Where that does not help, only
+        every so many steps are kept: neighbours say the same.
+
+        Parameters
+        ----------
+        verdict : Verdict
+        affordable : int
+            Steps to be kept for which there are evaluations left.
+        """
+        steps, every, few = self.steps, self.every, _MIXED * self.values.size
+        slow = verdict.diagnostics.ess < few
+        if slow and self.refits < _REFITS and 2 * every * steps <= affordable * every:
+            self.ensembles = refitted(self.ensembles, self.chains, self.values, self.rng)
+            self.chains, self.values = np.empty(0), np.empty(0)
+            self.more, self.every, self.refits = 2 * every * steps, 1, self.refits + 1
+            return
+        if np.median(verdict.diagnostics.fewest) < few and steps > _FIRST_STEPS:
+            self.chains, self.values = self.chains[:, 1::2], self.values[:, 1::2]
+            self.every = 2 * every
+        growth = _MARGIN / max(verdict.share, 1e-3)
+        growth = float(np.clip(growth, _LEAST_GROWTH, _MOST_GROWTH))
+        self.more = max(min(int((growth - 1) * self.steps), affordable), 1)
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """All of it but the density, for a checkpoint."""
+        proposal = self.ensembles.proposal
+        numbers = {
+            "share": self.ensembles.share,
+            "freedom": proposal.mixture.freedom,
+            **{name: getattr(self, name) for name in ("more", "every", "refits")},
+            "rng": self.rng.bit_generator.state,
+        }
+        kind, words, *others = self.ensembles.state
+        numbers["state"] = [kind, np.asarray(words).tolist(), *others]
+        straight = {f.name: getattr(proposal.straightening, f.name) for f in fields(Straightening)}
+        return {
+            **straight,
+            **{name: getattr(proposal.mixture, name) for name in ("weights", "means", "roots")},
+            "archive": proposal.archive,
+            "positions": self.ensembles.positions,
+            "chains": self.chains,
+            "values": self.values,
+            "numbers": np.array(json.dumps(numbers)),
+        }
+
+    @classmethod
+    def from_arrays(
+        cls, arrays: Mapping[str, NDArray[Any]], density: LogDensity, redraw: Redraw | None
+    ) -> Run:
+        """What `to_arrays` kept, of the same `density` and `redraw`."""
+        numbers = json.loads(str(arrays["numbers"]))
+        mixture = StudentMixture(
+            arrays["weights"], arrays["means"], arrays["roots"], numbers["freedom"]
+        )
+        straightening = Straightening(**{f.name: arrays[f.name] for f in fields(Straightening)})
+        kind, words, *others = numbers["state"]
+        rng = np.random.default_rng()
+        rng.bit_generator.state = numbers["rng"]
+        return cls(
+            Ensembles(
+                density,
+                Proposal(straightening, mixture, arrays["archive"]),
+                numbers["share"],
+                arrays["positions"],
+                (kind, np.array(words, dtype=np.uint32), *others),
+                redraw,
+            ),
+            rng,
+            arrays["chains"],
+            arrays["values"],
+            *(numbers[name] for name in ("more", "every", "refits")),
+        )
+
+
+def run_until_done(
+    run: Run,
+    rule: Rule,
+    left: Callable[[], int],
+    report: Progress,
+    keep: Callable[[Run], None],
+) -> Verdict:
+    """Advance all ensembles until they are done, or no evaluations are `left`.
+
+    Parameters
+    ----------
+    run : Run
+        One with chains is looked at first.
+    rule : callable
+        Judges chains in sampling coordinates.
+    left : callable
+        Evaluations that may still be spent.
+    report : callable
+    keep : callable
+        Called with the run before its chains are looked at.
+    """
+
+    def advance() -> None:
+        steps = run.steps + run.more
+        report(0.25 + 0.74 * run.steps / steps, f"step {run.every * steps}")
+        run.advance()
+        keep(run)
+
+    if not run.steps:
+        advance()
+    while True:
+        verdict = rule(run.chains)
+        affordable = left() // (ENSEMBLES * WALKERS * run.every)
+        if verdict.done or affordable < _FIRST_STEPS:
+            return verdict
+        run.go_on(verdict, affordable)
+        advance()
