@@ -1,1 +1,1 @@
-"""Posteriors in files: groups as ArviZ has them, in netCDF."""
+"""Posteriors in files, groups as ArviZ has them in netCDF; and states of samplers."""
