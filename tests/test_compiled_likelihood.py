@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_response import plain_response
 
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform
 from bayeshaptic.models.build import build_model
 from bayeshaptic.models.joint_prior import joint_prior
 from bayeshaptic.models.prior import Prior
-from bayeshaptic.models.response.rational_plain import plain_response
 from bayeshaptic.models.response.transfer import transfer
 from bayeshaptic.recordings.response.windows import Windows
 

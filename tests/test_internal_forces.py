@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plain_stepping import step_through
 
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, forced_motion, steps
-from bayeshaptic.effects.nonlinear.stepping import step_through
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays

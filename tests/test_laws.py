@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from plain_stepping import step_through
 
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
@@ -15,7 +16,6 @@ from bayeshaptic.effects.library import effect_class, effects
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place, forced_motion, steps
 from bayeshaptic.effects.nonlinear.protocol import Motion, NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
-from bayeshaptic.effects.nonlinear.stepping import step_through
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.types import Floats

@@ -149,8 +149,8 @@ class Trial:
 
     @property
     def score(self) -> float:
-        """What candidates are ranked by: held-out gain less two a parameter."""
-        return self.gain_choose - 2.0 * self.size
+        """What candidates are ranked by: held-out gain less what a parameter must bring."""
+        return self.gain_choose - thresholds.A_PARAMETER * self.size
 
     @property
     def convincing(self) -> bool:

@@ -116,7 +116,7 @@ def forced_motion(
 def steps(
     mechanism: Mechanism, place: Place, step_s: float
 ) -> tuple[Floats, Floats, float, Floats]:
-    """Exact steps, as `stepping.step_through` takes them: matrix, drive, gain, reading."""
+    """Exact steps, as `stepping_kernel.step_through` takes them: matrix, drive, gain, reading."""
     a = mechanism.state_matrix()[0]
     size, n = len(a), len(mechanism.masses)
     push = np.zeros(size)

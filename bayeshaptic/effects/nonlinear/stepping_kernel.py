@@ -1,4 +1,7 @@
-"""The compiled form of `stepping.step_through`."""
+"""Steps of a linear mechanism with a force that its motion makes, compiled.
+
+`tests/plain_stepping.py` is the same in plain NumPy.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,32 @@ def step_through(
     law: Callable[..., float],
     constants: Floats,
 ) -> Floats:
-    """As the plain form; `law` is a compiled callback."""
+    """What a force adds to the motor's position at the samples, from rest.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (S + 3, S)
+        One step of the S states without the force; then what it adds to position and velocity in
+        the middle of the step, and to the velocity at its end.
+    drive : ndarray, shape (S,)
+        What a unit force held over the step adds to the states.
+    gain : float
+        What it adds to the velocity.
+    reading : ndarray, shape (S,)
+        The motor's position in the states.
+    position, velocity : ndarray, shape (N * substeps,)
+        Motion at the force's place without the force.
+    step_s : float
+    substeps : int
+    law : callable
+        The force of a step, as `Law.force`: a compiled callback.
+    constants : ndarray
+        Of the law: its strength and shape.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+    """
     rows, states = matrix.shape
     motor = np.empty(len(position) // substeps)
     z, ahead = np.zeros(states), np.empty(rows)
