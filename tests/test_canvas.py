@@ -7,10 +7,12 @@ import re
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.axes import Plain
 from bayeshaptic.report.figures.canvas import draw_both
 
 
@@ -49,3 +51,24 @@ def test_both_formats_are_those_of_matplotlib() -> None:
     # Texts are measured and images placed in whole pixels here, in points there.
     assert ours == pytest.approx(theirs, abs=1.01 * 72 / style.DPI)
     assert svg.count("<image") == other.getvalue().count("<image") == 2
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_axes_of_few_strokes_look_like_those_of_matplotlib(scale: str) -> None:
+    def picture(kind: type[Axes]) -> np.ndarray:
+        figure = style.new_figure(4.0)
+        top, bottom = figure.subplots(2, 1, subplot_kw={"axes_class": kind})
+        style.panel(top, "x, ms", "y")
+        top.plot([1e3, 3e5], [1.0, 2e-7])
+        top.set_yscale(scale)
+        style.panel(bottom, "z")
+        bottom.secondary_xaxis("top")
+        bottom.set_xticks([0, 1], ["one", "two"], rotation=90)
+        bottom.set_yticks([0, 1, 2], ["first", "second\nline", "beyond the end"])
+        bottom.set_ylim(1.5, -0.5)
+        figure.align_ylabels([top, bottom])
+        return draw_both(figure)[0].astype(int)
+
+    off = np.abs(picture(Axes) - picture(Plain)).max(axis=2)
+    # Grid lines are one stroke, clipped where two translucent edges lay on each other.
+    assert np.mean(off > 0) < 0.001

@@ -290,7 +290,7 @@ def test_the_strongest_pairs_are_shown() -> None:
 
 @pytest.fixture
 def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
-    """Every text that matplotlib draws, as it is drawn."""
+    """Place and words of every text that matplotlib draws, as it is drawn."""
     from matplotlib.text import Text
 
     drawn: list[Any] = []
@@ -298,7 +298,7 @@ def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
 
     def draw(self: Any, renderer: Any, *rest: Any, **named: Any) -> Any:
         if self.get_visible() and self.get_text().strip():
-            drawn.append(self)
+            drawn.append((self.get_window_extent(), self.get_text()))
         return original(self, renderer, *rest, **named)
 
     monkeypatch.setattr(Text, "draw", draw)
@@ -314,7 +314,7 @@ def test_no_text_of_a_figure_covers_another_or_is_cut_off(
         figure = picture.draw(analysis)
         drawn_texts.clear()
         figure.canvas.draw()
-        boxes = [(text.get_window_extent(), text.get_text()) for text in drawn_texts]
+        boxes = list(drawn_texts)
         assert len(boxes) > 10, picture.name
         canvas = figure.bbox
         for index, (box, text) in enumerate(boxes):

@@ -57,21 +57,13 @@ def draw_on(axes: Axes, result: Result) -> None:
             linewidth=3.0 if ours else 1.2,
             capsize=3,
         )
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.set_yticks(range(len(rows)), [_NAMES.get(w.key, w.label) for w in rows])
+    names = [_NAMES.get(w.key, w.label) for w in rows]
+    style.rows(axes, names, [_number(witness, unit) for witness in rows])
     low, high = axes.get_xlim()
     if high - low < _NARROWEST_DB:
         centre = 0.5 * (low + high)
         axes.set_xlim(centre - _NARROWEST_DB / 2, centre + _NARROWEST_DB / 2)
     axes.ticklabel_format(axis="x", useOffset=False)
-    _numbers(axes, rows, unit)
-
-
-def _numbers(axes: Axes, rows: tuple[Witness, ...], unit: str) -> None:
-    right = axes.secondary_yaxis("right")
-    right.set_yticks(range(len(rows)), [_number(witness, unit) for witness in rows])
-    right.tick_params(labelsize=style.FONT - 0.5, length=0)
-    right.spines["right"].set_visible(False)
 
 
 def _number(witness: Witness, unit: str) -> str:

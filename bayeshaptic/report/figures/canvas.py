@@ -8,13 +8,15 @@ renderers.
 from __future__ import annotations
 
 import io
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from matplotlib.backend_bases import GraphicsContextBase, RendererBase
+from matplotlib.backend_bases import FigureCanvasBase, GraphicsContextBase, RendererBase
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.backends.backend_svg import RendererSVG
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.transforms import Affine2D, Bbox, TransformedPath
 
 from bayeshaptic.types import Bytes
@@ -32,8 +34,23 @@ def draw_both(figure: Figure) -> tuple[Bytes, str]:
         A whole SVG file.
     """
     both = _Both(figure)
+    _Canvas(figure, both)
     figure.draw(both)
     return both.finish()
+
+
+class _Canvas(FigureCanvasBase):
+    """Lets the layout measure texts where they will be drawn: once."""
+
+    def __init__(self, figure: Figure, both: _Both) -> None:
+        super().__init__(figure)
+        self.get_renderer = lambda: both
+
+
+@lru_cache(8192)
+def _measured(text: str, font: FontProperties, ismath: Any, dpi: float) -> Any:
+    """Width, height and descent of a text in pixels: figures have most of their texts in common."""
+    return RendererAgg(1, 1, dpi).get_text_width_height_descent(text, font, ismath)
 
 
 class _Both(RendererBase):
@@ -177,7 +194,7 @@ class _Both(RendererBase):
         self._vector.close_group(s)
 
     def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> Any:
-        return self._pixels.get_text_width_height_descent(s, prop, ismath)
+        return _measured(s, prop.copy(), ismath, self.dpi)
 
     def get_canvas_width_height(self) -> tuple[float, float]:
         return self._size

@@ -64,7 +64,7 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
         axes.axvspan(etfe.frequency_hz[-1], half * 1.02, color="#f0f0f0", zorder=0, linewidth=0)
         if start < low_hz:
             axes.axvspan(start, low_hz, color="#f0f0f0", zorder=0, linewidth=0)
-    top.set_yscale("log")
+    style.log_scale(top.yaxis)
     top.set_ylim(*_stiffness_range(etfe, [k for _, k in found], row))
     bottom.set_yscale("symlog", linthresh=LINEAR_DEG, linscale=1.2)
     _phase_ticks(bottom)

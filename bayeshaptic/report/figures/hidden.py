@@ -30,12 +30,7 @@ def draw(hidden: Hidden) -> Figure:
         low, middle, high = effect.shift_db
         axes.plot([low, high], [place, place], color=style.OTHER, linewidth=3.0, alpha=0.8)
         axes.plot([middle], [place], "o", color=style.OTHER, markersize=4.5)
-    axes.set_yticks(range(len(shown)), [effect.title for effect in shown])
-    axes.set_ylim(max(len(shown), 1) - 0.4, -0.6)
-    right = axes.secondary_yaxis("right")
-    right.set_yticks(range(len(shown)), [_label(effect) for effect in shown])
-    right.tick_params(labelsize=style.FONT - 0.5, length=0)
-    right.spines["right"].set_visible(False)
+    style.rows(axes, [effect.title for effect in shown], [_label(effect) for effect in shown])
     return figure
 
 

@@ -79,7 +79,7 @@ def _spectrum(
     density = np.sqrt(power[kept]) * size.factor
     style.panel(axes, y=f"{size.unit}/√Hz")
     axes.plot(frequency[kept], np.maximum(density, 1e-300), color=colour, linewidth=0.8)
-    axes.set_yscale("log")
+    style.log_scale(axes.yaxis)
     axes.minorticks_off()
     style.frequency_axis(axes, float(frequency[kept[0]]), float(frequency[-1]))
 

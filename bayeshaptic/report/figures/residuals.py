@@ -101,13 +101,8 @@ def noise_band(axes: Axes, bands: BandResidual) -> None:
 
 def rms_axis(axes: Axes, lowest: float, highest: float) -> None:
     """From zero; logarithmic where the residual is many times the noise."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     if highest <= 6:
         axes.set_ylim(0, 1.1 * highest)
         return
-    axes.set_yscale("log")
+    style.log_scale(axes.yaxis, (1, 2, 5))
     axes.set_ylim(0.9 * lowest, 1.3 * highest)
-    axes.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-    axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
-    axes.yaxis.set_minor_formatter(NullFormatter())

@@ -102,7 +102,7 @@ def _rhat(axes: Axes, posterior: Any) -> None:
     place = np.arange(len(posterior.rhat))
     axes.plot(place, np.maximum(posterior.rhat - 1, 1e-5), "o", color=style.MODEL, markersize=4)
     axes.axhline(0.01, color=style.OTHER, linestyle="--", linewidth=0.9, label="0.01")
-    axes.set_yscale("log")
+    style.log_scale(axes.yaxis)
     axes.set_ylim(5e-6, max(0.1, 3 * float(posterior.rhat.max() - 1)))
     style.legend(axes, loc="upper right")
     _names(axes, posterior)

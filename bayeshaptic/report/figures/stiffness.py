@@ -59,12 +59,7 @@ def _histogram(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...]) -> Non
     axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
     _lines(axes, analysis, rows, row)
     if logarithmic:
-        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-        axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-        axes.xaxis.set_major_formatter(FuncFormatter(style.plain))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        style.log_scale(axes.xaxis, (1, 2, 5))
     axes.set_xlabel(f"critical stiffness, {row.unit}", fontsize=style.FONT)
     _decibel_axis(axes, row, limit.unit)
     style.legend(axes, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4)

@@ -20,6 +20,7 @@ from bayeshaptic.types import Bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import XAxis, YAxis
     from matplotlib.figure import Figure
 
 DATA = "#1a1a1a"
@@ -43,9 +44,10 @@ _BASE64 = 4 / 3  # characters a byte of a picture in a page
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
     """An empty figure with constrained layout, outside of pyplot."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained", facecolor="white")
+    from bayeshaptic.report.figures.axes import Page
+
+    figure = Page(figsize=(width_in, height_in), dpi=DPI, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
@@ -91,6 +93,36 @@ def legend(axes: Axes, **options: Any) -> None:
     axes.legend(**settings)
 
 
+def rows(axes: Axes, names: Sequence[str], right: Sequence[str] = ()) -> None:
+    """A row a name, the first one on top; `right` stands beside the rows' other end."""
+    from matplotlib.ticker import FixedFormatter, FixedLocator
+
+    axes.yaxis.set_major_locator(FixedLocator(range(len(names))))
+    axes.yaxis.set_major_formatter(FixedFormatter(names))
+    axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
+    for place, text in enumerate(right):
+        axes.annotate(
+            text,
+            (1.0, place),
+            (3.5, 0.0),
+            xycoords=axes.get_yaxis_transform(),
+            textcoords="offset points",
+            va="center_baseline",
+            fontsize=FONT - 0.5,
+            annotation_clip=False,
+        )
+
+
+def log_scale(axis: XAxis | YAxis, subs: Sequence[int] = (1,)) -> None:
+    """A logarithmic axis with plain numbers at `subs` times the powers of ten."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.set_major_locator(LogLocator(10, subs=subs))
+    axis.set_major_formatter(FuncFormatter(plain))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def frequency_axis(axes: Axes, low_hz: float, high_hz: float, label: str = "") -> None:
     """A logarithmic frequency axis with plain numbers (1, 10, 100) on it."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
@@ -130,9 +162,18 @@ def _minor_marks(axes: Axes, low: float, high: float) -> None:
     line.set_in_layout(False)
 
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def plain(value: float, _: object = None) -> str:
-    """A tick's number without powers of ten, with a proper minus."""
-    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
+    """A tick's number with a proper minus; powers of ten are written 10³ from 10⁵ on."""
+    text = f"{value:g}"
+    if value and not 1e-3 < abs(value) < 1e5:
+        digits, _e, power = f"{value:e}".partition("e")
+        factor = f"{float(digits):g}"
+        raised = f"10{str(int(power)).translate(_RAISED)}"
+        text = raised if factor == "1" else f"{factor}·{raised}"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def short(name: str) -> str:
@@ -183,7 +224,7 @@ def png(pixels: Bytes) -> bytes:
     from PIL import Image
 
     buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, format="png", dpi=(DPI, DPI))
+    Image.fromarray(pixels).save(buffer, format="png", dpi=(DPI, DPI), compress_level=1)
     return buffer.getvalue()
 
 

@@ -71,8 +71,7 @@ def _shares(axes: Axes, shares: VarianceShares) -> None:
         axes.text(
             100 * share + 1.5, place, f"{100 * share:.0f}", va="center", fontsize=style.SMALL + 0.5
         )
-    axes.set_yticks(range(len(rows)), [name for name, _ in rows])
-    axes.set_ylim(len(rows) - 0.4, -0.6)
+    style.rows(axes, [name for name, _ in rows])
     axes.set_xlim(0, max([100 * share for _, share in rows], default=0.0) * 1.15 + 5)
 
 
@@ -106,5 +105,4 @@ def _elasticities(axes: Axes, found: list[Elasticities], names: list[str]) -> No
         )
         reach = np.abs(np.array(ends).reshape(-1, 2).T - values)
         axes.errorbar(values, places, xerr=reach, fmt="none", color=style.DATA, linewidth=0.9)
-    axes.set_yticks(range(len(names)), [style.short(name) for name in names])
-    axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
+    style.rows(axes, [style.short(name) for name in names])

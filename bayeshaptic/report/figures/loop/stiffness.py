@@ -82,23 +82,13 @@ def draw_on(axes: Axes, closed: Closed) -> None:
             linewidth=2.0 if row.look != style.DATA else 1.1,
             capsize=3,
         )
-    _number_axis(axes, shown, unit)
-    axes.set_yticks(range(len(shown)), [row.label for row in shown])
+    numbers = [estimate(row.middle, row.low, row.high, unit) for row in shown]
+    style.rows(axes, [row.label for row in shown], numbers)
     low, high = axes.get_xlim()
     if high - low < _NARROWEST_DB:
         centre = 0.5 * (low + high)
         axes.set_xlim(centre - _NARROWEST_DB / 2, centre + _NARROWEST_DB / 2)
     axes.ticklabel_format(axis="x", useOffset=False)
-
-
-def _number_axis(axes: Axes, shown: tuple[Row, ...], unit: str) -> None:
-    """The same intervals as numbers, where nothing can cover them."""
-    axes.set_ylim(len(shown) - 0.4, -0.6)
-    right = axes.secondary_yaxis("right")
-    text = [estimate(row.middle, row.low, row.high, unit) for row in shown]
-    right.set_yticks(range(len(shown)), text)
-    right.tick_params(labelsize=style.FONT - 0.5, length=0)
-    right.spines["right"].set_visible(False)
 
 
 def _model(label: str, analysis: Analysis, colour: str) -> list[Row]:

@@ -21,8 +21,6 @@ def _first(closed: Closed) -> str:
 
 def draw(closed: Closed) -> Figure:
     """A row a test: its statistic over its threshold, on a logarithmic axis."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     before = closed.traced.before
     after = {test.name: test for test in closed.traced.after} if closed.effects else {}
     figure = style.new_figure(0.9 + 0.2 * len(before))
@@ -45,12 +43,8 @@ def draw(closed: Closed) -> Figure:
     axes.plot([], [], "s", color=style.OTHER, markerfacecolor="white", label=_first(closed))
     if after:
         axes.plot([], [], "o", color=style.MODEL, label="after, with what was added")
-    axes.set_xscale("log")
+    style.log_scale(axes.xaxis, (1, 2, 5))
     axes.set_xlim(0.9 * _LEAST, high)
-    axes.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter(FuncFormatter(style.plain))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_yticks(range(len(before)), [question(test) for test in before])
-    axes.set_ylim(len(before) - 0.4, -0.6)
+    style.rows(axes, [question(test) for test in before])
     style.legend(axes, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)
     return figure

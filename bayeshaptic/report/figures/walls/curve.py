@@ -95,7 +95,7 @@ def _steps(samples: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 
 def _reach(left: Axes, right: Axes, curves: list[NDArray[Any]], factor: float) -> None:
     """From where the first curve leaves the risk of 0.05 % to where the last one has ended."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+    from matplotlib.ticker import MaxNLocator
 
     ends = np.array([np.quantile(_finite(samples), (0.0005, 0.5, 0.9995)) for samples in curves])
     low, high = ends[:, 0].min() * factor, ends[0, 2] * factor
@@ -105,10 +105,7 @@ def _reach(left: Axes, right: Axes, curves: list[NDArray[Any]], factor: float) -
     right.set_xlim(max(low - margin, 0.0), max(ends[0, 1] * factor, low) + margin)
     high = ends[:, 2].max() * factor
     if low > 0 and high > LOG_BEYOND * low:
-        left.set_xscale("log")
-        left.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-        left.xaxis.set_major_formatter(FuncFormatter(style.plain))
-        left.xaxis.set_minor_formatter(NullFormatter())
+        style.log_scale(left.xaxis, (1, 2, 5))
         left.set_xlim(low / 1.1, high * 1.1)
     else:
         left.set_xlim(max(low - margin, 0.0), high + margin)
