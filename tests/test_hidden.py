@@ -91,9 +91,10 @@ def test_where_no_draw_is_possible_there_is_no_density(rigid: Posterior) -> None
 
 
 def weighed(name: str, evidence: float, changes: np.ndarray, factor: float = 0.0) -> Weighed:
-    about = name, name, "linear", "", "", "number", 1.0
+    about = name, name, "linear", "", "", "", "", "", 1.0
     rows = np.repeat(changes[None], KEPT // PAIRED, axis=0)
-    return Weighed(*about, evidence, 0.0, np.ones(KEPT), np.full(KEPT, factor), rows)
+    draws = np.ones(KEPT), np.full(KEPT, factor), rows, np.ones(KEPT), np.zeros((KEPT, 0))
+    return Weighed(*about, evidence, 0.0, *draws)
 
 
 def test_the_average_of_effects_that_share_nothing_is_bayes_rule_for_each(rigid: Posterior) -> None:

@@ -48,6 +48,8 @@ class LinearEffect(ABC):
     """The measurement that would separate the ties, in words."""
     several: ClassVar[bool] = False
     """Whether a device may have more than one of it."""
+    belongs_to: ClassVar[str] = "device"
+    """Where it is the same one: "device", "configuration", or "" for that of one hand alone."""
 
     @classmethod
     @abstractmethod

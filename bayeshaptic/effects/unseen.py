@@ -30,6 +30,8 @@ class Unseen:
         Probability of each shape.
     lowest : float
         Least strength, below zero where it may have either sign.
+    unit_size : float
+        What a strength of one is, in a unit that all recordings of a device share.
     """
 
     dimension: str
@@ -39,6 +41,7 @@ class Unseen:
     shapes: Floats = field(default_factory=lambda: np.zeros((1, 0)), repr=False)
     weight: Floats = field(default_factory=lambda: np.ones(1), repr=False)
     lowest: float = 0.0
+    unit_size: float = 1.0
 
 
 def alone(strength: Floats, shapes: Floats) -> Floats:

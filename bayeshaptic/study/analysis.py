@@ -12,6 +12,7 @@ from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.begun import device_of
 from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.hidden.several import Together
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, describe
@@ -25,6 +26,7 @@ from bayeshaptic.stability.cases import Case, DeviceLimit
 from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.cases import StudyCases, study_cases
 from bayeshaptic.study.configuration_limits import ConfigurationLimits
+from bayeshaptic.study.hidden import known_together
 from bayeshaptic.types import Progress
 
 Executor = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
@@ -60,6 +62,9 @@ class StudyAnalysis(Shown):
     notices : tuple of Notice
     seconds : mapping
         Stage to the time it took.
+    hidden : tuple of Together
+        What could hide in the device, by each recording and by all of them; empty where nobody
+        asked, and where one recording alone knows of it.
     """
 
     study: Study
@@ -73,6 +78,7 @@ class StudyAnalysis(Shown):
     limit: DeviceLimit | None
     notices: tuple[Notice, ...]
     seconds: Mapping[str, float]
+    hidden: tuple[Together, ...] = ()
 
     @property
     def name(self) -> str:
@@ -188,6 +194,8 @@ def analyse_study(
     began = time.perf_counter()
     recordings = _analysed(tasks, report, executor)
     seconds = {"recordings": time.perf_counter() - began}
+    known = known_together(recordings, chosen.seed)
+    recordings = known.recordings
     whole = study_cases(
         recordings,
         chosen.seed,
@@ -198,8 +206,9 @@ def analyse_study(
         study,
         device,
         recordings,
-        notices=study.notices + _failures(recordings) + whole.notices,
+        notices=study.notices + _failures(recordings) + known.notices + whole.notices,
         seconds=seconds | dict(whole.seconds),
+        hidden=known.effects,
         **_parts(whole),
     )
 

@@ -7,11 +7,12 @@ first order; three are left out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayeshaptic.diagnosis.hidden.evidence import Evidence, sum_of
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.regression import Around
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, systematic
@@ -38,6 +39,28 @@ class Looked:
     meeting: Floats = field(repr=False)
     gain: Floats = field(repr=False)
 
+    def with_more(self, told: Mapping[int, Sequence[Evidence]], rng: np.random.Generator) -> Looked:
+        """With what other recordings say of the sizes of some effects: by their number here.
+
+        Draws are drawn again by it; those of which two effects share something stay among these.
+        """
+        weighed, meeting = list(self.weighed), self.meeting.copy()
+        for number, others in told.items():
+            one = self.weighed[number]
+            log = sum_of(others, one.size, one.shape)
+            weight = np.exp(log - log.max())
+            rows = rng.permutation(systematic(weight[::PAIRED], len(weight[::PAIRED]), rng))
+            kept = rng.permutation(systematic(weight, KEPT, rng))
+            kept[::PAIRED] = PAIRED * rows
+            weighed[number] = one.with_more(others, kept)
+            meeting[number] = meeting[number][:, rows]
+            meeting[:, number] = meeting[:, number][:, :, rows]
+        return Looked(tuple(weighed), meeting, _gain(meeting))
+
+
+def _gain(meeting: Floats) -> Floats:
+    return np.log(np.exp(meeting).mean(axis=(2, 3)))
+
 
 def looked_at(weighed: Sequence[Weighed], known: Around) -> Looked:
     """What each two effects share, to first order in both."""
@@ -45,7 +68,7 @@ def looked_at(weighed: Sequence[Weighed], known: Around) -> Looked:
     count, draws = len(weighed), len(weighed[0].changes)
     shared = known.overlap(every, every).reshape(count, draws, count, draws)
     meeting = np.minimum(-shared.transpose(0, 2, 1, 3), _MOST_GAIN)
-    return Looked(tuple(weighed), meeting, np.log(np.exp(meeting).mean(axis=(2, 3))))
+    return Looked(tuple(weighed), meeting, _gain(meeting))
 
 
 @dataclass(frozen=True)

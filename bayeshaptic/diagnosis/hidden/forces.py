@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
@@ -109,6 +110,7 @@ def force_suspects(
             assert force is not None
             if not (force.sd > 0 and force.rms > 0):
                 continue
+            power = _power_of(shape)
             both = kind.signed or shape.over == COMMAND  # it may as well be the other way round
             suspects.append(
                 Suspect(
@@ -128,11 +130,22 @@ def force_suspects(
                     ForceSaid(force.strength, force.sd),
                     counts=False,
                     share=1 / len(pulls),
+                    place=shape.name,
+                    shared="device" if np.isfinite(power) else "",
+                    unit_size=force.rms**-power if np.isfinite(power) else 1.0,
                 )
             )
     return tuple(suspects)
 
 
+def _power_of(shape: Shape) -> float:
+    """What power of its variable a force is; not a number where it is none."""
+    one, two, four = np.abs(shape.force(np.array([1.0, 2.0, 4.0])))
+    alike = min(one, two, four) > 0 and np.isclose(two / one, four / two, rtol=1e-6)
+    return float(np.log2(two / one)) if alike else np.nan
+
+
+@cache
 def slope_of(force: Callable[[Floats], Floats]) -> float:
     """E[f(z) z] of a standard normal z."""
     z, weight = hermegauss(_NODES)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.hidden.average import Average, average, looked_at
+from bayeshaptic.diagnosis.hidden.average import Average, Looked, average, looked_at
 from bayeshaptic.diagnosis.hidden.drift import drifts, weigh_drift
 from bayeshaptic.diagnosis.hidden.forces import force_suspects
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
@@ -16,7 +16,6 @@ from bayeshaptic.diagnosis.hidden.suspects import linear_suspects
 from bayeshaptic.diagnosis.hidden.weighed import Weighed, weigh
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.types import Floats
@@ -73,6 +72,8 @@ class Hidden:
     prior : HiddenPrior
     sensitivity : mapping
         Factor on the prior probabilities to 1, 5, 50 and 95 % points of K_CR.
+    looked : Looked
+        Every effect that was looked at, at every place.
     """
 
     declared: CriticalStiffness = field(repr=False)
@@ -80,6 +81,7 @@ class Hidden:
     effects: tuple[HiddenEffect, ...]
     prior: HiddenPrior
     sensitivity: dict[float, tuple[float, ...]]
+    looked: Looked = field(repr=False)
 
 
 def with_hidden(
@@ -116,18 +118,32 @@ def with_hidden(
     weighed = _weighed(known, etfe, tests, found, prior, rng)
     if not weighed:
         return None
-    looked = looked_at(weighed, known)
+    return averaged(limit, looked_at(weighed, known), prior, rng)
+
+
+def averaged(
+    limit: CriticalStiffness, looked: Looked, prior: HiddenPrior, rng: np.random.Generator
+) -> tuple[CriticalStiffness, Hidden]:
+    """The limit averaged over effects that were looked at, and what these are.
+
+    Parameters
+    ----------
+    limit : CriticalStiffness
+        Of the declared model.
+    looked : Looked
+    prior : HiddenPrior
+    rng : numpy.random.Generator
+    """
     own = average(looked, prior)
     samples = limit.samples * np.exp(own.log_factors(len(limit.samples), rng))
-    whole = replace(limit, samples=samples)
     sensitivity = {}
     for factor in SENSITIVITY:
         other = average(looked, prior.times(factor))
         moved = limit.samples * np.exp(other.log_factors(len(limit.samples), rng))
         levels = replace(limit, samples=moved).quantile([0.01, 0.05, 0.5, 0.95])
         sensitivity[factor] = tuple(float(level) for level in levels)
-    effects = _effects(own, prior, posterior)
-    return whole, Hidden(limit, own.nothing, effects, prior, sensitivity)
+    found = Hidden(limit, own.nothing, _effects(own, prior), prior, sensitivity, looked)
+    return replace(limit, samples=samples), found
 
 
 def _weighed(
@@ -149,16 +165,14 @@ def _weighed(
     ]
 
 
-def _effects(
-    average: Average, prior: HiddenPrior, posterior: Posterior
-) -> tuple[HiddenEffect, ...]:
+def _effects(average: Average, prior: HiddenPrior) -> tuple[HiddenEffect, ...]:
     """One row an effect, its places together."""
     present, rows, weighed = average.present, [], average.looked.weighed
     for name in dict.fromkeys(one.name for one in weighed):
         places = [i for i, one in enumerate(weighed) if one.name == name]
         share = present[places] / max(float(present[places].sum()), 1e-300)
         strength, factor = _pooled(weighed, places, share)
-        first, model = weighed[places[int(np.argmax(share))]], posterior.model
+        first = weighed[places[int(np.argmax(share))]]
         rows.append(
             HiddenEffect(
                 name,
@@ -168,7 +182,7 @@ def _effects(
                 prior.of(name),
                 float(present[places].sum()),
                 first.what,
-                unit_of(first.dimension, model.force_unit, model.position_unit),
+                first.unit,
                 float(_quantile(np.abs(strength), 0.95)),
                 tuple(float(20 / np.log(10) * q) for q in _quantile(factor, [0.05, 0.5, 0.95])),  # type: ignore[arg-type]
                 max(weighed[i].pareto_k for i in places),

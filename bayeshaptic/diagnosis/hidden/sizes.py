@@ -27,12 +27,15 @@ class Sizes:
     strength : ndarray, shape (C,)
     own : ndarray, shape (C, p)
         Values of the effect's parameters.
+    shape : ndarray, shape (C, K)
+        See `Unseen`.
     weight : ndarray, shape (C,)
         Prior probabilities, given that the effect is there and hides.
     """
 
     strength: Floats = field(repr=False)
     own: Floats = field(repr=False)
+    shape: Floats = field(repr=False)
     weight: Floats = field(repr=False)
 
 
@@ -54,7 +57,7 @@ def sizes_of(suspect: Suspect, known: Around) -> Sizes:
         weight = np.concatenate([weight, weight[other]])
         strength = np.concatenate([strength, -strength[other]])
     own = unseen.own(strength, unseen.shapes[shape])
-    return Sizes(strength, own, weight / weight.sum())
+    return Sizes(strength, own, unseen.shapes[shape], weight / weight.sum())
 
 
 def seen_of(suspect: Suspect, known: Around) -> Floats:

@@ -45,6 +45,14 @@ class Suspect:
         spring or damper that it looks like; the limit is that of the rest.
     share : float
         Of the effect's probability; the rest is for its other places.
+    place : str
+        Which of these.
+    shared : str
+        Whether another recording says something of the same one: "device", wherever the device is
+        the same; "configuration", where its configuration is, too; or nothing, where the hand has
+        it, or its size means something else in every recording.
+    unit_size : float
+        Of a strength of one, in a unit that recordings share.
     """
 
     name: str
@@ -57,6 +65,9 @@ class Suspect:
     tested: ForceSaid | None = None
     counts: bool = True
     share: float = 1.0
+    place: str = ""
+    shared: str = ""
+    unit_size: float = 1.0
 
     @property
     def model(self) -> Model:
@@ -88,6 +99,18 @@ def _places(candidates: Sequence[Extension], model: Model, etfe: Etfe) -> list[S
     sizes = [(one, one.unseen(model, etfe)) for one in candidates]  # type: ignore[attr-defined]
     asked = [(one, unseen) for one, unseen in sizes if unseen is not None]
     return [
-        Suspect(e.name, e.title, e.family, e.told_apart_by, model, e, unseen, share=1 / len(asked))  # type: ignore[attr-defined]
-        for e, unseen in asked
+        Suspect(
+            one.name,  # type: ignore[attr-defined]
+            one.title,  # type: ignore[attr-defined]
+            one.family,  # type: ignore[attr-defined]
+            one.told_apart_by,  # type: ignore[attr-defined]
+            model,
+            one,
+            unseen,
+            share=1 / len(asked),
+            place=str(getattr(one, "on", "")),
+            shared=one.belongs_to,  # type: ignore[attr-defined]
+            unit_size=unseen.unit_size,
+        )
+        for one, unseen in asked
     ]

@@ -8,13 +8,17 @@ the evidence against nothing more (D. J. C. MacKay, "Bayesian interpolation", Ne
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import logsumexp
 
+from bayeshaptic.diagnosis.hidden.evidence import Evidence
 from bayeshaptic.diagnosis.hidden.regression import Around, log_limits
 from bayeshaptic.diagnosis.hidden.sizes import sizes_of
 from bayeshaptic.diagnosis.hidden.suspects import Suspect
+from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.numerics.pareto import pareto_k
 from bayeshaptic.types import Floats, Ints
 
@@ -23,6 +27,7 @@ PAIRED = 5  # every so many of them meet those of another effect
 _BOLD = 0.25  # share of the sizes that are drawn from the flatter distribution
 # Steps of Gauss and Newton towards where the parameters give way to: of few cases, and of many.
 _STEPS, _FEW, _STEPS_EACH = 8, 200, 2
+_LEAST_LOG = -1e3  # log evidence: less is as impossible
 _FARTHEST = 5.0  # log stiffness: a factor of 150 either way is far enough
 
 
@@ -34,8 +39,12 @@ class Weighed:
     ----------
     name, title, family, told_apart_by : str
         The effect's.
-    what, dimension : str
-        What its strength is, in words and as `unit_of` knows it.
+    what, unit : str
+        What its strength is.
+    place : str
+        Which of the effect's places, or which of its laws.
+    shared : str
+        What recordings must have in common to say something of the same one, see `Suspect`.
     share : float
         Of the effect's prior probability.
     log_evidence : float
@@ -48,6 +57,10 @@ class Weighed:
         What each does to ln K_CR.
     changes : ndarray, shape (KEPT / PAIRED, N)
         Of the residuals, before the parameters give way, by some of them.
+    size, shape : ndarray, shapes (KEPT,), (KEPT, K)
+        Of each draw, as other recordings of the device know them.
+    evidence : Evidence or None
+        Of every size; None where there is none for other recordings.
     """
 
     name: str
@@ -55,13 +68,30 @@ class Weighed:
     family: str
     told_apart_by: str
     what: str
-    dimension: str
+    unit: str
+    place: str
+    shared: str
     share: float
     log_evidence: float
     pareto_k: float
     strength: Floats = field(repr=False)
     log_factor: Floats = field(repr=False)
     changes: Floats = field(repr=False)
+    size: Floats = field(repr=False)
+    shape: Floats = field(repr=False)
+    evidence: Evidence | None = field(default=None, repr=False)
+
+    def with_more(self, others: Sequence[Evidence], kept: Ints) -> Weighed:
+        """With what other recordings say of its sizes; `kept` are the draws that this leaves."""
+        assert self.evidence is not None
+        return replace(
+            self,
+            log_evidence=self.evidence.with_more(others),
+            strength=self.strength[kept],
+            log_factor=self.log_factor[kept],
+            size=self.size[kept],
+            shape=self.shape[kept],
+        )
 
 
 def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
@@ -87,19 +117,28 @@ def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
     kept = rng.permutation(systematic(weight, KEPT, rng))
     excluded = not np.isfinite(top)  # no draw is possible
     factor = np.zeros(KEPT) if excluded else _log_factor(suspect, known, vectors, theta, kept)
+    size = sizes.strength * suspect.unit_size
+    log = guess + said - np.log(sizes.weight)
+    log = log - (float(logsumexp(said + guess)) - evidence)
+    told = Evidence(size, sizes.shape, sizes.weight, np.maximum(log, _LEAST_LOG))
     return Weighed(
         suspect.name,
         suspect.title,
         suspect.family,
         suspect.told_apart_by,
         suspect.unseen.title,
-        suspect.unseen.dimension,
+        unit_of(suspect.unseen.dimension, suspect.base.force_unit, suspect.base.position_unit),
+        suspect.place,
+        suspect.shared,
         suspect.share,
         evidence,
         pareto_k(log_weight[possible]) if possible.sum() > 50 else np.inf,
         sizes.strength[cells][kept],
         factor,
         changes[cells[kept[::PAIRED]]],
+        size[cells][kept],
+        sizes.shape[cells][kept],
+        None if excluded or not suspect.shared else told,
     )
 
 

@@ -49,6 +49,7 @@ class AttachedMass(LinearEffect):
     on: str = MOTOR
 
     several = True
+    belongs_to = "configuration"
     places: ClassVar[tuple[str, ...]]
     prefix: ClassVar[str]
     part: ClassVar[str]
@@ -87,7 +88,7 @@ class AttachedMass(LinearEffect):
             return np.stack([shapes[:, 0], share * carrier, shapes[:, 1]], axis=1)
 
         title = "its mass over that of what it hangs on"
-        return Unseen("number", title, 1.0, own, *modes(sizes))
+        return Unseen("number", title, 1.0, own, *modes(sizes), unit_size=carrier)
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         frequency, mass, damping = self.own(values)
@@ -120,6 +121,7 @@ class ArmMode(AttachedMass):
     name = "arm_mode"
     title = "further mass in the hand or arm"
     ties = ("reflex",)
+    belongs_to = ""
     told_apart_by = "another posture or a relaxed grip: it changes with it, and a reflex fades"
     places = (HAND,)
     prefix = "arm"

@@ -56,7 +56,8 @@ class BaseCompliance(LinearEffect):
         def own(share: Floats, shapes: Floats) -> Floats:
             return np.stack([shapes[:, 0], sizes.device_mass / share, shapes[:, 1]], axis=1)
 
-        return Unseen("number", "device's mass over the base's", 1.0, own, *modes(sizes))
+        title, unit = "device's mass over the base's", 1 / sizes.device_mass
+        return Unseen("number", title, 1.0, own, *modes(sizes), unit_size=unit)
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         frequency, mass, damping = self.own(values)

@@ -33,6 +33,7 @@ class Reflex(LinearEffect):
     name = "reflex"
     title = "reflex of the hand"
     ties = ("arm_mode",)
+    belongs_to = ""
     told_apart_by = "let the person relax, or hold the handle by a clamp of the hand's mass"
 
     @classmethod

@@ -47,10 +47,13 @@ def size(effect: HiddenEffect) -> str:
 
 
 def strength(effect: HiddenEffect) -> str:
-    """The size that it does not exceed, with its unit; shares in per cent."""
-    if effect.unit:
-        return quantity(effect.strength_q95, effect.unit, digits=2)
-    return f"{100 * effect.strength_q95:.2g} %"
+    """The size that it does not exceed, with its unit."""
+    return amount(effect.strength_q95, effect.unit)
+
+
+def amount(strength: float, unit: str) -> str:
+    """A strength with its unit; shares in per cent."""
+    return quantity(strength, unit, digits=2) if unit else f"{100 * strength:.2g} %"
 
 
 def db(shift: float) -> str:

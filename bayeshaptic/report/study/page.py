@@ -11,7 +11,7 @@ from bayeshaptic.report.provenance import versions
 from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
 from bayeshaptic.report.study.headline import study_headline
-from bayeshaptic.report.study.words import configurations, hands, missing, people
+from bayeshaptic.report.study.words import configurations, hands, hidden, missing, people
 
 if TYPE_CHECKING:
     from bayeshaptic.report.figures.style import Drawn
@@ -23,6 +23,7 @@ _CONTENTS = (
     ("limit", "Limit"),
     ("people", "People"),
     ("configurations", "Configurations"),
+    ("hidden", "What could hide"),
     ("recordings", "Recordings"),
     ("walls", "Walls"),
     ("guidance", "What next"),
@@ -69,6 +70,7 @@ def render_study(
         people_caption=_people_caption(study),
         correlations=study_tables.correlations(study.population) if study.population else (),
         configurations=configurations(study),
+        hidden=hidden(study),
         parts=tuple(parts),
         lacking=missing(study),
         pictures={name: embedded(name, one, words[name]) for name, one in pictures.items()},

@@ -15,6 +15,7 @@ from bayeshaptic.study.recorded_cases import place_of
 from bayeshaptic.types import Floats
 
 if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.hidden.several import Together
     from bayeshaptic.inference.population.infer import Population
     from bayeshaptic.stability.cases import Case, DeviceLimit
     from bayeshaptic.stability.critical import CriticalStiffness
@@ -48,6 +49,7 @@ def population_summary(study: StudyAnalysis) -> dict[str, Any]:
             "configurations": _configurations(study),
             "device_limit": None if study.limit is None else _device_limit(study.limit),
             "sampling": None if population is None else _sampling(population),
+            "hidden": [_hidden(effect) for effect in study.hidden] or None,
         }
     )
 
@@ -90,6 +92,18 @@ def _sampling(population: Population) -> dict[str, Any] | None:
         "rhat_max": float(found.rhat.max()),
         "ess_min": found.ess,
         "not_pooled": sorted({one.user for one in population.recordings if one.how == ALONE}),
+    }
+
+
+def _hidden(effect: Together) -> dict[str, Any]:
+    """What could hide: by each recording, and by all together (null where each is by itself)."""
+    return {
+        "name": effect.name,
+        "prior": effect.prior,
+        "probability": effect.together,
+        "probability_alone": list(effect.alone),
+        "strength_q95": effect.strength_q95[1],
+        "unit": effect.unit,
     }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.quantities import interval, percent, pure, quantity, scale
 from bayeshaptic.report.numbers.cases import has_draws, raw_limits
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel
+from bayeshaptic.report.numbers.hidden import amount
 from bayeshaptic.report.numbers.rows import Rows
 from bayeshaptic.report.numbers.titles import title_of
 from bayeshaptic.report.study.words import spread_db
@@ -49,6 +50,27 @@ def device(study: StudyAnalysis) -> Rows:
 def _places(study: StudyAnalysis) -> list[str]:
     places = {one.entry.configuration for one in study.recordings} - {None}
     return [str(place) for place in sorted(places, key=lambda p: (isinstance(p, str), p))]
+
+
+def hidden(study: StudyAnalysis) -> Rows:
+    """A row an effect that could hide: probability before, after each recording, after all."""
+    return tuple(
+        (
+            one.title,
+            percent(one.prior),
+            _between(one.alone),
+            _DASH if one.together is None else percent(one.together),
+            amount(one.strength_q95[0], one.unit),
+            amount(one.strength_q95[1], one.unit),
+            one.what,
+        )
+        for one in study.hidden
+    )
+
+
+def _between(probabilities: Sequence[float]) -> str:
+    low, high = percent(min(probabilities)), percent(max(probabilities))
+    return low if low == high else f"{low} to {high}"
 
 
 def recordings(study: StudyAnalysis, pages: dict[str, str]) -> tuple[dict[str, Any], ...]:

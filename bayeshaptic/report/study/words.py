@@ -11,6 +11,7 @@ from bayeshaptic.quantities import estimate, percent, pure
 from bayeshaptic.report.numbers.bands import band_of
 from bayeshaptic.report.numbers.cases import is_free
 from bayeshaptic.report.numbers.estimates import decibel
+from bayeshaptic.report.numbers.hidden import amount
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
@@ -135,6 +136,24 @@ def spread_db(case: Case) -> float:
     """Standard deviation of a limit in dB, from its 90 % interval."""
     low, high = (decibel(case.limit.quantile(p)) for p in (0.05, 0.95))
     return (high - low) / Z90 if math.isfinite(low) and math.isfinite(high) else math.inf
+
+
+def hidden(study: StudyAnalysis) -> str:
+    """What the recordings know together of effects too small to be seen."""
+    shared = [one for one in study.hidden if one.together is not None]
+    text = (
+        "Every limit on this page allows for effects that no recording shows. What belongs to the "
+        "device has one size in all of its recordings, and they rule out together what one cannot"
+    )
+    if not shared:
+        return f"{text}; here every recording stands by itself."
+    first = max(shared, key=lambda one: one.together or 0.0)
+    assert first.together is not None
+    return (
+        f"{text}. The most probable is {first.title}: {percent(first.together)} after all of them "
+        f"({percent(max(first.alone))} after the one that says most for it), no larger than "
+        f"{amount(first.strength_q95[1], first.unit)}."
+    )
 
 
 def missing(study: StudyAnalysis) -> tuple[str, ...]:

@@ -1,0 +1,79 @@
+"""What one recording says of the sizes of an effect, for another recording of the same device."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import logsumexp
+
+from bayeshaptic.types import Floats
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence of sizes over nothing more, everything else integrated out.
+
+    Attributes
+    ----------
+    size : ndarray, shape (C,)
+        In a unit that all recordings of the device share; above and below zero.
+    shape : ndarray, shape (C, K)
+        What else tells the cases apart: a mode's frequency and damping ratio.
+    weight : ndarray, shape (C,)
+        Prior probability of each.
+    log : ndarray, shape (C,)
+        Log evidence of each.
+    """
+
+    size: Floats = field(repr=False)
+    shape: Floats = field(repr=False)
+    weight: Floats = field(repr=False)
+    log: Floats = field(repr=False)
+
+    def with_more(self, others: Sequence[Evidence]) -> float:
+        """Log evidence of the effect together with what others say of its sizes."""
+        log = self.log + sum_of(others, self.size, self.shape)
+        return float(logsumexp(log, b=self.weight))
+
+    def of(self, size: Floats, shape: Floats) -> Floats:
+        """Log evidence of other sizes (D,) with the shapes (D, K) that come closest, (D,).
+
+        In between linear over the logarithm of the size; beyond the ends as the square of the size,
+        which is what the log likelihood of a small change goes with.
+        """
+        out = np.zeros(len(size))
+        kinds, which = np.unique(self.shape, axis=0, return_inverse=True)
+        near = _nearest(kinds, shape)
+        for kind in np.unique(near):
+            for positive in (True, False):
+                asked = (near == kind) & ((size > 0) == positive)
+                known = (which.ravel() == kind) & ((self.size > 0) == positive)
+                if asked.any() and known.any():
+                    out[asked] = _interpolated(
+                        np.abs(size[asked]), np.abs(self.size[known]), self.log[known]
+                    )
+        return out
+
+
+def sum_of(several: Sequence[Evidence], size: Floats, shape: Floats) -> Floats:
+    """Log evidence of the sizes (D,) with the shapes (D, K) by several recordings, (D,)."""
+    return np.sum([one.of(size, shape) for one in several], axis=0)
+
+
+def _nearest(kinds: Floats, shape: Floats) -> Floats:
+    """Which of the `kinds` (S, K), all above zero, is closest to each shape, (D,)."""
+    if not kinds.shape[1]:
+        return np.zeros(len(shape), int)
+    apart = np.abs(np.log(shape)[:, None] - np.log(kinds)).sum(axis=2)
+    return np.asarray(apart.argmin(axis=1))
+
+
+def _interpolated(size: Floats, known: Floats, log: Floats) -> Floats:
+    order = np.argsort(known)
+    known, log = known[order], log[order]
+    inside = np.interp(np.log(size), np.log(known), log)
+    below = log[0] * (size / known[0]) ** 2
+    above = np.minimum(log[-1], 0.0) * (size / known[-1]) ** 2 + max(log[-1], 0.0)
+    return np.asarray(np.where(size < known[0], below, np.where(size > known[-1], above, inside)))

@@ -1,0 +1,129 @@
+"""What several recordings of one device know together of the effects that could hide in it.
+
+An effect of the device (its delay, a lag, friction, a mode) has one size in all of them: what the
+others say of that size is one more factor of its likelihood in each, so that their evidence counts
+together.  Effects of a hand, and sizes that mean something else in every recording, stay apart.
+The other parameters of each recording are its own, and of what else could hide nothing is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence, Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.diagnosis.hidden.evidence import Evidence
+from bayeshaptic.diagnosis.hidden.hidden import Hidden, HiddenEffect, averaged
+from bayeshaptic.diagnosis.hidden.weighed import Weighed
+from bayeshaptic.stability.critical import CriticalStiffness
+
+
+@dataclass(frozen=True)
+class Together:
+    """What recordings of one device say of an effect.
+
+    Attributes
+    ----------
+    name, title : str
+    prior : float
+        Probability that the device has it, before any recording was looked at.
+    alone : tuple of float
+        After each recording by itself, of those that could have it.
+    together : float or None
+        After all of them; None where no two say something of the same one.
+    what, unit : str
+        What its strength is.
+    strength_q95 : (float, float)
+        With a probability of 95 % it is no larger, if it is there: by the recording that knows most
+        of it, and by all of them.
+    """
+
+    name: str
+    title: str
+    prior: float
+    alone: tuple[float, ...]
+    together: float | None
+    what: str
+    unit: str
+    strength_q95: tuple[float, float]
+
+
+def all_together(
+    every: Sequence[Hidden], configurations: Sequence[Hashable], seed: int = 0
+) -> tuple[list[tuple[CriticalStiffness, Hidden]], tuple[Together, ...]]:
+    """Each recording's limit by what all of them know, and what that is.
+
+    Parameters
+    ----------
+    every : sequence of Hidden
+        Of each recording.
+    configurations : sequence
+        Where each was made.
+    seed : int
+
+    Returns
+    -------
+    list of (CriticalStiffness, Hidden), tuple of Together
+    """
+    found, shared = [], set()
+    for number, one in enumerate(every):
+        rng = np.random.default_rng([seed, 15, number])
+        told = {
+            which: others
+            for which, weighed in enumerate(one.looked.weighed)
+            if (others := _others(weighed, number, every, configurations))
+        }
+        shared |= {one.looked.weighed[which].name for which in told}
+        found.append(averaged(one.declared, one.looked.with_more(told, rng), one.prior, rng))
+    return found, _table(every, [hidden for _, hidden in found], shared)
+
+
+def _others(
+    own: Weighed, number: int, every: Sequence[Hidden], configurations: Sequence[Hashable]
+) -> list[Evidence]:
+    """What the recordings but one say of the same effect at the same place."""
+    if own.evidence is None:
+        return []
+    alike = [
+        one
+        for other, one in enumerate(every)
+        if other != number
+        and (own.shared == "device" or configurations[other] == configurations[number])
+    ]
+    return [
+        weighed.evidence
+        for one in alike
+        for weighed in one.looked.weighed
+        if (weighed.name, weighed.place) == (own.name, own.place) and weighed.evidence is not None
+    ]
+
+
+def _table(
+    before: Sequence[Hidden], after: Sequence[Hidden], shared: Set[str]
+) -> tuple[Together, ...]:
+    rows = []
+    for name in dict.fromkeys(effect.name for one in before for effect in one.effects):
+        pairs = [
+            (old, new)
+            for one, other in zip(before, after, strict=True)
+            for old, new in zip(_of(one, name), _of(other, name), strict=True)
+        ]
+        old, new = min(pairs, key=lambda pair: pair[0].strength_q95)  # it knows most
+        rows.append(
+            Together(
+                name,
+                old.title,
+                old.prior,
+                tuple(a.probability for a, _ in pairs),
+                new.probability if name in shared else None,
+                old.what,
+                old.unit,
+                (old.strength_q95, new.strength_q95),
+            )
+        )
+    return tuple(sorted(rows, key=lambda row: -(row.together or max(row.alone))))
+
+
+def _of(hidden: Hidden, name: str) -> list[HiddenEffect]:
+    return [effect for effect in hidden.effects if effect.name == name]
