@@ -19,7 +19,7 @@ import os
 import pickle
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -37,12 +37,16 @@ from hidden_recordings import (  # noqa: E402
     bench_of,
     clean_bench,
     jobs,
+    possible,
     recording_of,
     seen_in,
 )
 
+from bayeshaptic.diagnosis.analysis import Analysis  # noqa: E402
 from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average  # noqa: E402
+from bayeshaptic.diagnosis.hidden.average import Average  # noqa: E402
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior  # noqa: E402
+from bayeshaptic.diagnosis.hidden.weighed import Weighed  # noqa: E402
 from bayeshaptic.diagnosis.options import Options  # noqa: E402
 from bayeshaptic.report.headline import headline  # noqa: E402
 from bayeshaptic.rig import Bench  # noqa: E402
@@ -63,9 +67,9 @@ class Outcome:
         Whether the report recommends a stiffness.
     truth : float
         K_CR, dB.
-    declared, average, less, more : tuple of float
-        Points of K_CR at `LEVELS`, dB: of the declared model, of the average, and of the average
-        with prior probabilities halved and doubled.
+    declared, average, less, more, oracle : tuple of float
+        Points of K_CR at `LEVELS`, dB: of the declared model, of the average, of the average with
+        prior probabilities halved and doubled, and of whoever knows the mixture of this benchmark.
     probability : float
         Of the effect that is there.
     seconds, hidden_seconds : float
@@ -80,6 +84,7 @@ class Outcome:
     average: tuple[float, ...]
     less: tuple[float, ...]
     more: tuple[float, ...]
+    oracle: tuple[float, ...]
     probability: float
     seconds: float
     hidden_seconds: float
@@ -120,6 +125,7 @@ def run(job: Job, keep: Path | None) -> Outcome:
     closed = with_average(closed, HiddenPrior(), Options(seed=job.seed))
     averaging = time.process_time() - began
     analysis, hidden = closed.analysis, closed.analysis.hidden
+    held = CASES[job.case][1]
     there = [e for e in hidden.effects if e.name == job.effect] if hidden else []
     average = tuple(analysis.limit.db(LEVELS))
     other = [_db(hidden.sensitivity[f]) if hidden else average for f in SENSITIVE]
@@ -131,10 +137,33 @@ def run(job: Job, keep: Path | None) -> Outcome:
         tuple(analysis.declared.db(LEVELS)),
         average,
         *other,
+        oracle(analysis, possible(held)) if hidden else average,
         there[0].probability if there else 0.0,
         took + averaging,
         averaging,
     )
+
+
+def oracle(analysis: Analysis, effects: Sequence[str]) -> tuple[float, ...]:
+    """Points of K_CR, dB, where nothing has a probability of a third, else one of `effects`."""
+    hidden = analysis.hidden
+    assert hidden is not None
+    weighed = hidden.looked.weighed
+    names = [next((e for e in effects if e == alias(one)), "") for one in weighed]
+    places = [max(names.count(name), 1) for name in names]
+    prior = np.array([bool(n) * 2 / len(effects) / p for n, p in zip(names, places, strict=True)])
+    evidence = np.array([one.log_evidence for one in weighed])
+    odds = prior * np.exp(np.where(np.isfinite(evidence), evidence, -np.inf))
+    whole = 1 + odds.sum()
+    known = Average(hidden.looked, 1 / whole, odds / whole, np.zeros((len(odds), len(odds))))
+    limit = analysis.declared
+    factors = np.exp(known.log_factors(len(limit.samples), np.random.default_rng(0)))
+    return tuple(replace(limit, samples=limit.samples * factors).db(LEVELS))
+
+
+def alias(one: Weighed) -> str:
+    """The name of an effect here: a spring of the connection is an effect of its own."""
+    return "hardening_connection" if one.place.startswith("stretch") else one.name
 
 
 def _db(stiffness: tuple[float, ...]) -> tuple[float, ...]:
@@ -182,9 +211,15 @@ def table(outcomes: list[Outcome]) -> str:
     for file in (True, False):
         name = "with" if file else "without"
         lines.append(row(f"  {name} a device file", [o for o in stated if o.job.file == file]))
-    for name, points in (("halved", "less"), ("doubled", "more")):
-        other = [replace(o, average=getattr(o, points)) for o in stated]
-        lines.append(row(f"prior probabilities {name}", other))
+    clean = [o for o in stated if o.job.effect == NONE]
+    for name, points in (
+        ("prior halved", "less"),
+        ("prior doubled", "more"),
+        ("an oracle", "oracle"),
+    ):
+        lines.append(row(name, [replace(o, average=getattr(o, points)) for o in stated]))
+        other = [replace(o, average=getattr(o, points)) for o in clean]
+        lines.append(row("  nothing hides", other))
     shares = np.array([o.hidden_seconds / (o.seconds - o.hidden_seconds) for o in outcomes])
     whole = np.array([[o.hidden_seconds, o.seconds] for o in outcomes]).sum(axis=0)
     lines.append(

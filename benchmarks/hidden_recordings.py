@@ -69,14 +69,18 @@ def jobs(count: int, seed: int) -> list[Job]:
     out = []
     for number in range(count):
         case = list(CASES)[number % len(CASES)]
-        held = CASES[case][1]
-        possible = [e for e in EFFECTS if e not in (HIDDEN_BY_A_HAND if held else NEEDS_A_HAND)]
-        effect = NONE if rng.uniform() < 1 / 3 else str(rng.choice(possible))
+        drawn = str(rng.choice(possible(CASES[case][1])))
+        effect = NONE if rng.uniform() < 1 / 3 else drawn
         share = float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
         turn = number // len(CASES)
         length, file = LENGTHS_S[turn % 2], turn // 2 % 2 == 0
         out.append(Job(case, length, effect, share, 1000 * seed + number, file))
     return out
+
+
+def possible(held: bool) -> list[str]:
+    """The effects that a device may have."""
+    return [e for e in EFFECTS if e not in (HIDDEN_BY_A_HAND if held else NEEDS_A_HAND)]
 
 
 def clean_bench(case: str) -> Bench:
@@ -104,9 +108,10 @@ def seen_in(case: str, seconds: float) -> dict[str, Callable[[float], float]]:
     device, held = CASES[case]
     clean = recording_of(clean_bench(case), seconds, 1)
     closed = close_loop(clean, device=device, held=held, hidden=False)
-    return {suspect.name: scale for suspect, scale in _scales(closed)} | {
-        "grip_drift": lambda _: _GRIP
-    }
+    found: dict[str, Callable[[float], float]] = {"grip_drift": lambda _: _GRIP}
+    for suspect, scale in _scales(closed):
+        found.setdefault(suspect.name, scale)  # of an effect with several places the motor's
+    return found
 
 
 def _scales(closed: Closed):  # type: ignore[no-untyped-def]

@@ -12,10 +12,12 @@ from linear_bench import RIGID, Device
 
 from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average
 from bayeshaptic.diagnosis.hidden.average import average, looked_at
+from bayeshaptic.diagnosis.hidden.evidence import Evidence
 from bayeshaptic.diagnosis.hidden.forces import slope_of
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.regression import around
+from bayeshaptic.diagnosis.hidden.several import all_together
 from bayeshaptic.diagnosis.hidden.sizes import sizes_of
 from bayeshaptic.diagnosis.hidden.suspects import ForceSaid, Suspect, linear_suspects
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, weigh
@@ -135,6 +137,48 @@ def test_with_no_probability_the_limit_is_the_declared_one(rigid: Posterior) -> 
     tiny = with_hidden(limit, rigid, rigid.etfe, (), (), HiddenPrior(1e-9))
     assert tiny is not None
     assert np.array_equal(tiny[0].samples, limit.samples) and tiny[1].nothing > 0.999999
+
+
+def test_sizes_of_another_recording_are_read_off_its_evidence() -> None:
+    size = np.array([1.0, 2.0, 4.0, -1.0, -2.0])
+    shape = np.array([[10.0], [10.0], [10.0], [10.0], [10.0]])
+    log = np.array([-0.1, -0.4, -1.6, 0.2, 0.5])
+    own = Evidence(size, shape, np.full(5, 0.2), log)
+    assert own.of(size, shape) == pytest.approx(log)
+    others = own.of(np.array([0.5, 8.0, 2.0, -0.5]), np.full((4, 1), 9.0))
+    assert others == pytest.approx([-0.025, -6.4, -0.4, 0.05])
+    assert own.with_more([own, own]) == pytest.approx(np.log(0.2 * np.exp(3 * log).sum()))
+
+
+def test_two_recordings_rule_out_what_one_cannot(rigid: Posterior) -> None:
+    """Of a clean device, and of one whose other recording shows the effect."""
+    assert rigid.etfe is not None
+    prior = HiddenPrior(0.0, {"extra_delay": 0.1, "actuator_lag": 0.1})
+    made = with_hidden(critical_stiffness(rigid), rigid, rigid.etfe, (), (), prior)
+    assert made is not None
+    one = made[1]
+    found, rows = all_together([one] * 8, [None] * 8)
+    for name in ("extra_delay", "actuator_lag"):
+        row = next(row for row in rows if row.name == name)
+        own = next(w for w in one.looked.weighed if w.name == name).evidence
+        assert own is not None and row.together is not None
+        odds = 0.1 / 0.9 * float(own.weight @ np.exp(8 * own.log))
+        assert row.together == pytest.approx(odds / (1 + odds), rel=0.15, abs=0.01)
+        assert row.strength_q95[1] < 0.6 * row.strength_q95[0]
+    widths = [np.ptp(limit.db([0.01, 0.95])) for limit in (made[0], found[0][0])]
+    assert widths[1] < widths[0]
+    assert one.nothing < found[0][1].nothing
+
+
+def test_what_belongs_to_a_hand_or_a_configuration_is_not_shared(rigid: Posterior) -> None:
+    assert rigid.etfe is not None
+    prior = HiddenPrior(0.0, {"second_mode": 0.1, "extra_delay": 0.1})
+    made = with_hidden(critical_stiffness(rigid), rigid, rigid.etfe, (), (), prior)
+    assert made is not None
+    rows = {row.name: row for row in all_together([made[1]] * 2, [0.0, 1.0])[1]}
+    assert rows["second_mode"].together is None and rows["extra_delay"].together is not None
+    rows = {row.name: row for row in all_together([made[1]] * 2, [0.0, 0.0])[1]}
+    assert rows["second_mode"].together is not None
 
 
 @pytest.fixture(scope="module")

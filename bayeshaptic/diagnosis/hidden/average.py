@@ -16,7 +16,7 @@ from bayeshaptic.diagnosis.hidden.evidence import Evidence, sum_of
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.regression import Around
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, systematic
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
 
 _MOST_GAIN = 3.0  # log evidence that two effects may gain by cancelling each other
 
@@ -48,14 +48,19 @@ class Looked:
         for number, others in told.items():
             one = self.weighed[number]
             log = sum_of(others, one.size, one.shape)
-            weight = np.exp(log - log.max())
-            rows = rng.permutation(systematic(weight[::PAIRED], len(weight[::PAIRED]), rng))
-            kept = rng.permutation(systematic(weight, KEPT, rng))
+            rows = _drawn_again(log[::PAIRED], rng)
+            kept = _drawn_again(log, rng)
             kept[::PAIRED] = PAIRED * rows
             weighed[number] = one.with_more(others, kept)
             meeting[number] = meeting[number][:, rows]
             meeting[:, number] = meeting[:, number][:, :, rows]
         return Looked(tuple(weighed), meeting, _gain(meeting))
+
+
+def _drawn_again(log_weight: Floats, rng: np.random.Generator) -> Ints:
+    """As many, by their weight, in any order."""
+    weight = np.exp(log_weight - log_weight.max())
+    return rng.permutation(systematic(weight, len(weight), rng))
 
 
 def _gain(meeting: Floats) -> Floats:
