@@ -49,7 +49,7 @@ def population_summary(study: StudyAnalysis) -> dict[str, Any]:
             "configurations": _configurations(study),
             "device_limit": None if study.limit is None else _device_limit(study.limit),
             "sampling": None if population is None else _sampling(population),
-            "hidden": [_hidden(effect) for effect in study.hidden] or None,
+            "hidden_effects": [_hidden(effect) for effect in study.hidden] or None,
         }
     )
 
