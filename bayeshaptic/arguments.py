@@ -18,6 +18,7 @@ from numbers import Integral, Real
 from typing import Any, TypeVar
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.faq import entry_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 Names = Mapping[str, Any]
@@ -76,11 +77,17 @@ def at_the_door(function: F) -> F:
     @functools.wraps(function)
     def door(*args: Any, **kwargs: Any) -> Any:
         bound = signature.bind(*args, **kwargs)
-        for name, value in bound.arguments.items():
-            parameter = signature.parameters[name]
-            if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
-                _check(name, value, str(parameter.annotation), names)
-        return function(*args, **kwargs)
+        try:
+            for name, value in bound.arguments.items():
+                parameter = signature.parameters[name]
+                if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+                    _check(name, value, str(parameter.annotation), names)
+            return function(*args, **kwargs)
+        except InputError as error:  # a traceback shows its notes
+            more = entry_of(error)
+            if more is not None and not getattr(error, "__notes__", ()):
+                error.add_note(more.command)
+            raise
 
     return door  # type: ignore[return-value]
 

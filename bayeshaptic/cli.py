@@ -23,6 +23,7 @@ from typing import NoReturn
 from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.talk import complain
 from bayeshaptic.errors import BayeshapticWarning, InputError, describe
+from bayeshaptic.faq import explained
 from bayeshaptic.threads import one_thread_from_the_start
 from bayeshaptic.version import __version__
 
@@ -96,7 +97,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (InputError, OSError) as error:
         if debug:
             traceback.print_exc()
-        complain(f"error: {describe(error)}")
+        complain(f"error: {explained(error)}")
         return 2
     except Exception as error:
         if debug:

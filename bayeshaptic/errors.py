@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -9,7 +10,17 @@ class InputError(ValueError):
     """Input that cannot be used: the message names the place and the cure in one line.
 
     The command line prints the message and exits with status 2; nothing half-written is left.
+
+    Parameters
+    ----------
+    message : str
+    topic : str, optional
+        The entry of `bayeshaptic.faq` that says more, where it is not that of the file that raises.
     """
+
+    def __init__(self, message: str, topic: str | None = None) -> None:
+        super().__init__(message)
+        self.topic = topic
 
 
 class BayeshapticWarning(UserWarning):
@@ -43,6 +54,11 @@ def printable(text: str) -> str:
 def one_line(text: str) -> str:
     """`text` in one line, printable: what libraries say of damaged files."""
     return printable(" ".join(text.split()))
+
+
+def unique(notices: Iterable[Notice]) -> tuple[Notice, ...]:
+    """Warnings first, without repetitions."""
+    return tuple(sorted(dict.fromkeys(notices), key=lambda notice: notice.level != "warning"))
 
 
 def describe(error: BaseException) -> str:

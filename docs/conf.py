@@ -2,6 +2,9 @@
 
 import re
 
+from docutils.nodes import SkipNode
+from latex2mathml.converter import convert
+
 from bayeshaptic.version import __version__
 
 project = "bayeshaptic"
@@ -12,7 +15,6 @@ version = release = __version__
 extensions = [
     "myst_nb",  # Markdown, and notebooks that are run while the site is built
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
 ]
@@ -27,6 +29,8 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_merge_streams = True
 
+html_math_renderer = "mathml"
+
 napoleon_numpy_docstring = True
 napoleon_google_docstring = False
 napoleon_use_rtype = False
@@ -37,6 +41,8 @@ suppress_warnings = ["config.cache"]
 
 def setup(app):
     app.connect("source-read", _bring_files_along)
+    inline, block = (_in_line, None), (_displayed, None)
+    app.add_html_math_renderer("mathml", inline, block)
 
 
 def _bring_files_along(app, name, source):
@@ -48,3 +54,15 @@ def _bring_files_along(app, name, source):
         return f"{{download}}`{found[1]} <{found[2]}>`" if leads_out else found[0]
 
     source[0] = re.sub(r"\[([^\]]+)\]\(([^)#\s]+\.md)(?:#[^)]*)?\)", as_download, source[0])
+
+
+def _in_line(writer, node):
+    """An equation as MathML, which browsers draw by themselves: no script, no network."""
+    writer.body.append(convert(node.astext()))
+    raise SkipNode
+
+
+def _displayed(writer, node):
+    equation = convert(node.astext(), display="block")
+    writer.body.append(f'<div class="math">{equation}</div>\n')
+    raise SkipNode

@@ -22,6 +22,7 @@ from bayeshaptic.models.model import Model
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, TableSpectra
 from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 ENSEMBLES, STEPS, WALKERS = 4, 25, 32
 
@@ -98,13 +99,17 @@ def fake_analysis(
     fit = _fit(model, etfe, posterior, misfit)
     limit = critical_stiffness(posterior)
     middle = limit.quantile(0.5)
-    witness = SimpleNamespace(q05=0.985 * middle, q50=1.004 * middle, q95=1.02 * middle)
-    nothing = SimpleNamespace(
-        q05=None,
-        q50=None,
-        q95=None,
-        reason="the measured phase does not reach -180 degrees between 0.7 and 300 Hz",
+    witness = EtfeCriticalStiffness(
+        0.985 * middle,
+        1.004 * middle,
+        1.02 * middle,
+        8.7,
+        limit.unit,
+        phase_sd_deg=0.03,
+        db_per_degree=12.0,
     )
+    why = "the measured phase does not reach -180 degrees between 0.7 and 300 Hz"
+    nothing = EtfeCriticalStiffness(None, None, None, None, limit.unit, why)
     return FakeAnalysis(
         recording=etfe.recording,
         etfe=etfe,

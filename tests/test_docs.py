@@ -11,10 +11,18 @@ from pathlib import Path
 import pytest
 
 import bayeshaptic
-from bayeshaptic.cli import build_parser
+from bayeshaptic.cli import build_parser, main
+from bayeshaptic.faq import entries, entry
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("data/*.md")})
+PAGES = sorted(
+    {
+        *ROOT.glob("*.md"),
+        *ROOT.glob("docs/**/*.md"),
+        *ROOT.glob("data/*.md"),
+        ROOT / "bayeshaptic" / "faq.md",
+    }
+)
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 
@@ -107,23 +115,47 @@ def calls_of(name: str) -> dict[Path, list[ast.Call]]:
 
 
 def test_every_warning_has_an_entry() -> None:
-    text = (ROOT / "docs" / "faq.md").read_text(encoding="utf-8")
     topics = {
         call.args[1].value
-        for calls in calls_of("Notice").values()
+        for name in ("Notice", "say")
+        for calls in calls_of(name).values()
         for call in calls
-        if isinstance(call.args[1], ast.Constant)
+        if len(call.args) > 2 and isinstance(call.args[1], ast.Constant)
     }
-    assert {"feedback", "units", "misfit"} <= topics
-    assert not [topic for topic in sorted(topics) if f"\n### {topic}\n" not in text]
+    topics |= {"a person not yet seen", "device limit"}  # "No {part}: why" of a study
+    assert {"feedback", "units", "misfit", "not steady"} <= topics
+    for topic in sorted(topics):
+        assert topic in entry(topic).title.split(", ") and entry(topic).paragraphs
 
 
 def test_every_refusal_has_an_entry() -> None:
-    text = (ROOT / "docs" / "faq.md").read_text(encoding="utf-8")
-    places = " ".join(re.findall(r"<!-- refuses: (.*?) -->", text)).split()
+    places = [place for one in entries().values() for place in one.places]
     assert all((ROOT / "bayeshaptic" / place).exists() for place in places)
-    refusing = [path.as_posix() for path in calls_of("InputError")]
-    assert not [path for path in refusing if not path.startswith(tuple(places))]
+    refusing = calls_of("InputError")
+    assert not [path for path in refusing if not path.as_posix().startswith(tuple(places))]
+    for calls in refusing.values():
+        for keyword in (one for call in calls for one in call.keywords if one.arg == "topic"):
+            assert isinstance(keyword.value, ast.Constant) and keyword.value.value in entries()
+
+
+def test_a_message_leads_to_its_entry(capsys: pytest.CaptureFixture[str]) -> None:
+    relay = ROOT / "data" / "recordings" / "phantom-user-relay.csv.gz"
+    for command, word in (
+        (["report", str(relay)], "relay"),
+        (["report", "nothing.csv"], "file"),
+        (["report", str(relay), "--columns", "force=nothing"], "columns"),
+        (["status", str(ROOT)], "options"),
+    ):
+        assert main(command) == 2
+        assert capsys.readouterr().err.rstrip().endswith(f" [bayeshaptic explain {word}]")
+        assert main(["explain", word]) == 0
+        assert capsys.readouterr().out.startswith(entry(word).title)
+    with pytest.raises(bayeshaptic.InputError) as caught:
+        bayeshaptic.read_recording("nothing.csv")
+    assert caught.value.__notes__ == ["bayeshaptic explain file"]
+    assert main(["explain"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in listed] == list(entries())
 
 
 def test_the_gallery_is_light_and_needs_nothing() -> None:

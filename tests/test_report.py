@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import base64
-import dataclasses
 import hashlib
 import html
 import json
 import re
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -129,9 +128,7 @@ def test_no_confident_number_when_the_model_does_not_explain_the_data() -> None:
 
 def test_a_faint_misfit_is_said_beside_the_number() -> None:
     analysis = fake_analysis("rigid")
-    analysis.fit = dataclasses.replace(
-        analysis.fit, reduced_chi_square=1.25, residual=np.ones(400, complex)
-    )
+    analysis.fit = replace(analysis.fit, reduced_chi_square=1.25, residual=np.ones(400, complex))
     found = headline(analysis)
     assert found.status == "caution"
     assert "slightly above the noise" in " ".join(found.details)
@@ -139,9 +136,7 @@ def test_a_faint_misfit_is_said_beside_the_number() -> None:
 
 def test_few_points_may_be_above_the_noise_by_chance() -> None:
     analysis = fake_analysis("rigid")
-    analysis.fit = dataclasses.replace(
-        analysis.fit, reduced_chi_square=1.4, residual=np.ones(12, complex)
-    )
+    analysis.fit = replace(analysis.fit, reduced_chi_square=1.4, residual=np.ones(12, complex))
     assert headline(analysis).status == "safe"
 
 
@@ -166,24 +161,31 @@ def test_a_warning_stands_beside_the_number() -> None:
 def test_a_measurement_that_contradicts_the_model_lowers_the_number() -> None:
     analysis = fake_analysis()
     low = 0.8 * analysis.limit.quantile(0.5)
-    analysis.etfe_limit = SimpleNamespace(q05=0.98 * low, q50=low, q95=1.02 * low, reason=None)
+    own = {"q05": 0.98 * low, "q50": low, "q95": 1.02 * low}
+    analysis.etfe_limit = replace(analysis.etfe_limit, **own)
     found = headline(analysis)
     assert found.status == "caution"
     number = re.search(r"Stay below ([\d.]+) kN/m", found.sentence)
     assert number
     assert 0.97 * low < 1e3 * float(number[1]) <= 0.98 * low
     assert "do not overlap" in agreement(analysis)
+    wide = {"q05": 0.5 * low, "q95": 2 * low}
+    analysis.etfe_limit = replace(analysis.etfe_limit, **wide)
+    assert (
+        "Near 8.70 Hz the phase is known to 0.03 degrees (sd), and each tenth of a degree moves "
+        "this limit by 1.2 dB." in agreement(analysis)
+    )
 
 
 def test_an_unstable_or_unlimited_loop_gets_no_number() -> None:
     analysis = fake_analysis("rigid")
     samples = analysis.limit.samples.copy()
     samples[: len(samples) // 10] = 0.0
-    analysis.limit = dataclasses.replace(analysis.limit, samples=samples)
+    analysis.limit = replace(analysis.limit, samples=samples)
     found = headline(analysis)
     assert found.status == "untrusted"
     assert "10 %" in found.sentence
-    analysis.limit = dataclasses.replace(analysis.limit, samples=np.full_like(samples, np.inf))
+    analysis.limit = replace(analysis.limit, samples=np.full_like(samples, np.inf))
     assert "Nothing limits" in headline(analysis).sentence
 
 
@@ -191,7 +193,7 @@ def test_too_few_draws_are_no_recommendation() -> None:
     analysis = fake_analysis("rigid")
     few = slice(0, 100)
     limit = analysis.limit
-    analysis.limit = dataclasses.replace(
+    analysis.limit = replace(
         limit,
         samples=limit.samples[few],
         frequency_hz=limit.frequency_hz[few],
@@ -565,7 +567,7 @@ def test_what_the_measured_crossing_may_hide_stands_beside_it() -> None:
     own = analysis.etfe_limit
     said = "near 8.9 Hz the phase is nearer to -180 degrees than its noise"
     plain = [w.remark for w in witnesses(analysis) if w.key == "etfe"]
-    analysis.etfe_limit = SimpleNamespace(**(vars(own) | {"caveat": said}))
+    analysis.etfe_limit = replace(own, caveat=said)
     (remark,) = [w.remark for w in witnesses(analysis) if w.key == "etfe"]
     assert remark == f"{plain[0]}; {said}"
     assert said in [row[-1] for row in comparison(analysis) if row[0] == "measurement alone"][0]

@@ -36,6 +36,7 @@ KEYS: dict[str, set[str]] = {
         "hidden",
         "diagnosis",
         "error",
+        "notices",
         "provenance",
     },
     "recommendation": {"status", "stiffness", "risk", "sentence"},

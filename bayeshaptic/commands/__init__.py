@@ -7,6 +7,15 @@ module and name it in COMMANDS. Modules import what they run inside `run`, so th
 
 from __future__ import annotations
 
-from bayeshaptic.commands import batch, inspect, population, relay, report, simulate, status
+from bayeshaptic.commands import (
+    batch,
+    explain,
+    inspect,
+    population,
+    relay,
+    report,
+    simulate,
+    status,
+)
 
-COMMANDS = (report, inspect, relay, simulate, population, batch, status)
+COMMANDS = (report, inspect, relay, simulate, population, batch, status, explain)

@@ -61,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the measurement; 0."""
     from bayeshaptic.commands.talk import Talk
+    from bayeshaptic.faq import explained
     from bayeshaptic.models import build_model
     from bayeshaptic.recordings.read import read_measurement
     from bayeshaptic.recordings.recording import Recording
@@ -82,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
             for line in check_lines(check_relay(measured, model), measured.unit):
                 talk.say(line)
         for notice in measured.notices:
-            talk.say(f"  {notice.level}: {notice.text}")
+            talk.say(f"  {notice.level}: {explained(notice)}")
     return 0
 
 

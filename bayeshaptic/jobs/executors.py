@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bayeshaptic.errors import InputError, describe
+from bayeshaptic.faq import entry, explained
 
 Job = Callable[[Any], Any]
 
@@ -79,7 +80,7 @@ def processes(workers: int) -> Executor:
             suspects = yield from _until_a_worker_dies(job, waiting, workers)
             for item in suspects:
                 if (yield from _until_a_worker_dies(job, deque([item]), 1)):
-                    yield Outcome(item, error=_DIED)
+                    yield Outcome(item, error=f"{_DIED} [{entry('worker').command}]")
 
     return run
 
@@ -227,7 +228,7 @@ def _attempt(job: Job, item: Any) -> Outcome:
     try:
         return Outcome(item, result=job(item))
     except Exception as error:
-        return Outcome(item, error=describe(error), refused=isinstance(error, InputError))
+        return Outcome(item, error=explained(error), refused=isinstance(error, InputError))
 
 
 def _start_worker(parent: int) -> None:

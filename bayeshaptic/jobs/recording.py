@@ -12,6 +12,7 @@ from bayeshaptic.devices import Device, load_device
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.faq import explained
 from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.jobs.job import Job, checkpoints_of
 from bayeshaptic.recordings.read import read_measurement, recording_name
@@ -82,6 +83,6 @@ def reported(
         See `bayeshaptic.report.provenance`.
     """
     page = write_report(result, folder, origin)
-    warnings = tuple(notice.text for notice in result.analysis.notices if notice.level == "warning")
+    warnings = tuple(explained(n) for n in result.analysis.notices if n.level == "warning")
     remark = in_short(result.closed) if result.closed else ""
     return Reported(name, page, headline(result), remark, warnings)

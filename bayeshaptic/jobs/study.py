@@ -11,6 +11,7 @@ from typing import Any
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.saved.checkpoint import kept_until_done
+from bayeshaptic.faq import explained
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
 from bayeshaptic.jobs.job import Job, checkpoints_of, refuse_file
@@ -206,7 +207,7 @@ def _device(
     pages = {one.name: one.page for one in done or () if one.page is not None}
     page = write_study_report(study, folder, pages, walls=done is not None)
     warnings = tuple(
-        n.text for n in study.notices if n.level == "warning" and n.topic != "recordings"
+        explained(n) for n in study.notices if n.level == "warning" and n.topic != "recordings"
     )
     return (Reported(study.name, page, study_headline(study), warnings=warnings),)
 

@@ -58,7 +58,8 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         raise InputError(
             f"{where}: a {recording.kind} recording (position in {recording.position_unit}), but "
             f"the device {device.name} is {device.kind}; give the position's unit with "
-            f"--columns, as in position=NAME[{device.position_unit}]"
+            f"--columns, as in position=NAME[{device.position_unit}]",
+            topic="columns",
         )
     scales = (
         *_period(recording, device),
@@ -80,20 +81,23 @@ def _refuse_unusable(recording: Recording, where: str) -> None:
     samples = recording.samples
     if len(recording.position) != samples:
         raise InputError(
-            f"{where}: {samples} samples of force and {len(recording.position)} of position"
+            f"{where}: {samples} samples of force and {len(recording.position)} of position",
+            topic="rows",
         )
     if samples < FEWEST_SAMPLES:
         raise InputError(
             f"{where}: {samples} samples ({recording.duration_s:.3g} s) are too few: at least "
             f"{FEWEST_SAMPLES} ({FEWEST_SAMPLES * recording.period_s:.3g} s at this period) are "
-            f"needed, and {USUAL_SECONDS} s are usual"
+            f"needed, and {USUAL_SECONDS} s are usual",
+            topic="too-little",
         )
     for what, signal in (("force", recording.force), ("position", recording.position)):
         bad = np.flatnonzero(~np.isfinite(signal))
         if len(bad):
             raise InputError(
                 f"{where}: the {what} is {signal[bad[0]]} in row {bad[0] + 1} ({len(bad)} such "
-                "rows)"
+                "rows)",
+                topic="rows",
             )
     if np.ptp(recording.force) == 0:
         raise InputError(
@@ -234,20 +238,23 @@ def _causality(recording: Recording, where: str) -> list[Notice]:
         raise InputError(
             f"{where}: force and position look swapped: the past position predicts the force (it "
             f"removes {100 * found.removed:.0f} % of the error), the past force does not "
-            "predict the position; exchange them with --columns force=...,position=..."
+            "predict the position; exchange them with --columns force=...,position=...",
+            topic="swapped",
         )
     if found.opposite:
         raise InputError(
             f"{where}: the position moves against the force: one of them has the opposite sign, "
             "and the device would have a negative mass; turn one round with --columns, as in "
-            "position=NAME*-1"
+            "position=NAME*-1",
+            topic="swapped",
         )
     if found.relay:
         raise InputError(
             f"{where}: a relay recording (the force switches between {recording.force.min():.3g} "
             f"and {recording.force.max():.3g} {recording.force_unit} with the sign of the "
             "position), of which no frequency response can be estimated; its gain margin is read "
-            f"by: bayeshaptic relay {where}"
+            f"by: bayeshaptic relay {where}",
+            topic="relay",
         )
     if found.has_feedback:
         text = (

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.errors import unique
 from bayeshaptic.report import tables, words
 from bayeshaptic.report.assumptions import assumptions, priors
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
@@ -17,7 +18,7 @@ from bayeshaptic.report.loop import words as loop_words
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.page import answer, methods
-from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, unique, with_contents
+from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, with_contents
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.next_step import next_step
 from bayeshaptic.report.page.reproduce import asked, reproduce

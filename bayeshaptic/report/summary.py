@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.errors import Notice, unique
+from bayeshaptic.faq import entry
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, finite
@@ -70,6 +72,7 @@ def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str
             "hidden": _hidden(analysis),
             "diagnosis": diagnosis,
             "error": {name: _error(given or {}) for name, given in error.items()},
+            "notices": _notices(analysis.notices),
             "provenance": origin or provenance(seed=analysis.posterior.seed),
         }
     )
@@ -95,6 +98,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return finite(value)
     return value
+
+
+def _notices(notices: tuple[Notice, ...]) -> list[dict[str, str]]:
+    """Warnings first, each with the word of its entry in `bayeshaptic explain`."""
+    return [{**vars(notice), "explain": entry(notice.topic).word} for notice in unique(notices)]
 
 
 def _error(given: Mapping[str, Any]) -> dict[str, Any]:

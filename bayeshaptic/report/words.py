@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 _DELAY = "delay_s"
-_WIDE_DB = 1.5  # of an interval, from which it is worth a word why
+_WIDER = 3.0  # times the model's interval, from which it is worth a word why
 
 
 def misfit(analysis: Analysis, loop: bool = False) -> str:
@@ -140,18 +140,24 @@ def _apart(analysis: Analysis, own: Witness) -> str:
     side = "above" if difference > 0 else "below"
     verdict = "their 90 % intervals overlap" if overlap else "their 90 % intervals do not overlap"
     text = f"The model's median lies {abs(difference):.2f} dB {side} that, and {verdict}."
-    hertz = getattr(analysis.etfe_limit, "frequency_hz", None)
-    if hertz and own.low > 0 and decibel(own.high) - decibel(own.low) > _WIDE_DB:
-        etfe = analysis.etfe
-        near = np.abs(np.log2(etfe.frequency_hz / hertz)) < 0.5
-        if near.any():
-            noise = np.degrees(float(np.median(etfe.relative_sd[near])) / math.sqrt(2))
-            text += (
-                f" The measurement's interval is wide because near {quantity(hertz, 'Hz')} one "
-                f"point of its phase is uncertain by {pure(noise, 2)} degrees (sd), and the limit "
-                "is where that phase crosses −180 degrees; the model uses all frequencies."
-            )
-    return text
+    low, high = limit.quantile(0.05), limit.quantile(0.95)
+    if min(own.low, low) <= 0:
+        return text
+    wider = math.log(own.high / own.low) > _WIDER * math.log(high / low)
+    return f"{text} {_why_wide(analysis)}" if wider else text
+
+
+def _why_wide(analysis: Analysis) -> str:
+    """Why the measurement knows its own limit less well than the model does."""
+    own = analysis.etfe_limit
+    assert own.frequency_hz is not None and own.phase_sd_deg is not None
+    assert own.db_per_degree is not None
+    return (
+        "The measurement's is the wider one because it sees the frequencies around its crossing "
+        f"alone. Near {quantity(own.frequency_hz, 'Hz')} the phase is known to "
+        f"{pure(own.phase_sd_deg, 2)} degrees (sd), and each tenth of a degree moves this limit by "
+        f"{pure(own.db_per_degree / 10, 2)} dB. The model uses all frequencies."
+    )
 
 
 def hump(analysis: Analysis) -> str:

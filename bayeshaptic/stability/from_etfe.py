@@ -20,6 +20,7 @@ _LEVELS = (0.25, 0.7, 1.2, 1.9, 2.5)
 _DOUBTFUL = 1.0  # a stretch below this is worth a word where it is not in the numbers,
 _NEAR = 2.0  # and a place that is nearer than this without reaching the other side
 _POINTS = 201
+_ASIDE = 2  # places on either side of a crossing, over which its slope is read
 _ENOUGH = 0.95  # share of draws with a crossing inside the band that an interval needs
 
 
@@ -40,6 +41,12 @@ class EtfeCriticalStiffness:
         Where the phase may cross too, by less than its noise; this is not in the numbers.
     samples : ndarray, shape (n,)
         K_CR of each draw of the noise; inf where it has no crossing inside the band.
+    phase_sd_deg : float or None
+        Standard deviation of the phase at `frequency_hz`, in degrees, all windows around it taken
+        together.
+    db_per_degree : float or None
+        How far K_CR moves where that phase is wrong by a degree, in dB: large where the phase
+        runs nearly along -180 degrees.
     """
 
     q05: float | None
@@ -50,6 +57,8 @@ class EtfeCriticalStiffness:
     reason: str | None = None
     caveat: str | None = None
     samples: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
+    phase_sd_deg: float | None = None
+    db_per_degree: float | None = None
 
 
 class _Run(NamedTuple):
@@ -117,7 +126,20 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
     q05, q50, q95 = (float(q) for q in np.quantile(samples[crosses], [0.05, 0.5, 0.95]))
     middle = float(np.median(where[crosses]))
     caveat = _caveat(fits, side, q05, etfe.stiffness_unit)
-    return EtfeCriticalStiffness(q05, q50, q95, middle, etfe.stiffness_unit, None, caveat, samples)
+    return EtfeCriticalStiffness(
+        q05, q50, q95, middle, etfe.stiffness_unit, None, caveat, samples, *_steepness(fits, middle)
+    )
+
+
+def _steepness(fits: list[LocalFit], frequency_hz: float) -> tuple[float, float]:
+    """The phase's standard deviation at a crossing in degrees, and dB of 1/abs(G) per degree."""
+    centres = np.array([fit.centre_hz for fit in fits])
+    nearest = int(np.abs(np.log(centres / frequency_hz)).argmin())
+    around = [fit.inverse for fit in fits[max(nearest - _ASIDE, 0) : nearest + _ASIDE + 1]]
+    turned = np.degrees(np.abs(np.angle(around[-1] / around[0])))
+    risen = 20 * np.log10(abs(around[-1]) / abs(around[0]))
+    sd = float(np.degrees(fits[nearest].relative_sd))
+    return sd, float(abs(risen) / max(turned, sd))
 
 
 def _runs(side: Floats, threshold: float) -> tuple[list[_Run], list[_Run]]:

@@ -13,12 +13,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.faq import entry, without_links
 from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Template
 
-    from bayeshaptic.errors import Notice
     from bayeshaptic.report.figures.style import Drawn
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
@@ -49,7 +49,7 @@ class EmbeddedPicture:
 
 
 def frame() -> dict[str, Any]:
-    """What every page has: style, script and its hash, version, the moment."""
+    """What every page has: style, script and its hash, version, the moment, what words mean."""
     script = (TEMPLATES / "page.js").read_text(encoding="utf-8")
     digest = hashlib.sha256(script.encode()).digest()
     return {
@@ -58,6 +58,8 @@ def frame() -> dict[str, Any]:
         "script_hash": base64.b64encode(digest).decode("ascii"),
         "version": __version__,
         "written": written(),
+        "faq": entry,
+        "plain": without_links,
     }
 
 
@@ -68,12 +70,6 @@ def with_contents(page: str, contents: Sequence[tuple[str, str]]) -> str:
     )
     place = page.index("</nav>")
     return page[:place] + links + page[place:]
-
-
-def unique(notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
-    """Warnings first, without repetitions."""
-    once = tuple(dict.fromkeys(notices))
-    return tuple(sorted(once, key=lambda notice: notice.level != "warning"))
 
 
 def embedded(name: str, drawn: Drawn, words: str) -> EmbeddedPicture:
