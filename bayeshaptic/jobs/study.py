@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.faq import explained
+from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
 from bayeshaptic.jobs.job import Job, checkpoints_of, refuse_file
