@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.begun import Begun
-from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop, open_questions
+from bayeshaptic.diagnosis.feedback.in_loop import contradictions, follow_in_loop, open_questions
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
@@ -56,6 +56,7 @@ def analyse_in_loop(begun: Begun, one_mass: bool, options: Options) -> Analysis 
     # What the response says is no part of this likelihood.
     posterior = replace(posterior, windows=None, etfe=None)
     limit = watch.limit_of(posterior)
+    doubts = found.doubts + contradictions(found.motion, posterior)
     questions = open_questions(found, posterior, limit, one_mass)
     told = tuple(replace(n, text=_BIASED) if n.topic == "feedback" else n for n in begun.notices)
     return Analysis(
@@ -71,7 +72,7 @@ def analyse_in_loop(begun: Begun, one_mass: bool, options: Options) -> Analysis 
         notices=told + limit.notices,
         seconds={**begun.seconds, "motion in the loop": time.perf_counter() - began},
         lever_m=begun.lever_m,
-        in_loop=replace(found, questions=questions),
+        in_loop=replace(found, doubts=doubts, questions=questions),
     )
 
 

@@ -11,6 +11,8 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower, pid
 from bayeshaptic.models import HalfNormal
+from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.stability.critical import CriticalStiffness
@@ -19,7 +21,11 @@ from bayeshaptic.types import Floats
 # Half a recording has too few strokes to say much: the halves may differ by so many of their sds.
 _APART = 4.0
 _WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
+# Standard deviations (Student's t, eight degrees of freedom: 1 in 1000) from which on the motion
+# contradicts what was given.
+_CONTRADICTED = 5.04
 _CENTRAL = 1.6449  # standard deviations that hold 90 %
+_DIMENSIONS = {"m": "mass", "b": "damping", "delay_s": "time"}
 _WORDS = {"m": "mass", "b": "viscous damping", "delay_s": "delay"}
 
 
@@ -100,6 +106,29 @@ def open_questions(
     if not (low > 0 and 20 * np.log10(high / low) < _WIDEST_DB):
         reasons.append("the recording leaves the limit open within more than a factor of two")
     return tuple(reasons)
+
+
+def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
+    """What was given, as known or by a prior, that the motion contradicts.
+
+    A delay of the device file that is not the recording's moves the damping, and with it the limit.
+    """
+    model, drawn = posterior.model, posterior.summary()
+    known: list[str] = []
+    believed: list[str] = []
+    for name, value, sd in zip(NAMES, motion.values, motion.sd, strict=True):
+        free = name in model.names
+        told = drawn[name]["q50"] if free else model.fixed[name]
+        if name not in _WORDS or abs(told - value) < _CONTRADICTED * sd:
+            continue
+        unit = unit_of(_DIMENSIONS[name], model.force_unit, model.position_unit)
+        what = "comes out, with its prior, as" if free else "was given as"
+        (believed if free else known).append(
+            f"the {_WORDS[name]} {what} {quantity(told, unit)}, and the motion says "
+            f"{quantity(value, unit, sd)}: leave out what gave it (--device, --delay-s, a prior)"
+        )
+    # What is known wrongly pulls the others along.
+    return tuple(known or believed)
 
 
 def _halves(recording: Recording) -> tuple[Recording, Recording]:
