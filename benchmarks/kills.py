@@ -32,6 +32,13 @@ RECORDINGS = 2
 SECONDS = 4
 MOST_SECONDS_AFTER = 5.0
 OPTIONS = ("--model", "rigid", "--device", "phantom", "--band", "1,25", "--no-loop", "--quiet")
+KEEPING = """
+import sys
+from bayeshaptic import cli
+from bayeshaptic.inference.saved import checkpoint
+checkpoint.EVERY_S = 0.0
+sys.exit(cli.main())
+"""
 MARK = "BAYESHAPTIC_KILLS"  # in the environment of every process of a run
 
 
@@ -211,6 +218,23 @@ def _worker(parent: subprocess.Popen[str], mark: str) -> int | None:
     return None
 
 
+def one_sampler(tally: Tally, place: Path, reference: Any) -> None:
+    """Kill a report as soon as its sampler has kept its state, and go on from there."""
+    tally.runs += 1
+    out = place / f"out-sampler-{tally.runs}"
+    _, _, _, *words = command("report", place, out)
+    process = started([sys.executable, "-c", KEEPING, *words], out.name)
+    while process.poll() is None and not list(out.glob(".checkpoints/*.state")):
+        time.sleep(0.002)
+    process.kill()
+    process.communicate()
+    if not list(out.glob(".checkpoints/*.state")):
+        tally.wrong.append("no state was kept")
+    if left := left_after(out.name):
+        tally.wrong.append(f"alive: {left}")
+    finish(tally, "report", place, out, reference)
+
+
 def prepared(place: Path) -> tuple[dict[str, Any], dict[str, float]]:
     """Recordings, the results of a run that nobody disturbs, and how long each kind takes."""
     (place / "in").mkdir()
@@ -230,6 +254,7 @@ def main() -> int:
     """The table; 1 where anything went wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=30)
+    parser.add_argument("--samplers", type=int, default=3)
     parser.add_argument("--disks", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
@@ -251,6 +276,8 @@ def main() -> int:
             how = signal.SIGKILL if number % 2 else signal.SIGTERM
             delay = float(rng.uniform(0.05, 1.0)) * seconds[kind]
             attempt(f"{kind}, {how.name}", one_kill, kind, how, place, reference, delay)
+        for _ in range(arguments.samplers):
+            attempt("sampler, SIGKILL", one_sampler, place, reference)
         for kilobytes in rng.integers(50, 3000, arguments.disks):
             attempt("full disk", one_disk, place, reference, int(kilobytes))
         attempt("pool worker killed", one_worker, place, reference, ())

@@ -13,8 +13,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.diagnostics import diagnose
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.saved.archive import model_from_dict
-from bayeshaptic.inference.saved.arviz_groups import MARK
-from bayeshaptic.types import Floats
+from bayeshaptic.inference.saved.arviz_groups import MARK, from_chains
 
 
 @at_the_door
@@ -56,23 +55,18 @@ def load_posterior(path: str | Path) -> Posterior:
 
 def _restored(data: Any, stats: Any, about: dict[str, Any]) -> Posterior:
     model = model_from_dict(about["model"])
-    by_walker = np.stack([data[name][()] for name in model.names], axis=-1)
-    chains = _by_ensemble(by_walker, about["ensembles"])
+    walkers = about["walkers"]
+    values = np.stack([data[name][()] for name in model.names], axis=-1)
+    chains = from_chains(values, walkers)
     if not np.isfinite(chains).all():
         raise ValueError("draws that are no numbers")
     return Posterior(
         model,
         chains,
-        _by_ensemble(stats["log_likelihood"][()], about["ensembles"]),
+        from_chains(stats["log_likelihood"][()], walkers),
         diagnose(chains),
         about["converged"],
         about["message"],
         about["seconds"],
         about["seed"],
     )
-
-
-def _by_ensemble(values: Floats, ensembles: int) -> Floats:
-    """(chain, draw, ...) to (ensembles, steps, walkers, ...), each walker having been a chain."""
-    split = values.reshape(ensembles, -1, *values.shape[1:])
-    return np.moveaxis(split, 1, 2)

@@ -116,16 +116,9 @@ class Posterior(Shown):
             for i, name in enumerate(self.names)
         }
 
-    def to_arviz(self, chains: str = "walkers") -> Any:
-        """An ArviZ InferenceData (0.x) or DataTree (1.x).
-
-        Parameters
-        ----------
-        chains : {"walkers", "ensembles"}
-            What is a chain: with walkers ArviZ's effective draws are ours, with ensembles its
-            R-hat is.
-        """
-        return to_arviz(self, chains)
+    def to_arviz(self) -> Any:
+        """An ArviZ InferenceData (0.x) or DataTree (1.x), each ensemble a chain."""
+        return to_arviz(self)
 
     @at_the_door
     def save(self, path: str | Path) -> Path:

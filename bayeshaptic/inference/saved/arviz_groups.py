@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from bayeshaptic.errors import InputError
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.saved.archive import model_to_dict
@@ -56,13 +54,13 @@ class Sampled(Protocol):
     def etfe(self) -> Etfe | None: ...
 
 
-def to_arviz(posterior: Sampled, chains: str = "walkers") -> Any:
+def to_arviz(posterior: Sampled) -> Any:
     """The posterior as ArviZ keeps it.
 
-    With each walker a chain ArviZ counts effective draws as we do; but its R-hat compares walkers
-    of one ensemble, which know of each other and are short. With each ensemble a chain its R-hat is
-    ours, and it counts far too many effective draws. Ours stand in the attributes ``rhat`` and
-    ``effective_draws`` of each variable either way.
+    Each ensemble is a chain, and its walkers follow each other in it, each in the order of time:
+    ArviZ's R-hat then compares what began apart, as ours does, and its effective draws see what
+    each walker repeats.  Those of the report stand in the attributes ``rhat`` and
+    ``effective_draws`` of each variable.
 
     Groups: ``posterior`` (a variable a parameter, its unit in ``attrs["units"]``),
     ``sample_stats`` (log likelihood), ``prior``, and, where the measurement is at hand,
@@ -72,17 +70,13 @@ def to_arviz(posterior: Sampled, chains: str = "walkers") -> Any:
     Parameters
     ----------
     posterior : Posterior
-    chains : {"walkers", "ensembles"}
 
     Returns
     -------
     arviz.InferenceData (0.x) or xarray.DataTree (1.x)
     """
-    if chains not in _ARRANGED:
-        raise InputError(f'chains is "walkers" or "ensembles", not {chains!r}.')
     az = _arviz()
-    arranged = _groups(posterior, _ARRANGED[chains])
-    groups = {name: dataset(group) for name, group in arranged.items()}
+    groups = {name: dataset(group) for name, group in _groups(posterior).items()}
     if int(az.__version__.split(".")[0]) < 1:  # 1.x has the old name too, but not the old thing
         return az.InferenceData(**groups)
     import xarray
@@ -105,39 +99,34 @@ def save_posterior(posterior: Sampled, path: Path) -> Path:
     return path
 
 
-def _by_walker(values: Floats) -> Floats:
-    """(ensembles, steps, walkers, ...) to (chain, draw, ...) with each walker a chain."""
+def as_chains(values: Floats) -> Floats:
+    """(ensembles, steps, walkers, ...) to (chain, draw, ...), walker by walker."""
     moved = np.moveaxis(values, 2, 1)
-    return moved.reshape(-1, *moved.shape[2:])
+    return moved.reshape(len(moved), -1, *moved.shape[3:])
 
 
-def _by_ensemble(values: Floats) -> Floats:
-    """(ensembles, steps, walkers, ...) to (chain, draw, ...), step by step."""
-    return values.reshape(len(values), -1, *values.shape[3:])
+def from_chains(values: Floats, walkers: int) -> Floats:
+    """What `as_chains` was given."""
+    return np.moveaxis(values.reshape(len(values), walkers, -1, *values.shape[2:]), 1, 2)
 
 
-_ARRANGED = {"walkers": _by_walker, "ensembles": _by_ensemble}
-
-
-def _groups(
-    posterior: Sampled, arranged: Callable[[Floats], Floats] = _by_walker
-) -> dict[str, Group]:
+def _groups(posterior: Sampled) -> dict[str, Group]:
     """The groups, alike for the file and for both versions."""
     model = posterior.model
-    by_walker = arranged(posterior.chains)
-    draws = _numbered(by_walker)
+    chains = as_chains(posterior.chains)
+    draws = _numbered(chains)
     rng = np.random.default_rng(posterior.seed)
     prior = np.stack([draw(model.prior(n), rng, _PRIOR_DRAWS) for n in model.names], axis=-1)[None]
-    level = Variable(("chain", "draw"), arranged(posterior.log_likelihood))
+    level = Variable(("chain", "draw"), as_chains(posterior.log_likelihood))
     groups = {
-        "posterior": Group(_sampled(posterior, by_walker), draws, _about(posterior)),
+        "posterior": Group(_sampled(posterior, chains), draws, _about(posterior)),
         "sample_stats": Group({"log_likelihood": level}, draws),
         "prior": Group(_parameters(posterior, prior), _numbered(prior)),
     }
     if posterior.windows is not None:
-        groups["log_likelihood"] = _pointwise(posterior, by_walker)
+        groups["log_likelihood"] = _pointwise(posterior)
     if posterior.etfe is not None:
-        groups |= _predictive(posterior, by_walker, rng)
+        groups |= _predictive(posterior, rng)
     return groups
 
 
@@ -183,7 +172,7 @@ def _sampled(posterior: Sampled, values: Floats) -> dict[str, Variable]:
 def _about(posterior: Sampled) -> dict[str, Any]:
     about = {
         "model": model_to_dict(posterior.model),
-        "ensembles": posterior.chains.shape[0],
+        "walkers": posterior.chains.shape[2],
         "converged": posterior.converged,
         "message": posterior.message,
         "seconds": posterior.seconds,
@@ -192,15 +181,16 @@ def _about(posterior: Sampled) -> dict[str, Any]:
     return {MARK: json.dumps(about), "inference_library": "emcee"}
 
 
-def _thinned(by_walker: Floats, count: int) -> Floats:
-    step = max(1, by_walker.shape[1] // count)
-    return by_walker[:, step - 1 :: step][:, :count]
+def _thinned(posterior: Sampled, count: int) -> Floats:
+    """At most `count` draws of each walker, shape (chain, draw, P)."""
+    step = max(1, posterior.chains.shape[1] // count)
+    return as_chains(posterior.chains[:, step - 1 :: step][:, :count])
 
 
-def _pointwise(posterior: Sampled, by_walker: Floats) -> Group:
+def _pointwise(posterior: Sampled) -> Group:
     windows = posterior.windows
     assert windows is not None
-    some = _thinned(by_walker, _LIKELIHOOD_DRAWS)
+    some = _thinned(posterior, _LIKELIHOOD_DRAWS)
     values = Likelihood(posterior.model, windows).pointwise(some.reshape(-1, some.shape[2]))
     values = values.reshape(*some.shape[:2], -1)
     along = {
@@ -211,13 +201,11 @@ def _pointwise(posterior: Sampled, by_walker: Floats) -> Group:
     return Group({"response": response}, _numbered(some) | along)
 
 
-def _predictive(
-    posterior: Sampled, by_walker: Floats, rng: np.random.Generator
-) -> dict[str, Group]:
+def _predictive(posterior: Sampled, rng: np.random.Generator) -> dict[str, Group]:
     """The measured response, and what the posterior predicts of it with its noise."""
     etfe = posterior.etfe
     assert etfe is not None
-    some = _thinned(by_walker, _PREDICTIVE_DRAWS)
+    some = _thinned(posterior, _PREDICTIVE_DRAWS)
     response = posterior.model.response(some.reshape(-1, some.shape[2]), etfe.frequency_hz)
     noise = rng.standard_normal((2, *response.shape)) * np.sqrt(etfe.variance / 2)
     shape = (*some.shape[:2], -1)

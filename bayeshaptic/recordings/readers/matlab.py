@@ -68,6 +68,8 @@ def _variables(path: Path) -> dict[str, Any]:
     # scipy meets damaged or exotic files with whatever exception its parser runs into.
     try:
         return load(None)
+    except MemoryError:  # a second try would take as long
+        raise
     except Exception as error:
         try:
             names = [name for name, *_ in whosmat(path)]
@@ -77,6 +79,8 @@ def _variables(path: Path) -> dict[str, Any]:
     for name in names:
         try:
             found.update(load([name]))
+        except MemoryError:
+            raise
         except Exception:
             continue
     return found
