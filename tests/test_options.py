@@ -47,3 +47,12 @@ def test_stages_share_the_progress() -> None:
     options = Options(progress=lambda share, word: seen.append((share, word)))
     options.within(0.2, 0.6).within(0.5, 1.0).report(0.5, "half of it")
     assert seen == [(pytest.approx(0.5), "half of it")]
+
+
+def test_a_path_goes_where_a_recording_does(tmp_path: Path) -> None:
+    recording = bh.read_recording(RECORDING)
+    found = bh.estimate_etfe(str(RECORDING), band_hz=(1, 25))
+    assert (found.value == bh.estimate_etfe(recording, band_hz=(1, 25)).value).all()
+    assert bh.join_recordings([RECORDING, recording]).joints == (recording.samples,)
+    with pytest.raises(bh.InputError, match="no such file"):
+        bh.measure_relay(tmp_path / "a.csv")

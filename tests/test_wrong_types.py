@@ -113,7 +113,7 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
         (lambda: bh.read_recording(None), "path is None; give a text or a path"),
         (lambda: bh.read_recording("a.csv", rows=(1, "2")), "rows is"),
         (lambda: bh.recording_from_arrays("xy", [1, 2]), "force is 'xy'; give numbers"),
-        (lambda: bh.estimate_etfe("a.csv"), "give a Recording (see bayeshaptic.read_recording)"),
+        (lambda: bh.estimate_etfe(3), "give a Recording (see bayeshaptic.read_recording) or"),
         (lambda: bh.sample(blank(bh.Model), None), "etfe is None; give an Etfe"),
         (lambda: bh.elasticities(3), "source is 3; give a Model, Fit, Posterior"),
         (lambda: bh.write_report(3, "out"), "result is 3; give what bayeshaptic.analyse"),

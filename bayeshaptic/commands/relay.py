@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.faq import explained
     from bayeshaptic.models import build_model
-    from bayeshaptic.recordings.read import read_measurement
+    from bayeshaptic.recordings.measurement import read_measurement
     from bayeshaptic.recordings.recording import Recording
     from bayeshaptic.stability.relay.check import check_relay
     from bayeshaptic.stability.relay.measure import measure_relay

@@ -21,7 +21,7 @@ from bayeshaptic.models.structures import chain
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.join import unbroken
-from bayeshaptic.recordings.read import read_measurement
+from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.sufficiency import refuse_too_little

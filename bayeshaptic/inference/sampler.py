@@ -25,6 +25,7 @@ from bayeshaptic.inference.saved.checkpoint import Arrays, Checkpoint, key_of
 from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import minimise
+from bayeshaptic.progress import told
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
@@ -56,7 +57,7 @@ def sample(
     start: Fit | None = None,
     ess: float = DEFAULT_ESS,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     most_evaluations: int = MOST_EVALUATIONS,
     rule: Rule | None = None,
     checkpoints: str | Path | None = None,
@@ -78,8 +79,8 @@ def sample(
         Effective draws that every parameter must have, in the bulk and in the tails.
     seed : int
         Same seed, same draws.
-    progress : callable, optional
-        Called with the share done and a word about it.
+    progress : callable, bool or None
+        Called with the share done and a word about it; True draws a bar.
     most_evaluations : int
         Evaluations of the likelihood after which to give up, a cap that is the same on every
         machine; the result then says it has not converged.
@@ -107,7 +108,7 @@ def sample(
             f"{', '.join(model.names)}: fit this model first."
         )
     began = time.perf_counter()
-    report = progress or (lambda share, word: None)
+    report = told(progress) or (lambda share, word: None)
     fit = start if start is not None else least_squares(model, etfe, seed=seed)
     asked = rule or EveryParameter(fit.model, ess)
     report(0.02, "finding the peak")

@@ -15,7 +15,8 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.faq import explained
 from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.jobs.job import Job, checkpoints_of
-from bayeshaptic.recordings.read import read_measurement, recording_name
+from bayeshaptic.recordings.measurement import read_measurement
+from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.report import write_report

@@ -2,7 +2,8 @@
 
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.join import join_recordings
-from bayeshaptic.recordings.read import read_measurement, read_recording, recording_from_arrays
+from bayeshaptic.recordings.measurement import read_measurement
+from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.readers import Reader, register_reader
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.frf_table import read_frf

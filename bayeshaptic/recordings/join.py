@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
 
 # Shorter than this, a piece has too few lines for windows of its own.
@@ -16,7 +18,9 @@ FEWEST_SAMPLES = 250
 
 
 @at_the_door
-def join_recordings(recordings: Sequence[Recording], name: str | None = None) -> Recording:
+def join_recordings(
+    recordings: Sequence[Recording | str | Path], name: str | None = None
+) -> Recording:
     """Recordings of one device, held alike, as one recording of several pieces.
 
     All pieces say something of the same masses, springs, friction and delay; where each begins,
@@ -24,7 +28,7 @@ def join_recordings(recordings: Sequence[Recording], name: str | None = None) ->
 
     Parameters
     ----------
-    recordings : sequence of Recording
+    recordings : sequence of Recording or path
         With the same period and units.
     name : str, optional
         That of the first, and how many more there are, by default.
@@ -41,8 +45,9 @@ def join_recordings(recordings: Sequence[Recording], name: str | None = None) ->
     """
     if not recordings:
         raise InputError("there are no recordings to join")
-    first = recordings[0]
-    for other in recordings:
+    read = [recording_of(one) for one in recordings]
+    first = read[0]
+    for other in read:
         if abs(other.period_s / first.period_s - 1) > 1e-3:
             raise InputError(
                 f"{other.name} is sampled every {other.period_s:g} s and {first.name} every "
@@ -59,21 +64,21 @@ def join_recordings(recordings: Sequence[Recording], name: str | None = None) ->
                 f"{other.name}: {other.samples} samples are too few even for a piece; leave it "
                 f"out, or record at least {FEWEST_SAMPLES}"
             )
-    if len(recordings) == 1:
+    if len(read) == 1:
         return first
-    pieces = [piece for recording in recordings for piece in recording.pieces]
+    pieces = [piece for recording in read for piece in recording.pieces]
     ends = np.cumsum([piece.samples for piece in pieces])
-    notices = dict.fromkeys(notice for recording in recordings for notice in recording.notices)
+    notices = dict.fromkeys(notice for recording in read for notice in recording.notices)
     text = (
-        f"{len(recordings)} recordings are taken as one: "
-        f"{', '.join(recording.name for recording in recordings)}. What says that they differ "
+        f"{len(read)} recordings are taken as one: "
+        f"{', '.join(recording.name for recording in read)}. What says that they differ "
         "(a user, a configuration, a trial or a level of their own) keeps them apart."
     )
     return replace(
         first,
         force=np.concatenate([piece.force for piece in pieces]),
         position=np.concatenate([piece.position for piece in pieces]),
-        name=name or f"{first.name} and {len(recordings) - 1} more",
+        name=name or f"{first.name} and {len(read) - 1} more",
         notices=(*notices, Notice("note", "pieces", text)),
         joints=tuple(int(end) for end in ends[:-1]),
     )

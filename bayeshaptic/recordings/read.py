@@ -1,4 +1,4 @@
-"""Recordings and frequency responses from files and from arrays."""
+"""Recordings from files and from arrays."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from bayeshaptic.recordings.columns import (
 )
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.frf_table import frf_from_arrays
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.units import base_unit, choose_units
 
@@ -81,52 +79,13 @@ def read_recording(
             f"{path}: a table of a frequency response, not a recording; use read_frf or "
             "read_measurement"
         )
-    cut = _Cut(rows, seconds)
-    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
+    cut = Cut(rows, seconds)
+    return recorded(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
 
 
-@at_the_door
-def read_measurement(
-    path: str | os.PathLike[str],
-    columns: Columns = None,
-    period_s: float | None = None,
-    encoder_resolution: float | None = None,
-    name: str | None = None,
-    kind: str | None = None,
-    default_period_s: float | None = None,
-    rows: Span | None = None,
-    seconds: Span | None = None,
-) -> Recording | Etfe:
-    """A recording, or a frequency response where the file's columns are those of one.
-
-    Parameters
-    ----------
-    path, columns, period_s, encoder_resolution, name, kind, rows, seconds
-        See `read_recording`. A frequency response needs a period (see `read_frf`).
-    default_period_s : float or None
-        The period where the file has no time stamps, as a device file gives it; stamps come before
-        it.
-
-    Returns
-    -------
-    Recording or Etfe
-
-    Raises
-    ------
-    InputError
-        See `read_recording` and `read_frf`.
-    """
-    path = Path(path)
-    mapping = parse_columns(columns)
-    arrays = read_arrays(path)
-    if is_frequency_response(arrays, mapping):
-        if rows is not None or seconds is not None:
-            raise InputError(f"{path}: a table of a frequency response has no rows to cut")
-        return frf_from_arrays(path, arrays, mapping, period_s or default_period_s, kind=kind)
-    if period_s is None and pick(arrays, "time", mapping, path, required=False) is None:
-        period_s = default_period_s
-    cut = _Cut(rows, seconds)
-    return _recording(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
+def recording_of(given: Recording | str | os.PathLike[str]) -> Recording:
+    """The recording, read where it is a path."""
+    return given if isinstance(given, Recording) else read_recording(given)
 
 
 @at_the_door
@@ -208,7 +167,7 @@ def recording_from_arrays(
 
 
 @dataclass(frozen=True)
-class _Cut:
+class Cut:
     """The part of a file that is read; see `read_recording`."""
 
     rows: Span | None
@@ -238,7 +197,7 @@ class _Cut:
         return cut
 
 
-def _recording(
+def recorded(
     path: Path,
     arrays: Arrays,
     mapping: Mapping[str, Column],
@@ -246,8 +205,9 @@ def _recording(
     encoder_resolution: float | None,
     name: str | None,
     kind: str | None,
-    cut: _Cut,
+    cut: Cut,
 ) -> Recording:
+    """The recording in the arrays of a file; see `read_recording`."""
     signals: dict[str, NDArray[np.float64]] = {}
     units: dict[str, str | None] = {}
     for role in ("force", "position", "time"):

@@ -11,7 +11,8 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.known_limits import Reference
-from bayeshaptic.recordings.read import Columns, Span, read_measurement
+from bayeshaptic.recordings.measurement import read_measurement
+from bayeshaptic.recordings.read import Columns, Span
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 

@@ -26,6 +26,7 @@ from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
+from bayeshaptic.progress import told
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
@@ -131,7 +132,7 @@ def infer_population(
     users: Sequence[str],
     places: Sequence[float | str | None] | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Population:
     """Infer a population of hands from one posterior a recording.
 
@@ -148,7 +149,7 @@ def infer_population(
     places : sequence, optional
         In which configuration each was recorded.
     seed : int
-    progress : callable, optional
+    progress : callable, bool or None
         Called with the share done and a word about it.
 
     Returns
@@ -169,7 +170,7 @@ def infer_population(
     likelihood (`reweight`).
     """
     began = time.perf_counter()
-    report = progress or (lambda share, word: None)
+    report = told(progress) or (lambda share, word: None)
     model = common_model(posteriors)
     if not any(name in HAND for name in model.names):
         raise InputError(f"the {model.name} model has no hand: give posteriors of held devices.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.quantities import interval, pretty_unit, pure
+from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.periodic_excitation import estimate_periodic
 from bayeshaptic.recordings.response.random_excitation import estimate_random
@@ -139,7 +141,7 @@ class Etfe(Shown):
 @at_the_door
 @single_threaded
 def estimate_etfe(
-    recording: Recording,
+    recording: Recording | str | Path,
     band_hz: tuple[float, float] | None = None,
     *,
     minimum_lines: int | None = None,
@@ -148,7 +150,7 @@ def estimate_etfe(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or path
     band_hz : (low, high), optional
         Frequencies to use, Hz. By default chosen from the data: where the force has power and
         the response stands out of the noise.
@@ -166,6 +168,7 @@ def estimate_etfe(
     InputError
         When the recording is too short, the force has no power, or the band makes no sense.
     """
+    recording = recording_of(recording)
     if recording.joints:
         return _joined(recording, band_hz, minimum_lines)
     _check(recording, band_hz)

@@ -17,12 +17,14 @@ measurement says so.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.stability.relay.estimate import estimate, jackknife, oscillation_share
 from bayeshaptic.stability.relay.spectra import (
@@ -132,12 +134,12 @@ def _refuse_no_relay(force: Floats, position: Floats, name: str) -> None:
 
 
 @at_the_door
-def measure_relay(recording: Recording) -> RelayMeasurement:
+def measure_relay(recording: Recording | str | Path) -> RelayMeasurement:
     """Gain margin and frequency of a relay experiment.
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or path
         Force and position of a loop closed through a relay, the transient at the beginning
         included or not.
 
@@ -151,6 +153,7 @@ def measure_relay(recording: Recording) -> RelayMeasurement:
     InputError
         Where the recording is none of a relay, or nothing oscillates, or for too short to tell.
     """
+    recording = recording_of(recording)
     force, position = np.asarray(recording.force), np.asarray(recording.position)
     if np.ptp(force) == 0 or np.ptp(position) == 0:
         raise InputError(
