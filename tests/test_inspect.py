@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_readers import WRITERS, mapping_of
 
 from bayeshaptic import cli
 from bayeshaptic.recordings import read_recording, read_study
@@ -84,3 +85,14 @@ def test_a_study_is_written_with_what_a_person_says(
     assert 'columns = "time=t,force=iq*2.1[N],position=enc*1e-6[m]"' in study.read_text()
     assert "no column 'nothing'" in capsys.readouterr().out
     assert read_study(study).read_all()[0].force_unit == "N"
+
+
+@pytest.mark.parametrize("name", ["dspace.mat", "dspace73.mat"])
+def test_signals_are_suggested_by_their_own_names(tmp_path: Path, name: str) -> None:
+    WRITERS[name](tmp_path / name)
+    found = overview(tmp_path / name)
+    assert not {"rec.Y(1).Data", "rec.Y(2).Data"} & {one.name for one in found.columns}
+    recording = read_recording(tmp_path / name, found.mapping)
+    named = read_recording(tmp_path / name, mapping_of(name))
+    assert {found.roles["force"][:1], found.roles["position"][:1]} == {"u", "q"}
+    np.testing.assert_array_equal(recording.force, named.force)

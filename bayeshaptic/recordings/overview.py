@@ -92,8 +92,9 @@ def overview(path: Path) -> Overview:
     arrays = read_arrays(path)
     seen: dict[int, str] = {}
     for name, values in arrays.items():
-        if len(values) > 1:
-            seen.setdefault(id(values), name)
+        # Of several names the last is the signal's own, where it can be written in a mapping.
+        if len(values) > 1 and (id(values) not in seen or not set(name) & set(",[]")):
+            seen[id(values)] = name
     facts = [_facts(name, arrays[name]) for name in seen.values()]
     facts.sort(key=lambda one: -one.samples)
     return Overview(path, tuple(facts), _roles(facts), arrays)
@@ -151,8 +152,12 @@ def _roles(facts: list[ColumnFacts]) -> dict[str, str]:
 
 
 def _called(column: ColumnFacts, role: str) -> bool:
-    last = re.split(r"[/.]", name_and_unit(column.name)[0])[-1]
-    return re.search(_WORDS[role], last, re.I) is not None
+    """Whether the name says so: its last part, or an earlier one where that says nothing."""
+    for part in reversed(re.split(r"[/.]", name_and_unit(column.name)[0])):
+        says = {each for each, words in _WORDS.items() if re.search(words, part, re.I)}
+        if says:
+            return role in says
+    return False
 
 
 def _scale(role: str, column: ColumnFacts) -> str:

@@ -27,7 +27,7 @@ FEWEST_CHANGES = 20
 # Fewer tones than this leave more parameters than numbers.
 FEWEST_TONES = 5
 # Share of the recording that may pass without force, or without motion.
-MOST_IDLE = 1 / 3
+MOST_IDLE = 0.33
 _IDLE_S = 0.1
 _FAINT = 1e-4  # of the strongest line's power
 _WIDEST_TONE = 9  # lines that a Hann window spreads a tone over, and its wander

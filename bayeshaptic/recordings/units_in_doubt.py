@@ -52,11 +52,13 @@ def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]
         return []
     factor = min((1e-6, 1e-3, 1e3, 1e6), key=lambda f: abs(np.log(mass * f / usual)))
     smaller, larger = ("small", "large") if factor > 1 else ("large", "small")
-    named = {1e3: " (are they in mm?)", 1e6: " (are they in um?)"}.get(factor, "")
+    named = {1e3: "mm", 1e6: "um"}.get(factor) if recording.position_unit == "m" else None
+    asked = f" (are they in {named}?)" if named else ""
+    term = f"[{named}]" if named else f"*{1 / factor:g}[{recording.position_unit}]"
     times = max(factor, 1 / factor)
     text = (
         f"The device answers as {mass:.2g} {unit} would: a slip of units? With positions {times:g} "
-        f"times as {smaller}{named}, or forces {times:g} times as {larger}, it would be "
-        f"{mass * factor:.2g} {unit}. Give the units with --columns, as in position=NAME[mm]."
+        f"times as {smaller}{asked}, or forces {times:g} times as {larger}, it would be "
+        f"{mass * factor:.2g} {unit}. Give the units with --columns, as in position=NAME{term}."
     )
     return [Notice("warning", "units", text)]

@@ -175,4 +175,5 @@ def typed_columns(names: list[str], rows: list[list[str]]) -> Arrays:
     return columns
 
 
-READER = Reader("CSV", (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz"), read_delimited)
+_SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz", ".lvm")
+READER = Reader("CSV", _SUFFIXES, read_delimited)

@@ -95,6 +95,8 @@ def _names(
 
     def header(row: int) -> Fields | None:
         fields = fields_of(row) if row >= 0 else []
+        if len(fields) == width + 1 and fields[-1] == "Comment":  # LabVIEW's, which the rows lack
+            fields = fields[:-1]
         return fields if len(fields) in widths and not any(map(_is_number, fields)) else None
 
     above = header(first - 1)
