@@ -16,7 +16,7 @@ from bayeshaptic.effects.linear import (
     reflex,
     transmission_loss,
 )
-from bayeshaptic.effects.nonlinear import actuator, friction, springs
+from bayeshaptic.effects.nonlinear import actuator, friction, gravity, springs
 from bayeshaptic.effects.registry import register, registered
 from bayeshaptic.errors import InputError
 
@@ -33,6 +33,7 @@ OWN = (
     actuator,
     friction,
     springs,
+    gravity,
     measurement,
 )
 

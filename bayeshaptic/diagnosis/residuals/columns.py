@@ -16,6 +16,7 @@ from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import COMMAND, LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
 from bayeshaptic.inference.fit import Fit
+from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
@@ -109,16 +110,39 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
     """Position and velocity of the motor without encoder noise.
 
     What the command does comes from the model; what a hand does besides is taken from the
-    measured position below 20 Hz, where the encoder sees it well.
+    measured position below 20 Hz, where the encoder sees it well, and of a free device how it began
+    and what a constant force does: friction has a sign where it slides along with that.
     """
     force = recording.force - recording.force.mean()
-    x, v = linear_motion(fit.model.system(fit.theta), force, recording.period_s)
+    system = fit.model.system(fit.theta)
+    x, v = linear_motion(system, force, recording.period_s)
     if fit.model.name == "grasped":
         rest = recording.position - recording.position.mean() - x
         rate = 1 / recording.period_s
         low = butter(4, min(_HAND_HZ, 0.4 * rate), fs=rate, output="sos")
         v = v + np.gradient(sosfiltfilt(low, rest), recording.period_s)
+    else:
+        v = v + drift_velocity(system, recording.position - x, recording.period_s)
     return x, v
+
+
+def drift_velocity(system: LinearSystem, besides: Floats, period_s: float) -> Floats:
+    """Velocity of a free device from how it began and from a constant force.
+
+    Nobody knows either, and the spectra do not; the position besides what the command does tells.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        A batch of one.
+    besides : ndarray, shape (N,)
+        The measured position less that of the command.
+    period_s : float
+    """
+    steady = np.ones(len(besides))
+    x, v = linear_motion(system, steady, period_s)
+    weights = np.linalg.lstsq(np.stack([steady, x, v], axis=1), besides, rcond=None)[0]
+    return np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
 
 
 def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped-def]

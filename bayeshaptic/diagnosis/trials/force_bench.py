@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from bayeshaptic.diagnosis.residuals.columns import line_transform
+from bayeshaptic.diagnosis.residuals.columns import drift_velocity, line_transform
 from bayeshaptic.diagnosis.state import FIT, State, log_likelihoods, share
 from bayeshaptic.effects.nonlinear.internal_force import (
     CONNECTION,
@@ -108,15 +108,8 @@ class ForceBench:
         return np.gradient(sosfiltfilt(low, besides), 1 / rate)
 
     def _drift(self, besides: Floats, theta: Floats) -> Floats:
-        """Velocity of a free device from how it began and from a constant force.
-
-        Nobody knows either; friction depends on it, and the spectra do not.
-        """
-        period = self.recording.period_s
-        steady = np.ones(len(besides))
-        x, v = linear_motion(self.model.system(theta), steady, period)
-        weights = np.linalg.lstsq(np.stack([steady, x, v], axis=1), besides, rcond=None)[0]
-        return weights[1] * v + weights[2] * np.gradient(v, period)
+        """Velocity of a free device from how it began and from a constant force."""
+        return drift_velocity(self.model.system(theta), besides, self.recording.period_s)
 
     def added_motion(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Floats:
         """What the force adds to the motor's position at the samples, shape (N,)."""

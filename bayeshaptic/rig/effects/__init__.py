@@ -15,8 +15,10 @@ from bayeshaptic.rig.effects.friction import CoulombFriction, DahlFriction, Stri
 from bayeshaptic.rig.effects.hand import GripDrift, Reflex
 from bayeshaptic.rig.effects.nonlinear import (
     Backlash,
+    ConstantForce,
     Drag,
     ForceRipple,
+    Gravity,
     HardeningConnection,
     HardeningSpring,
 )
@@ -36,6 +38,7 @@ __all__ = [
     "Backlash",
     "BaseCompliance",
     "CentringStiffness",
+    "ConstantForce",
     "CoulombFriction",
     "DahlFriction",
     "Drag",
@@ -44,6 +47,7 @@ __all__ = [
     "ExtraDelay",
     "ForceRipple",
     "GainDrift",
+    "Gravity",
     "GripDrift",
     "HardeningConnection",
     "HardeningSpring",

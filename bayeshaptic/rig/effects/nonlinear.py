@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -94,6 +95,43 @@ class ForceRipple(Effect):
 
     def build(self, structure: Structure) -> None:
         law = Ripple(self.amplitude, self.pitch, self.phase)
+        structure.laws.append(NodeLaw(structure.motor, FRAME, law))
+
+
+@register
+@dataclass(frozen=True)
+class Gravity(Effect):
+    """A weight on a turning part: -torque sin(x - hangs_at) on the motor, x in radians."""
+
+    name: ClassVar[str] = "gravity"
+    at_least_zero: ClassVar[tuple[str, ...]] = ("torque",)
+    torque: float = 0.05
+    hangs_at: float = 0.0
+
+    @classmethod
+    def typical(cls, scales: Scales) -> Gravity:
+        return cls(0.5 * scales.force)
+
+    def build(self, structure: Structure) -> None:
+        law = Ripple(-self.torque, 2 * math.pi, -self.hangs_at)
+        structure.laws.append(NodeLaw(structure.motor, FRAME, law))
+
+
+@register
+@dataclass(frozen=True)
+class ConstantForce(Effect):
+    """A force on the motor that never changes: a spring far away, a weight on a straight axis."""
+
+    name: ClassVar[str] = "constant_force"
+    force: float = 0.2
+
+    @classmethod
+    def typical(cls, scales: Scales) -> ConstantForce:
+        return cls(0.2 * scales.force)
+
+    def build(self, structure: Structure) -> None:
+        # A wave so long that it stays where it begins.
+        law = Ripple(self.force, 1e9, 0.5 * math.pi)
         structure.laws.append(NodeLaw(structure.motor, FRAME, law))
 
 
