@@ -127,7 +127,7 @@ class ConstantForce(Effect):
 
     @classmethod
     def typical(cls, scales: Scales) -> ConstantForce:
-        return cls(0.2 * scales.force)
+        return cls(0.03 * scales.force)
 
     def build(self, structure: Structure) -> None:
         # A wave so long that it stays where it begins.
