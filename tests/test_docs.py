@@ -33,7 +33,8 @@ def blocks(page: Path, language: str) -> list[str]:
 
 
 def with_snippets() -> list[Path]:
-    return [page for page in PAGES if blocks(page, "python")]
+    own = ROOT / "CONTRIBUTING.md"  # a test of its own
+    return [page for page in PAGES if page != own and blocks(page, "python")]
 
 
 @pytest.mark.parametrize("page", with_snippets(), ids=lambda page: str(page.relative_to(ROOT)))
@@ -45,6 +46,41 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
     script = tmp_path / "snippets.py"
     script.write_text(code, encoding="utf-8")
     command = [sys.executable, "-W", "error", "-W", "ignore::FutureWarning", str(script)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
+USED = """
+import bayeshaptic as bh
+from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.effects.laws import fitted
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.shapes import Usual
+from bayeshaptic.recordings import register_reader
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+
+bench = Bench.from_device("lhifam").with_effect("extra_delay")
+low, high = bench.band_hz
+made = simulate(bench, WhiteNoise(bench.force_rms, high, low, 8.0), seed=1)
+time = bench.period_s * np.arange(len(made.force))
+np.column_stack([time, made.force, 1e3 * made.position]).astype("<f4").tofile("x.raw")
+register_reader(READER)
+columns = "time=time_s,force=force_n[N],position=position_m[mm]"
+recording = bh.read_recording("x.raw", columns=columns)
+etfe = bh.estimate_etfe(recording)
+
+found = trace(etfe, bh.least_squares(bh.free(device="lhifam"), etfe)).state.accepted[0]
+assert "late_sensor" in (found.name, *found.ties)
+assert "rounded_friction" in dict(fitted(MOTOR, Usual(1.0, 1.0, "m")))
+values = dict.fromkeys(THREE.names, np.ones(1))
+assert THREE.build(values).state_matrix().shape == (1, 6, 6)
+"""
+
+
+def test_what_contributing_adds_works(tmp_path: Path) -> None:
+    """Its snippets, and then what they add is used: a reader, a model, an effect, a law."""
+    code = "\n".join(blocks(ROOT / "CONTRIBUTING.md", "python")) + USED
+    command = [sys.executable, "-W", "error", "-W", "ignore::FutureWarning", "-c", code]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
 
