@@ -8,9 +8,10 @@ from scipy.integrate import quad
 from scipy.stats import kstest, multivariate_t
 from scipy.stats import t as student_t
 
-from bayeshaptic.inference.sampling.importance import adapt
+from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.numerics.mixture import StudentMixture, fit_student_mixture, student
 from bayeshaptic.numerics.straightening import nothing_to_straighten, straighten
+from bayeshaptic.numerics.weights import effective, normalised, tempered
 
 
 def two_humps(size: int = 2, freedom: float = 8.0) -> StudentMixture:
@@ -97,44 +98,34 @@ def test_points_on_a_line_do_not_break_a_fit():
     assert np.isfinite(fitted.sample(rng, 10)).all()
 
 
-def test_adapting_finds_a_density_that_the_first_guess_hardly_knows():
+def test_weights_are_tempered_until_enough_points_count():
+    """One may be heavier than the others by more than a number can hold."""
+    log_weights = np.concatenate([[0.0], -1e6 - np.arange(499.0)])
+    weights = tempered(log_weights, 100.0)
+    assert weights.sum() == pytest.approx(1.0)
+    assert effective(weights) >= 100.0
+    even = tempered(np.zeros(500), 100.0)
+    assert effective(even) == pytest.approx(500.0)
+    assert np.isfinite(normalised(np.full(5, -np.inf))).all()
+
+
+def test_warming_up_finds_a_density_that_the_first_guess_hardly_knows():
     target = two_humps(4)
     first = student(np.full(4, 3.0), 16 * np.eye(4))
-    adapted = adapt(target.log_density, first, np.random.default_rng(7))
-    assert adapted.efficiency > 0.5
-    assert adapted.weights.sum() == pytest.approx(1.0)
-    assert adapted.weights @ adapted.points == pytest.approx(np.full(4, 1.8), abs=0.2)
+    seed = np.random.SeedSequence(7)
+    ensembles = warmed_up(target.log_density, first, seed, np.full(4, 3.0))
+    chains, _ = ensembles.advance(400)
+    assert chains.mean(axis=(0, 1, 2)) == pytest.approx(np.full(4, 1.8), abs=0.2)
 
 
-def test_adapting_leaves_a_good_guess_alone():
-    target = student(np.zeros(3), np.eye(3), 50.0)
-    guess = student(np.zeros(3), 1.1 * np.eye(3))
-    assert adapt(target.log_density, guess, np.random.default_rng(8)).proposal is guess
-
-
-def test_adapting_survives_a_guess_outside_the_support():
+def test_warming_up_survives_a_guess_outside_the_support():
     def target(x):
         return np.where(np.all(x > 5, axis=1), -0.5 * np.sum(x**2, axis=1), -np.inf)
 
     guess = student(np.zeros(2), np.eye(2))
-    adapted = adapt(target, guess, np.random.default_rng(9))
-    assert np.isfinite(adapted.weights).all()
-    nowhere = adapt(lambda x: np.full(len(x), -np.inf), guess, np.random.default_rng(9))
-    assert np.isfinite(nowhere.weights).all()
-
-
-def test_one_point_that_outweighs_all_others_by_far_decides_nothing():
-    """Heavier by more than a number can hold: log weights hundreds apart."""
-    guess = student(np.zeros(3), np.eye(3))
-
-    def narrow(x):
-        return -0.5e8 * np.sum((x - 2.0) ** 2, axis=1)
-
-    adapted = adapt(narrow, guess, np.random.default_rng(16))
-    assert np.isfinite(adapted.points).all()
-    # The proposals have moved towards the peak, instead of collapsing on the best point so far.
-    assert np.linalg.norm(adapted.points[-2000:].mean(axis=0) - 2.0) < 1.5
-    assert adapted.points[-2000:].std(axis=0).min() > 1e-3
+    ensembles = warmed_up(target, guess, np.random.SeedSequence(9), np.full(2, 6.0))
+    chains, _ = ensembles.advance(50)
+    assert (chains > 5).all()
 
 
 def test_a_fit_to_one_point_is_that_point():

@@ -17,7 +17,6 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.ensembles import LogDensity, warmed_up
-from bayeshaptic.inference.sampling.importance import adapt
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
 from bayeshaptic.inference.sampling.run import Run, run_until_done
@@ -64,10 +63,10 @@ def sample(
 ) -> Posterior:
     """Draw from the posterior of `model`'s parameters given `etfe`.
 
-    A Student t proposal is fitted to the peak, adapted by importance sampling and by a warm-up,
-    and frozen; four independent emcee ensembles of 64 walkers then run until R-hat between
-    ensembles is below 1.01 and every parameter has `ess` effective draws, bulk and tail.  They are
-    looked at where they have grown by up to twice.
+    A Student t proposal is fitted to the peak, adapted by a warm-up, and frozen; four independent
+    emcee ensembles of 64 walkers then run until R-hat between ensembles is below 1.01 and every
+    parameter has `ess` effective draws, bulk and tail.  They are looked at where they have grown by
+    up to twice.
 
     Parameters
     ----------
@@ -132,12 +131,10 @@ def sample(
 
     run = checkpoint.read(restore)
     if run is None:
-        tune, warm, refit = np.random.SeedSequence(seed).spawn(3)
+        warm, refit = np.random.SeedSequence(seed).spawn(2)
         peak, proposal = laplace(density, origin)
-        report(0.1, "adapting the proposal")
-        adapted = adapt(counted, proposal, np.random.default_rng(tune))
-        report(0.2, "warming up")
-        ensembles = warmed_up(counted, adapted, warm, peak, redraw)
+        report(0.1, "warming up")
+        ensembles = warmed_up(counted, proposal, warm, peak, redraw)
         run = Run(ensembles, np.random.default_rng(refit))
     verdict = run_until_done(
         run,

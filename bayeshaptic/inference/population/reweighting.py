@@ -26,7 +26,6 @@ from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.sampler import TOLERABLE, run_ensembles
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.ensembles import warmed_up
-from bayeshaptic.inference.sampling.importance import adapt
 from bayeshaptic.numerics.mixture import student
 from bayeshaptic.numerics.pareto import pareto_k
 from bayeshaptic.numerics.weights import effective, normalised, tempered
@@ -252,7 +251,7 @@ def _sampled(
     mean = weight @ x
     off = x - mean
     first = student(mean, (weight[:, None] * off).T @ off, 8.0)
-    ensembles = warmed_up(density, adapt(density, first, rng), seed)
+    ensembles = warmed_up(density, first, seed, x[int(np.argmax(density(x)))])
     proposal = ensembles.proposal
     y = proposal.mixture.sample(rng, int(_PROPOSED * count))
     x = proposal.straightening.bent(y)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.inference.sampling.importance import Adapted
 from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.numerics.mixture import StudentMixture, fit_student_mixture, student
 from bayeshaptic.numerics.straightening import Straightening, nothing_to_straighten, straighten
@@ -148,27 +147,24 @@ class Ensembles:
 
 def warmed_up(
     density: LogDensity,
-    adapted: Adapted,
+    first: StudentMixture,
     seed: np.random.SeedSequence,
-    peak: Floats | None = None,
+    peak: Floats,
     redraw: Redraw | None = None,
 ) -> Ensembles:
     """Ensembles that have forgotten their starts, with one proposal, refitted and frozen.
 
-    Each begins at its own widened draws, so that R-hat between them can see a second mode; where
-    these miss the support, near `peak` (by default the heaviest point).  After
-    each round of warm-up the proposal is fitted to where the walkers have been.  Rounds follow
+    Each begins at its own draws of a `first` proposal, so that R-hat between them can see a second
+    mode; where these miss the support, near `peak`.  After each round of warm-up the proposal is
+    fitted to where the walkers have been.  Rounds follow
     while the walkers, out of the sample that the proposal was fitted to, accept it too rarely,
     until neither that nor their density improves any more.
     """
     *seeds, last = seed.spawn(ENSEMBLES + 1)
     rng = np.random.default_rng(last)
-    size = adapted.points.shape[1]
-    if peak is None:
-        peak = adapted.points[int(np.argmax(adapted.weights))]
-    starts = [_spread_start(density, adapted, peak, np.random.default_rng(own)) for own in seeds]
-    archive = adapted.points[rng.choice(len(adapted.points), _ARCHIVE, p=adapted.weights)]
-    proposal = Proposal(nothing_to_straighten(size), adapted.proposal, archive)
+    size = len(peak)
+    starts = [_spread_start(density, first, peak, np.random.default_rng(own)) for own in seeds]
+    proposal = Proposal(nothing_to_straighten(size), first, first.sample(rng, _ARCHIVE))
     state = np.random.RandomState(np.random.MT19937(last)).get_state()
     ensembles = Ensembles(density, proposal, _WARM, np.concatenate(starts), state, redraw)
     best, level, idle = 0.0, -np.inf, 0
@@ -253,7 +249,7 @@ def _acceptance(
 
 
 def _spread_start(
-    density: LogDensity, adapted: Adapted, peak: Floats, rng: np.random.Generator
+    density: LogDensity, first: StudentMixture, peak: Floats, rng: np.random.Generator
 ) -> Floats:
     """Walkers where the density is positive: from the proposal, which is wider than the target.
 
@@ -262,7 +258,7 @@ def _spread_start(
     start = np.empty((0, len(peak)))
     for attempt in range(200):
         shrink = 0.8 ** max(attempt - 20, 0)
-        drawn = peak + shrink * (adapted.proposal.sample(rng, 4 * WALKERS) - peak)
+        drawn = peak + shrink * (first.sample(rng, 4 * WALKERS) - peak)
         start = np.concatenate([start, drawn[np.isfinite(density(drawn))]])
         if len(start) >= WALKERS:
             break
