@@ -28,6 +28,7 @@ PRIORS = [
     HalfNormal(2.5),
     NearZero(2.5, 0.1),
     NearZero(0.017, 1.7e-8),
+    NearZero(0.017, 1.7e-8, 0.25),
     Normal(200e-6, 20e-6),
     Normal(1.0, 2.0, low=0.0),
     Normal(-1.0, 0.5, low=0.0),  # all but cut off
@@ -181,6 +182,7 @@ def test_reach_of_a_fit_is_the_priors():
         ({"median": 2.0, "log_sd": 0.3}, LogNormal(2.0, 0.3)),
         ({"scale": 2}, HalfNormal(2.0)),
         ({"scale": 2, "floor": 1e-3}, NearZero(2.0, 1e-3)),
+        ({"scale": 2, "floor": 1e-3, "rise": 0.5}, NearZero(2.0, 1e-3, 0.5)),
         ({"mean": 1.0, "sd": 0.1}, Normal(1.0, 0.1)),
         ({"mean": 1.0, "sd": 0.1, "low": 0}, Normal(1.0, 0.1, 0.0)),
         ({"low": 1, "high": 2}, Uniform(1.0, 2.0)),
@@ -217,6 +219,7 @@ def test_bad_tables_name_the_parameter(table):
         (HalfNormal, (-1.0,)),
         (NearZero, (1.0, 0.0)),
         (NearZero, (1.0, 2.0)),
+        (NearZero, (1.0, 1e-3, 1.0)),
         (NearZero, (np.nan, 1e-3)),
         (Normal, (0.0, 0.0)),
         (Uniform, (1.0, 1.0)),

@@ -31,6 +31,9 @@ HAND_LOG_SD = 0.7
 DAMPER_SCALE = 2.0
 # One that the file gives as zero was not seen: it may be as small as this share of that.
 DAMPER_FLOOR = 1e-6
+# Where nobody said zero, four times as much lies next to it as in a factor e above: between what
+# pushes away from a damper of zero (1) and what pulls a small one there (0).
+DAMPER_RISE = 0.25
 # A free delay lies within a few periods.
 FREE_DELAY_PERIODS = 2.0
 

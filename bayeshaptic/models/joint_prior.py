@@ -38,7 +38,7 @@ class JointPrior:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             log = np.log(x + shift)
             u = (np.where(self.logarithmic, log, x) - centre) * inverse_sd
-            density = constant - 0.5 * u * u - np.where(weight > 0, log, 0.0)
+            density = constant - 0.5 * u * u - np.where(weight > 0, weight * log, 0.0)
         total: Floats = np.where((x >= low) & (x <= high), density, -np.inf).sum(axis=1)
         for column, prior in zip(self.alone, self.others, strict=True):
             total += prior.log_density(theta[:, column])
@@ -49,9 +49,7 @@ def joint_prior(priors: Sequence[Prior]) -> JointPrior:
     """The product of `priors`, a parameter each."""
     terms = [getattr(prior, "terms", None) for prior in priors]
     known = [term for term in terms if term is not None]
-    numbers = (
-        (t.low, t.high, t.shift, t.centre, 1 / t.sd, float(t.over_x), t.constant) for t in known
-    )
+    numbers = ((t.low, t.high, t.shift, t.centre, 1 / t.sd, t.over_x, t.constant) for t in known)
     return JointPrior(
         np.flatnonzero([term is not None for term in terms]),
         np.flatnonzero([term is None for term in terms]),

@@ -53,7 +53,7 @@ def draw(prior: Prior, rng: np.random.Generator, size: int) -> Floats:
 class Terms:
     """What a log density is made of, for `joint_prior.py`: between `low` and `high`
 
-        constant - ((t - centre) / sd)^2 / 2 - [log(x + shift) if over_x],
+        constant - ((t - centre) / sd)^2 / 2 - over_x log(x + shift),
 
     t = log(x + shift) where it is `logarithmic`, and x where not.
     """
@@ -64,7 +64,7 @@ class Terms:
     centre: float = 0.0
     sd: float = np.inf
     logarithmic: bool = False
-    over_x: bool = False
+    over_x: float = 0.0
     shift: float = 0.0
 
     def __call__(self, x: ArrayLike) -> Floats:
@@ -73,7 +73,7 @@ class Terms:
         with np.errstate(divide="ignore", invalid="ignore"):
             log = np.log(x + self.shift)
             u = ((log if self.logarithmic else x) - self.centre) / self.sd
-            density = self.constant - 0.5 * u * u - (log if self.over_x else 0.0)
+            density = self.constant - 0.5 * u * u - (self.over_x * log if self.over_x else 0.0)
         return np.where((x >= self.low) & (x <= self.high), density, -np.inf)
 
 
@@ -108,7 +108,7 @@ class LogNormal(_ByTerms):
         constant = -np.log(self.log_sd) - _LOG_SQRT_2PI
         smallest = float(np.nextafter(0.0, 1.0))
         centre = float(np.log(self.median))
-        return Terms(smallest, np.inf, constant, centre, self.log_sd, True, True)
+        return Terms(smallest, np.inf, constant, centre, self.log_sd, True, 1.0)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return self.median * np.exp(self.log_sd * ndtri(np.asarray(p, float)))
@@ -144,15 +144,19 @@ class HalfNormal(_ByTerms):
 
 @dataclass(frozen=True)
 class NearZero(_ByTerms):
-    """Density proportional to exp(-x^2 / (2 scale^2)) / (x + floor): for dampers seen as zero.
+    """Density proportional to exp(-x^2 / (2 scale^2)) / (x + floor)^(1 - rise): dampers, maybe 0.
 
     A published zero says that nothing was seen, not how little there is.  Between `floor` and
     `scale` every factor is alike, so that on whatever scale the data tell zero from something,
     much of the probability lies next to zero; a half-normal is flat there and pushes away from it.
+    With a `rise`, below one, every factor e has exp(rise) times the probability of the one below
+    it: where nobody said zero, next to it lies 1 / rise times what is in a factor e above it, on
+    whatever scale.
     """
 
     scale: float
     floor: float
+    rise: float = 0.0
     coordinate = "linear"
     support = (0.0, np.inf)
 
@@ -162,33 +166,36 @@ class NearZero(_ByTerms):
             raise InputError(
                 f"NearZero needs a floor below its scale, by a factor of 1e12 at most; got {self}."
             )
+        if not 0 <= self.rise < 1:
+            raise InputError(f"NearZero needs a rise of at least 0 and below 1; got {self}.")
 
     @property
     def terms(self) -> Terms:
-        constant = -np.log(_near_zero(self.floor / self.scale)[0])
-        return Terms(0.0, np.inf, constant, sd=self.scale, over_x=True, shift=self.floor)
+        whole = _near_zero(self.floor / self.scale, self.rise)[0]
+        constant = -np.log(whole) - self.rise * np.log(self.floor)
+        over = 1 - self.rise
+        return Terms(0.0, np.inf, constant, sd=self.scale, over_x=over, shift=self.floor)
 
     def quantile(self, p: ArrayLike) -> Floats:
-        _, factors, below = _near_zero(self.floor / self.scale)
+        _, factors, below = _near_zero(self.floor / self.scale, self.rise)
         return self.floor * np.expm1(np.interp(np.asarray(p, float), below, factors))
 
     def describe(self, unit: str) -> str:
+        of = f"x^{self.rise - 1:.3g}" if self.rise else "log-uniform"
         return (
-            f"near zero: log-uniform from {self.floor:.3g} to {self.scale:.3g} {unit} with soft "
+            f"near zero: {of} from {self.floor:.3g} to {self.scale:.3g} {unit} with soft "
             "ends, zero included"
         )
 
 
 @lru_cache(maxsize=64)
-def _near_zero(ratio: float) -> tuple[float, Floats, Floats]:
+def _near_zero(ratio: float, rise: float) -> tuple[float, Floats, Floats]:
     """The integral of a `NearZero` density; log(1 + x / floor) with the probability below it."""
     from scipy.integrate import cumulative_simpson
 
     factors = np.linspace(0.0, np.log1p(9.0 / ratio), 20_001)
-    below = cumulative_simpson(
-        np.exp(-0.5 * (ratio * np.expm1(factors)) ** 2), x=factors, initial=0.0
-    )
-    below = np.maximum.accumulate(below)
+    density = np.exp(rise * factors - 0.5 * (ratio * np.expm1(factors)) ** 2)
+    below = np.maximum.accumulate(cumulative_simpson(density, x=factors, initial=0.0))
     return float(below[-1]), factors, below / below[-1]
 
 
@@ -276,7 +283,7 @@ class LogUniform(_ByTerms):
     @property
     def terms(self) -> Terms:
         constant = -np.log(np.log(self.high / self.low))
-        return Terms(self.low, self.high, constant, over_x=True)
+        return Terms(self.low, self.high, constant, over_x=1.0)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return self.low * (self.high / self.low) ** np.asarray(p, float)
@@ -289,6 +296,7 @@ _FORMS: dict[frozenset[str], type] = {
     frozenset({"median", "log_sd"}): LogNormal,
     frozenset({"scale"}): HalfNormal,
     frozenset({"scale", "floor"}): NearZero,
+    frozenset({"scale", "floor", "rise"}): NearZero,
     frozenset({"mean", "sd"}): Normal,
     frozenset({"mean", "sd", "low"}): Normal,
     frozenset({"low", "high"}): Uniform,
@@ -298,7 +306,8 @@ _FORMS: dict[frozenset[str], type] = {
 def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     """The prior that a ``[prior]`` table of a study declares for the parameter `name`.
 
-    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{scale, floor}`` near zero,
+    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{scale, floor}`` (and ``rise``)
+    near zero,
     ``{mean, sd}`` (and ``low``) normal, ``{low, high}`` uniform, and ``{low, high, log = true}``
     log-uniform.
 

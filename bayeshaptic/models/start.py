@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayeshaptic.models.build import DAMPER_FLOOR, delay_prior
+from bayeshaptic.models.build import DAMPER_FLOOR, DAMPER_RISE, delay_prior
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.prior import LogNormal, NearZero, Prior, draw
 from bayeshaptic.models.structures import GROUND_DAMPERS, HAND
@@ -104,7 +104,7 @@ def _hand_priors(mass: float) -> dict[str, Prior]:
 def _weak_prior(name: str, dimension: str, found: Scales, period_s: float) -> Prior:
     if name in GROUND_DAMPERS:
         scale = 0.5 * found.mass * found.middle
-        return NearZero(scale, DAMPER_FLOOR * scale)
+        return NearZero(scale, DAMPER_FLOOR * scale, DAMPER_RISE)
     if dimension == "mass":
         return LogNormal(found.mass, 2.0)
     if dimension == "damping":
