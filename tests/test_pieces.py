@@ -10,7 +10,9 @@ import pytest
 import bayeshaptic as bh
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.inference.time_domain.days import between_pieces
 from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.inference.time_domain.uneven import Ridge
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.join import unbroken
@@ -80,6 +82,31 @@ def test_short_steps_under_a_controller_count_together(series: list[Recording]) 
     assert apart.max() < 3.4  # 99 % of a Student t with eight degrees of freedom
     alone = fit_motion(series[2])
     assert np.all(found.sd[:2] < alone.sd[:2])
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.5])
+def test_friction_that_differs_between_pieces_is_in_the_widths(spread: float) -> None:
+    rng = np.random.default_rng(3)
+    pieces = [slice(start, start + 50) for start in range(0, 600, 50)]
+    estimates, told = [], []
+    for _ in range(300):
+        columns = np.zeros((600, 1 + len(pieces)))
+        columns[:, 0] = rng.standard_normal(600)
+        for number, piece in enumerate(pieces):
+            columns[piece, 1 + number] = 1.0
+        friction = 2.0 + spread * np.repeat(rng.standard_normal(len(pieces)), 50)
+        target = friction * columns[:, 0] + rng.standard_normal(600)
+        inverse = np.linalg.inv(columns.T @ columns)
+        solution = inverse @ columns.T @ target
+        none = np.zeros(columns.shape[1])
+        found = Ridge(solution, inverse, none, none, 13.0)
+        own = [np.array([1 + number]) for number in range(len(pieces))]
+        left = target - columns @ solution
+        added = between_pieces(columns, left, found, pieces, np.array([0]), own, 600.0)
+        told.append(inverse[0, 0] + added[0, 0])
+        estimates.append(solution[0])
+    # 300 estimates know their variance to 8 %; that of the spread is meant to be a little large.
+    assert 0.75 < np.mean(told) / np.var(estimates) < 1.6
 
 
 def test_short_steps_become_a_limit(series: list[Recording]) -> None:

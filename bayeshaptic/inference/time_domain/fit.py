@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.days import between_pieces
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
 from bayeshaptic.inference.time_domain.loop import Loop
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, Way, ridge
@@ -159,7 +160,12 @@ def _fit(loop: Loop, start: Floats, name: str) -> _Found:
                 break
     error, columns, solved = _linearised(loop, values, uneven, True, name)
     left = error + columns[:, plain:] @ uneven - columns @ solved.solution
-    spread = covariance(columns, left, solved, loop.independent)[:plain, :plain]
+    spread = covariance(columns, left, solved, loop.independent)
+    friction = np.array([NAMES.index("b"), NAMES.index("coulomb")])
+    own = loop.pieces, friction, loop.beginnings
+    spread = (spread + between_pieces(columns, left, solved, *own, loop.independent))[
+        :plain, :plain
+    ]
     best = values + solved.solution[:plain]
     return _Found(best, values, uneven, spread, error, solved, converged)
 

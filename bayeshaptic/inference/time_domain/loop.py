@@ -9,7 +9,7 @@ import numpy as np
 from bayeshaptic.inference.time_domain.follower import Follower, spring_and_damper
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
 
 SHARED = 5  # mass, damping, dry friction, constant force, delay: the same in all pieces
 _LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
@@ -69,13 +69,20 @@ class Loop:
         return np.append(_LOWEST, np.full(self.plain - SHARED, -np.inf))
 
     @property
-    def _pieces(self) -> list[slice]:
+    def pieces(self) -> list[slice]:
+        """Where the pieces are."""
         edges = (0, *self.joints, len(self.force))
         return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
 
+    @property
+    def beginnings(self) -> list[Ints]:
+        """Which values are position and velocity at a piece's beginning."""
+        firsts = range(SHARED, self.plain, 2)
+        return [np.array([first, first + 1]) for first in firsts]
+
     def begun(self, shared: Floats) -> Floats:
         """Values with the pieces' beginnings as measured, at rest; shape (plain,)."""
-        first = self.position[[piece.start for piece in self._pieces]]
+        first = self.position[[piece.start for piece in self.pieces]]
         return np.append(shared, np.stack([first, np.zeros_like(first)], axis=1))
 
     @property
@@ -104,7 +111,7 @@ class Loop:
         forward, backward = uneven.reshape(2, WAVES) @ self.shapes
         above, below = self.follower.above, self.follower.below
         simulated = np.empty_like(self.position)
-        for number, piece in enumerate(self._pieces):
+        for number, piece in enumerate(self.pieces):
             first = SHARED + 2 * number
             with np.errstate(all="ignore"):
                 simulated[piece] = follow(
@@ -145,7 +152,7 @@ class Loop:
             if i < SHARED:
                 out[:, i] = slope
                 continue
-            for column, piece in zip(moved, self._pieces, strict=True):
+            for column, piece in zip(moved, self.pieces, strict=True):
                 out[piece, column] = slope[piece]
         for i in range(2 * WAVES):
             more = uneven.copy()
