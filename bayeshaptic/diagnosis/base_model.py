@@ -16,6 +16,8 @@ from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
 from bayeshaptic.inference.fit import MISFIT
 
+_OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
+
 
 def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced]:
     """Close the loop, on every base model in question where the chosen one misfits.
@@ -32,15 +34,16 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
         With the base model whose explanation is the best.
     traced : Traced
     """
-    own = trace(begun.etfe, begun.fit, options.report, options.budget_s)
     rivals = _rivals(begun)
+    share = _OWN if rivals else 1.0
+    own = trace(begun.etfe, begun.fit, options.report, share * options.budget_s)
     if not rivals or not own.state.accepted or _is_the_least(own, begun, rivals):
         return begun, own
     found = {begun.fit.model.name: (begun, own)}
     for name in rivals:
         other = replace(begun, fit=begun.choice.candidates[name].fit)  # type: ignore[union-attr]
-        spent = options.budget_s / 2  # a wrong base finds much to try
-        found[name] = other, trace(other.etfe, other.fit, options.report, spent)
+        rest = (1 - share) * options.budget_s / len(rivals)
+        found[name] = other, trace(other.etfe, other.fit, options.report, rest)
     noise = max(1.0, min(t.state.fit.reduced_chi_square for _, t in found.values()))
     best = min(found, key=lambda name: _rank(found[name][1], noise))
     begun, traced = found[best]

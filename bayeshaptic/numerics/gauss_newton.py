@@ -22,6 +22,15 @@ def jacobian(residuals: Residuals, phi: Floats, at: Floats | None = None) -> Flo
     return np.transpose((shifted - at[:, None, :]) / _STEP, (0, 2, 1))
 
 
+def with_slopes(residuals: Residuals, phi: Floats) -> tuple[Floats, Floats]:
+    """Residuals (B, N) and their forward differences (B, N, P), in one call: the same numbers."""
+    count, size = phi.shape
+    points = np.repeat(phi, size + 1, axis=0).reshape(count, size + 1, size)
+    points[:, np.arange(size), np.arange(size)] += _STEP
+    all_ = residuals(points.reshape(-1, size)).reshape(count, size + 1, -1)
+    return all_[:, -1], np.transpose((all_[:, :-1] - all_[:, -1:]) / _STEP, (0, 2, 1))
+
+
 def minimise(
     residuals: Residuals, start: Floats, low: Floats, high: Floats, steps: int, tolerance: float
 ) -> tuple[Floats, Floats]:
@@ -48,20 +57,19 @@ def minimise(
         Half the sum of squares.
     """
     phi = np.clip(start, low, high)
-    value = residuals(phi)
+    value, slope = with_slopes(residuals, phi)
     cost = _half_square(value)
     damping = np.full(len(phi), 1e-2)
     open_ = np.arange(len(phi))  # starts that still move
     for _ in range(steps):
-        here, there = phi[open_], value[open_]
-        slope = jacobian(residuals, here, there)
-        step = _damped_step(slope, there, damping[open_], here, low, high)
+        here = phi[open_]
+        step = _damped_step(slope[open_], value[open_], damping[open_], here, low, high)
         trial = np.clip(here + step, low, high)
-        trial_value = residuals(trial)
+        trial_value, trial_slope = with_slopes(residuals, trial)
         gain = cost[open_] - _half_square(_finite(trial_value))
         better = gain > 0
         won = open_[better]
-        phi[won], value[won] = trial[better], trial_value[better]
+        phi[won], value[won], slope[won] = trial[better], trial_value[better], trial_slope[better]
         cost[won] -= gain[better]
         damping[open_] *= np.where(better, 0.2, 8.0)
         settled = np.where(better, gain < tolerance, damping[open_] > 1e6)

@@ -1,8 +1,8 @@
 """What a computation has cost so far, counted where it is made, the same on every machine.
 
-The unit is one value of a model at one frequency, or one step of a simulation.  What is spent
-inside `metered` counts towards its limit; nothing is ever stopped in the middle, but whoever runs a
-list of things may ask before each whether it is still affordable.
+The unit is one value of a rational model at one frequency; what takes longer counts for more.  What
+is spent inside `metered` counts towards its limit; nothing is ever stopped in the middle, but
+whoever runs a list of things may ask before each whether it is still affordable.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
-RATE = 1e7
-"""Evaluations that count as a second: what a core of 2020 does of either kind, about."""
-BUDGET_S = 60.0
+RATE = 2.5e7
+"""Evaluations that count as a second: what a busy core of 2020 does in searches, about."""
+BUDGET_S = 40.0
 """What a search for what a model lacks may cost by default, in these nominal seconds."""
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,57 +148,59 @@ def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | 
         freedom, richer = numbers - _ORDER - 1, numbers - _RICHER - 1
         if richer < 2:
             break
-        matrix, target = _equations(data, near, centre_hz, span, inverted)
-        left = _solve(matrix[:, : _ORDER + 1], target).left
-        fit = _solve(matrix, target)
-        enough = left - fit.left < _BETTER and left < freedom + 3 * np.sqrt(1.2 * freedom)
+        # The triangle of both polynomials: what is left of the target stands in its last column.
+        equations = _equations(data, near, centre_hz, span, inverted)
+        triangle: Complexes = np.asarray(np.linalg.qr(equations, mode="r"))
+        left = np.cumsum(np.abs(triangle[::-1, -1]) ** 2)[::-1]  # by k coefficients: at k
+        fewer, more = float(left[_ORDER + 1]), float(left[_RICHER + 1])
+        enough = fewer - more < _BETTER and fewer < freedom + 3 * np.sqrt(1.2 * freedom)
         accepted += enough or accepted > 0
-        used = data.frequency_hz[near]
-        last = LocalFit(
-            centre_hz,
-            float(span),
-            inverted,
-            float(used.min()),
-            float(used.max()),
-            fit.coefficients,
-            fit.covariance * (1.0 if enough else max(fit.left / richer, 1.0)),
-        )
+        last = float(span), near, triangle, 1.0 if enough else max(more / richer, 1.0)
         if accepted > _NARROWER:
             break
-    return last
+    return None if last is None else _fit(data, centre_hz, inverted, *last)
+
+
+def _fit(
+    data: ResponseData,
+    centre_hz: float,
+    inverted: bool,
+    span: float,
+    near: NDArray[np.bool_],
+    triangle: Complexes,
+    noise: float,
+) -> LocalFit:
+    """The solution of triangular equations, with `noise` times its covariance."""
+    size = _RICHER + 1
+    inverse = np.linalg.inv(triangle[:size, :size])
+    used = data.frequency_hz[near]
+    return LocalFit(
+        centre_hz,
+        span,
+        inverted,
+        float(used.min()),
+        float(used.max()),
+        (inverse @ triangle[:size, -1]).astype(complex),
+        (inverse @ inverse.conj().T * noise).astype(complex),
+    )
 
 
 def _equations(
     data: ResponseData, near: NDArray[np.bool_], centre_hz: float, span: float, inverted: bool
-) -> tuple[Complexes, Complexes]:
-    """Whitened linear equations for the coefficients of the richer polynomial."""
+) -> Complexes:
+    """Whitened linear equations for the coefficients of the richer polynomial; last, the target."""
     frequency, response = data.frequency_hz[near], data.response[near]
     if inverted:  # d(1/G) = -dG / G^2
         scale, value = response**2, 1 / response
     else:
         scale = ((centre_hz / frequency) ** 2).astype(complex)
         value = response / scale
-    design = data.design[near] * scale[:, None, :]
-    powers = _powers(frequency, centre_hz, span, _RICHER)
-    matrix = (design @ powers).reshape(-1, _RICHER + 1)
-    return matrix, (design @ value[..., None]).ravel()
-
-
-class _Solution(NamedTuple):
-    coefficients: Complexes
-    covariance: Complexes
-    left: float
-
-
-def _solve(matrix: Complexes, target: Complexes) -> _Solution:
-    """Least squares: coefficients, their covariance, and the sum of squares left."""
-    q, r = np.linalg.qr(matrix)
-    coefficients = np.linalg.solve(r, q.conj().T @ target)
-    inverse = np.linalg.inv(r)
-    left = float(np.sum(np.abs(target - matrix @ coefficients) ** 2))
-    return _Solution(coefficients.astype(complex), np.asarray(inverse @ inverse.conj().T), left)
+    columns = np.empty((*frequency.shape, _RICHER + 2), complex)
+    columns[..., :-1] = _powers(frequency, centre_hz, span, _RICHER)
+    columns[..., -1] = value
+    return ((data.design[near] * scale[:, None, :]) @ columns).reshape(-1, _RICHER + 2)
 
 
 def _powers(frequency_hz: Floats, centre_hz: float, span: float, order: int) -> Floats:
     x = (frequency_hz / centre_hz - 1) / span
-    return x[..., None] ** np.arange(order + 1)
+    return np.moveaxis(np.stack([x**0, *np.cumprod([x] * order, axis=0)]), 0, -1)

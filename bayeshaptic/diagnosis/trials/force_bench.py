@@ -32,6 +32,7 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 SUBSTEPS = 8
+_STEP = 4.0  # what a step costs, with the motion around it, in values of a rational model
 _HAND_HZ = 20.0
 
 
@@ -116,7 +117,7 @@ class ForceBench:
         system, period = self.model.system(theta), self.recording.period_s
         if isinstance(effect, CommandEffect):
             return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
-        spend(SUBSTEPS * self.recording.samples)
+        spend(_STEP * SUBSTEPS * self.recording.samples)
         motion = self.motions(theta, (effect.place,))[effect.place]
         return forced_motion(
             system.mechanism,

@@ -82,6 +82,9 @@ def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[
     tick : callable, optional
         Called with the title of each candidate that is fitted in full.
     """
+    affords = [meter.affords(one.title) for one in linear_candidates(state.model, state.etfe)]
+    if not all(affords):
+        return []  # not even sieved
     theta, windows = _fit_part(state.model, state.etfe, state.fit.windows, state.fit.theta[None])
     base = log_likelihoods(state.model, windows, theta)
     bases = starting_bases(state.model, state.fit.theta, state.fit.elsewhere)

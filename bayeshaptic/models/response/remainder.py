@@ -32,6 +32,7 @@ from bayeshaptic.models.response.dynamic_link import DynamicLink, Index, delayed
 from bayeshaptic.models.response.filter import Filter
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.sampled import fastest_pole, laurent, nodes_at
+from bayeshaptic.models.response.transfer import compliances
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate
 
 Floats = NDArray[Any]
@@ -129,13 +130,9 @@ def remainder_of(
 ) -> Remainder:
     """What dynamic links add to a mechanism with filters."""
     pairs = [mechanism.drive, *((link.first, link.second) for link in links)]
-    compliances = {
-        (i, j): mechanism.mutual(pairs[i], pairs[j])
-        for j in range(1, len(pairs))
-        for i in range(j + 1)
-    }
-    denominator = mechanism.transfer()[1]
-    return Remainder(links, compliances, denominator, filters)
+    couples = [(i, j) for j in range(1, len(pairs)) for i in range(j + 1)]
+    numerators, denominator = compliances(mechanism, [(pairs[i], pairs[j]) for i, j in couples])
+    return Remainder(links, dict(zip(couples, numerators, strict=True)), denominator, filters)
 
 
 @dataclass(frozen=True)

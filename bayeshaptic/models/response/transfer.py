@@ -1,15 +1,15 @@
-"""Numerator and denominator of a mechanism's transfer function, compiled.
+"""Numerators and denominator of a mechanism's transfer functions, compiled.
 
-`Mechanism.transfer` walks over the spanning trees of the network with arrays.  Here the walk is
-taken once for each arrangement of masses, with a record of what it adds and multiplies, and the
-record is run for every parameter vector by itself.
+`Mechanism.transfer` and `Mechanism.mutual` walk over the spanning trees of the network with arrays.
+Here the walk is taken once for each arrangement of masses, with a record of what it adds and
+multiplies, and the record is run for every parameter vector by itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import numpy as np
 
@@ -22,15 +22,19 @@ from bayeshaptic.models.response.spanning import (
     spanning_trees,
     with_edge,
 )
+from bayeshaptic.numerics.polynomial import Polynomial, add
 from bayeshaptic.types import Floats, Ints
 
 ADD, MULTIPLY = 0, 1
 _EDGE = 3  # coefficients: stiffness, damping, mass
+_WHOLE = (GROUND, GROUND)  # a node made one with itself: the network as it is
+Mass = tuple[int | None, int | None]
+"""Two masses, or a mass and the ground (None)."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """What is to be done with the edges of a network to have its transfer function.
+    """What is to be done with the edges of a network to have sums over its spanning trees.
 
     Attributes
     ----------
@@ -41,14 +45,14 @@ class Record:
         edges, then the results.
     lengths : ndarray of int
         How many coefficients each polynomial has.
-    numerator, denominator : int
+    wanted : ndarray of int
+        The numbers of what is asked for.
     """
 
     edges: Mapping[Pair, int]
     steps: Ints
     lengths: Ints
-    numerator: int
-    denominator: int
+    wanted: Ints
 
 
 @dataclass
@@ -76,11 +80,44 @@ class _Recorder:
 
 def transfer(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """What `Mechanism.transfer` gives, the batch first: shapes (B, degree + 1)."""
+    drive = _ends(mechanism.drive)
+    numerator, denominator = _trees(mechanism, (drive, _WHOLE))
+    return numerator, denominator
+
+
+def compliances(
+    mechanism: Mechanism, couples: Sequence[tuple[Mass, Mass]]
+) -> tuple[list[Polynomial], Polynomial]:
+    """What `Mechanism.mutual` gives for each couple of pairs, and the denominator of all of them.
+
+    Each of shape (degree + 1, B).
+    """
+    parts = [_parts(_ends(first), _ends(second)) for first, second in couples]
+    merges = tuple(dict.fromkeys(pair for part in parts for pair in part))
+    *found, denominator = (p.T for p in _trees(mechanism, (*merges, _WHOLE)))
+    known = dict(zip(merges, found, strict=True))
+    zero = np.zeros((1, mechanism.batch))
+    numerators = [
+        reduce(add, (sign * known[pair] for pair, sign in part.items()), zero) for part in parts
+    ]
+    return numerators, denominator
+
+
+def _parts(first: Pair, second: Pair) -> dict[Pair, float]:
+    """Which nodes are made one for a compliance, and with which factor; see `Mechanism.mutual`."""
+    (i, j), (k, m) = first, second
+    if (i, j) == (k, m):
+        return {first: 1.0}
+    signs = {(i, m): 0.5, (j, k): 0.5, (i, k): -0.5, (j, m): -0.5}
+    return {pair: sign for pair, sign in signs.items() if pair[0] != pair[1]}
+
+
+def _trees(mechanism: Mechanism, merges: tuple[Pair, ...]) -> list[Floats]:
+    """The sum over the spanning trees with each pair of nodes made one, (B, degree + 1) each."""
     from bayeshaptic.models.response.kernels.transfer import run
 
     pairs = tuple((link.first, _node(link.second)) for link in mechanism.links)
-    drive = (mechanism.driven, _node(mechanism.frame))
-    record = recorded(len(mechanism.masses), pairs, drive)
+    record = recorded(len(mechanism.masses), pairs, merges)
     edges = np.zeros((mechanism.batch, len(record.edges), _EDGE))
     for number, mass in enumerate(mechanism.masses):
         edges[:, record.edges[GROUND, number], 2] += mass
@@ -88,15 +125,14 @@ def transfer(mechanism: Mechanism) -> tuple[Floats, Floats]:
         edge = record.edges[min(i, j), max(i, j)]
         edges[:, edge, 0] += link.stiffness
         edges[:, edge, 1] += link.damping
-    numerator = np.empty((mechanism.batch, record.lengths[record.numerator]))
-    denominator = np.empty((mechanism.batch, record.lengths[record.denominator]))
-    wanted = (record.numerator, record.denominator)
-    run(record.steps, record.lengths, edges, wanted, numerator, denominator)
-    return numerator, denominator
+    lengths = record.lengths[record.wanted]
+    found = np.empty((mechanism.batch, len(lengths), int(lengths.max())))
+    run(record.steps, record.lengths, edges, record.wanted, found)
+    return [found[:, i, :length] for i, length in enumerate(lengths)]
 
 
 @lru_cache(maxsize=256)
-def recorded(masses: int, links: tuple[Pair, ...], drive: Pair) -> Record:
+def recorded(masses: int, links: tuple[Pair, ...], merges: tuple[Pair, ...]) -> Record:
     """The record for an arrangement of masses and links, GROUND being one of the nodes."""
     ends = {(GROUND, mass): True for mass in range(masses)}
     for i, j in links:
@@ -106,16 +142,18 @@ def recorded(masses: int, links: tuple[Pair, ...], drive: Pair) -> Record:
     edges: Mapping[Pair, int] = {}
     for number, (i, j) in enumerate(ends):
         edges = with_edge(edges, i, j, number + 1, algebra)
-    numerator = spanning_trees(merged(edges, drive, algebra), algebra)
-    denominator = spanning_trees(edges, algebra)
+    wanted = [spanning_trees(merged(edges, pair, algebra), algebra) for pair in merges]
     steps = [(kind, out, a, b) for (kind, a, b), out in recorder.steps.items()]
     return Record(
         {pair: number for number, pair in enumerate(ends)},
         np.array(steps, int).reshape(-1, 4),
         np.array(recorder.lengths),
-        numerator,
-        denominator,
+        np.array(wanted),
     )
+
+
+def _ends(pair: Mass) -> Pair:
+    return _node(pair[0]), _node(pair[1])
 
 
 def _node(mass: int | None) -> int:

@@ -204,10 +204,11 @@ def _robust(columns: Floats, wanted: Floats) -> tuple[Floats, float]:
 
 
 def _least_squares(columns: Floats, wanted: Floats, weight: Floats | None = None) -> Floats:
-    weighted = columns if weight is None else columns * weight[:, None]
-    gram = weighted.T @ columns
+    root = np.ones(len(columns)) if weight is None else np.sqrt(weight)
+    weighted = columns * root[:, None]
+    gram = weighted.T @ weighted  # of one matrix with itself: half the work
     gram[np.diag_indices_from(gram)] += _RIDGE * len(columns)
-    return np.asarray(np.linalg.solve(gram, weighted.T @ wanted))
+    return np.asarray(np.linalg.solve(gram, weighted.T @ (wanted.T * root).T))
 
 
 def _correlation(one: Floats, other: Floats) -> Share:

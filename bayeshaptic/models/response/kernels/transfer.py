@@ -9,15 +9,11 @@ from bayeshaptic.types import Floats, Ints
 
 
 @kernel
-def run(
-    steps: Ints,
-    lengths: Ints,
-    edges: Floats,
-    wanted: tuple[int, int],
-    numerator: Floats,
-    denominator: Floats,
-) -> None:
-    """Do what a `Record` says for every row of `edges`, shape (B, E, 3)."""
+def run(steps: Ints, lengths: Ints, edges: Floats, wanted: Ints, found: Floats) -> None:
+    """Do what a `Record` says for every row of `edges`, shape (B, E, 3).
+
+    `found`, of shape (B, number wanted, longest), is filled as far as each polynomial reaches.
+    """
     batch, count, _ = edges.shape
     values = np.zeros((len(lengths), lengths.max()))
     values[0, 0] = 1.0
@@ -40,7 +36,6 @@ def run(
                 for i in range(lengths[a]):
                     for j in range(lengths[b]):
                         values[out, i + j] += values[a, i] * values[b, j]
-        for power in range(numerator.shape[1]):
-            numerator[row, power] = values[wanted[0], power]
-        for power in range(denominator.shape[1]):
-            denominator[row, power] = values[wanted[1], power]
+        for place in range(len(wanted)):
+            for power in range(lengths[wanted[place]]):
+                found[row, place, power] = values[wanted[place], power]
