@@ -8,7 +8,6 @@ that cannot be used; 130 interrupted, 143 terminated. A command is one module of
 from __future__ import annotations
 
 import argparse
-import gc
 import os
 import re
 import signal
@@ -22,8 +21,9 @@ from typing import NoReturn
 
 from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.talk import complain
-from bayeshaptic.errors import BayeshapticWarning, InputError, describe
+from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import explained
+from bayeshaptic.garbage import look_rarely
 from bayeshaptic.threads import one_thread_from_the_start
 from bayeshaptic.version import __version__
 
@@ -76,9 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; never a traceback unless asked for."""
     one_thread_from_the_start()
-    # A figure is thousands of objects that refer to each other in circles: to look for garbage
-    # every 700 of them takes a fourteenth of a report.
-    gc.set_threshold(50_000, 20, 20)
+    look_rarely()
     parser = build_parser()
     arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
     if not hasattr(arguments, "run"):
@@ -150,8 +148,7 @@ def _warnings_in_one_line() -> Iterator[None]:
         file: object = None,
         line: str | None = None,
     ) -> None:
-        place = "" if issubclass(category, BayeshapticWarning) else f"{category.__name__}: "
-        complain(f"warning: {place}{' '.join(str(message).split())}")
+        complain(f"warning: {warned(message, category)}")
 
     with warnings.catch_warnings():
         # ArviZ 0.23 announces its successor once a day.

@@ -61,6 +61,12 @@ def unique(notices: Iterable[Notice]) -> tuple[Notice, ...]:
     return tuple(sorted(dict.fromkeys(notices), key=lambda notice: notice.level != "warning"))
 
 
+def warned(message: Warning | str, category: type[Warning]) -> str:
+    """What a warning says, in one line."""
+    place = "" if issubclass(category, BayeshapticWarning) else f"{category.__name__}: "
+    return place + one_line(str(message))
+
+
 def describe(error: BaseException) -> str:
     """One line that says what went wrong, for people: no traceback, no line breaks."""
     if isinstance(error, OSError) and error.strerror:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
@@ -21,12 +22,12 @@ from bayeshaptic.jobs.executors import Executor, Outcome
 from bayeshaptic.jobs.index import row_of, write_index
 from bayeshaptic.jobs.job import Job, Settings, refuse_file
 from bayeshaptic.jobs.manifest import Entry, entry_of, read_manifest, write_manifest
-from bayeshaptic.jobs.recording import report_recording
 from bayeshaptic.jobs.sources import find_sources
-from bayeshaptic.jobs.study import report_study
 from bayeshaptic.recordings.read import recording_name
-from bayeshaptic.report.reported import Reported
 from bayeshaptic.types import Progress
+
+if TYPE_CHECKING:
+    from bayeshaptic.report.reported import Reported
 
 SECONDS_BETWEEN_WRITES = 2.0
 
@@ -57,6 +58,10 @@ def report_source(
     InputError
         Where the source or the settings cannot be used.
     """
+    # Where many jobs are only handed out, what does them is not loaded.
+    from bayeshaptic.jobs.recording import report_recording
+    from bayeshaptic.jobs.study import report_study
+
     refuse_file(job.folder)
     if job.source.suffix.lower() == ".toml":
         return report_study(job, progress, workers)
@@ -151,6 +156,7 @@ def run_batch(
     execute = _executor(executor)
     again: list[Job] = []
     try:
+        batch.write()  # for whoever asks how far it is
         for outcome in execute(report_timed, todo) if todo else ():
             if outcome.error is None or outcome.refused:
                 batch.end(outcome)

@@ -8,21 +8,27 @@ process boundaries, so both must be picklable (a function of a module, frozen da
 from __future__ import annotations
 
 import concurrent.futures
+import logging
 import multiprocessing
 import os
 import re
 import signal
+import sys
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
 from typing import Any
 
-from bayeshaptic.errors import InputError, describe
+from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import entry, explained
+from bayeshaptic.garbage import look_rarely
 
 Job = Callable[[Any], Any]
 
@@ -173,47 +179,57 @@ def dask(address: str) -> Executor:
     InputError
         dask is not installed, or no scheduler answers at `address`.
     """
-    try:
-        import distributed
-    except ImportError:
+    if find_spec("distributed") is None:
         raise InputError(
             "running on a dask cluster needs the dask extra: pip install 'bayeshaptic[dask]'"
-        ) from None
+        )
 
     if address == "local":
         return _local_dask
     if not re.fullmatch(r"\w+://\S+", address):
         raise InputError(f"'{address}' is no dask address: write it as in tcp://10.0.0.1:8786")
+    return partial(_on_dask, address)
 
-    def run(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
-        try:
-            client = distributed.Client(address, timeout="10s", set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"no dask scheduler answers at {address} ({describe(error)}): start one with "
-                "'dask scheduler', or use --workers"
-            ) from error
-        with client, client.as_current():
-            submitted = {
-                client.submit(_attempt, job, item, pure=False, retries=0): item for item in items
-            }
-            for future in distributed.as_completed(submitted):
-                problem = future.exception()
-                if problem is None:
-                    yield future.result()
-                else:
-                    yield Outcome(submitted[future], error=describe(problem))
 
-    return run
+def _on_dask(address: str, job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+    import distributed
+
+    try:
+        client = distributed.Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no dask scheduler answers at {address} ({describe(error)}): start one with "
+            "'dask scheduler', or use --workers"
+        ) from error
+    with client, client.as_current():
+        submitted = {
+            client.submit(_attempt, job, item, pure=False, retries=0): item for item in items
+        }
+        for future in distributed.as_completed(submitted):
+            problem = future.exception()
+            if problem is None:
+                yield future.result()
+            else:
+                yield Outcome(submitted[future], error=describe(problem))
 
 
 def _local_dask(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+    import dask.config
     import distributed
 
-    with distributed.LocalCluster(
-        n_workers=usable_cores(), threads_per_worker=1, dashboard_address=None
-    ) as cluster:
-        yield from dask(cluster.scheduler_address)(job, items)
+    # Nobody looks at its statistics of where time goes, which cost some.
+    with (
+        dask.config.set({"distributed.worker.profile.enabled": False}),
+        distributed.LocalCluster(
+            n_workers=usable_cores(),
+            threads_per_worker=1,
+            dashboard_address=None,
+            silence_logs=logging.ERROR,
+        ) as cluster,
+    ):
+        with distributed.Client(cluster, set_as_default=False) as client:
+            client.run(look_rarely)
+        yield from _on_dask(cluster.scheduler_address, job, items)
 
 
 def usable_cores() -> int:
@@ -222,6 +238,10 @@ def usable_cores() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on macOS or Windows
         return os.cpu_count() or 1
+
+
+def _in_one_line(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    print(f"bayeshaptic: warning: {warned(message, category)}", file=sys.stderr)
 
 
 def _attempt(job: Job, item: Any) -> Outcome:
@@ -233,6 +253,8 @@ def _attempt(job: Job, item: Any) -> Outcome:
 
 def _start_worker(parent: int) -> None:
     """Leave interrupts to the parent, and end with it however it ends."""
+    look_rarely()
+    warnings.showwarning = _in_one_line
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:

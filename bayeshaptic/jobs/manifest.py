@@ -13,8 +13,8 @@ from typing import Any
 from bayeshaptic.errors import InputError
 from bayeshaptic.files import write_whole
 from bayeshaptic.jobs.job import Job
+from bayeshaptic.provenance import sha256, versions
 from bayeshaptic.recordings.study_file import read_study
-from bayeshaptic.report.provenance import sha256, versions
 
 NAME = "manifest.json"
 FORMAT = "bayeshaptic batch 1"

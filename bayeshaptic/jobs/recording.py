@@ -15,6 +15,7 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.faq import explained
 from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.jobs.job import Job, checkpoints_of
+from bayeshaptic.provenance import provenance
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.recording import Recording
@@ -22,7 +23,6 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.report import write_report
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.words import in_short
-from bayeshaptic.report.provenance import provenance
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.types import Progress
 
@@ -81,7 +81,7 @@ def reported(
     result : Analysis or Closed
     folder : Path
     origin : mapping, optional
-        See `bayeshaptic.report.provenance`.
+        See `bayeshaptic.provenance`.
     """
     page = write_report(result, folder, origin)
     warnings = tuple(explained(n) for n in result.analysis.notices if n.level == "warning")

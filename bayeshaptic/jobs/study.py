@@ -16,10 +16,10 @@ from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Executor, Outcome
 from bayeshaptic.jobs.job import Job, checkpoints_of, refuse_file
 from bayeshaptic.jobs.recording import reported
+from bayeshaptic.provenance import provenance
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study
 from bayeshaptic.recordings.study_file import read_study
-from bayeshaptic.report.provenance import provenance
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.write import write_study_report

@@ -11,13 +11,13 @@ import numpy as np
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, unique
 from bayeshaptic.faq import entry
+from bayeshaptic.provenance import provenance
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, finite
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.numbers.unstated import errors, unstated
-from bayeshaptic.report.provenance import provenance
 from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:

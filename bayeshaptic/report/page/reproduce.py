@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.provenance import sha256, versions
+from bayeshaptic.provenance import sha256, versions
 
 if TYPE_CHECKING:
     from bayeshaptic.report.numbers.rows import Rows
@@ -19,7 +19,7 @@ def reproduce(result: Result, origin: Mapping[str, Any] | None = None) -> Rows:
     ----------
     result : Analysis or Closed
     origin : mapping, optional
-        What `bayeshaptic.report.provenance` gives; a result that was made from Python has none.
+        What `bayeshaptic.provenance` gives; a result that was made from Python has none.
     """
     told = origin or {}
     rows: list[tuple[str, ...]] = []

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from bayeshaptic.errors import unique
+from bayeshaptic.provenance import versions
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
 from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, with_contents
-from bayeshaptic.report.provenance import versions
 from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
 from bayeshaptic.report.study.headline import study_headline
