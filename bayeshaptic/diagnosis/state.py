@@ -163,6 +163,11 @@ def share(windows: Windows, parts: tuple[int, ...]) -> NDArray[np.bool_]:
     return np.isin(np.arange(len(windows.scatter)) % 4, parts)
 
 
+def fit_part(model: Model, windows: Windows, theta: Floats) -> Floats:
+    """The optimum on the windows to fit, nearest to one vector."""
+    return polish(model, windows.part(share(windows, FIT)), theta)
+
+
 def log_likelihoods(model: Model, windows: Windows, theta: Floats) -> Floats:
     r"""Log likelihood of one vector on the windows to fit and on those to choose by, shape (2,).
 

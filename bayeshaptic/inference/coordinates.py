@@ -53,6 +53,11 @@ class Coordinates:
     floor: Floats = field(default_factory=lambda: np.zeros(0))
     follow: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
+    @property
+    def lowest(self) -> Floats:
+        """Where each coordinate ends below, shape (P,); -inf of a logarithm."""
+        return np.where(self.log, -np.inf, self.low)
+
     def natural(self, phi: Floats) -> Floats:
         own = self.own(phi)
         theta = np.where(self.log, np.exp(np.where(self.log, own, 0.0)), own * self.scale)

@@ -13,13 +13,12 @@ from scipy.interpolate import CubicSpline
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import (
-    FIT,
     Accepted,
     Estimate,
     State,
     Trial,
+    fit_part,
     log_likelihoods,
-    share,
 )
 from bayeshaptic.effects.linear.gain import Gain
 from bayeshaptic.errors import InputError
@@ -92,7 +91,7 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         windows = compress(part, state.fit.response)
         theta = np.array([start[name] for name in narrow.names])
         before = log_likelihoods(narrow, windows, theta)
-        theta = polish(narrow, windows.part(share(windows, FIT)), theta)
+        theta = fit_part(narrow, windows, theta)
         gains += log_likelihoods(narrow, windows, theta) - before
         found.append(theta)
     limits = critical_stiffness(narrow, np.stack(found)).samples

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.diagnosis.residuals.columns import drift_velocity, line_transform
-from bayeshaptic.diagnosis.state import FIT, State, log_likelihoods, share
+from bayeshaptic.diagnosis.state import State, fit_part, log_likelihoods
 from bayeshaptic.effects.nonlinear.internal_force import (
     CONNECTION,
     LOAD,
@@ -23,7 +23,6 @@ from bayeshaptic.effects.nonlinear.internal_force import (
     forced_motion,
 )
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
-from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.recording import Recording
@@ -139,7 +138,7 @@ class ForceBench:
         """Simulate, take off, fit; several times over, because the fit changes the motion."""
         for _ in range(rounds):
             etfe, windows = self._simulated(effect, strength, theta)
-            theta = polish(self.model, windows.part(share(windows, FIT)), theta)
+            theta = fit_part(self.model, windows, theta)
         return self._valued(effect, strength, theta, etfe, windows)
 
     def as_it_is(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Point:

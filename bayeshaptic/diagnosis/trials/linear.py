@@ -19,13 +19,14 @@ from bayeshaptic.diagnosis.state import (
     State,
     Trial,
     describe_gain,
+    fit_part,
     log_likelihoods,
     share,
 )
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.fit import search_box, weighted_residuals
-from bayeshaptic.inference.least_squares import least_squares, polish, refine
+from bayeshaptic.inference.least_squares import least_squares, refine
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.screening import promising_starts, starting_bases
 from bayeshaptic.models import Model
@@ -161,4 +162,4 @@ def _fit_part(model: Model, etfe: Etfe, windows: Windows, starts: Floats) -> tup
     """Fit the windows to fit by, twice: the second time compressed around the first fit."""
     theta = refine(model, windows.part(share(windows, FIT)), starts).theta
     windows = compress(etfe, partial(model.response, theta))
-    return polish(model, windows.part(share(windows, FIT)), theta), windows
+    return fit_part(model, windows, theta), windows

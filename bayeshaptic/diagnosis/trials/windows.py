@@ -11,11 +11,11 @@ from bayeshaptic.diagnosis.acceptance import needless
 from bayeshaptic.diagnosis.battery import model_tests, residual_tests
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.samples.mend import SampleLook, look_at_samples, repair_measurement
-from bayeshaptic.diagnosis.state import FIT, Change, State, Trial, log_likelihoods, share
+from bayeshaptic.diagnosis.state import Change, State, Trial, fit_part, log_likelihoods
 from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
-from bayeshaptic.inference.least_squares import least_squares, polish
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
@@ -148,5 +148,5 @@ def _undone(state: State, change: Change) -> tuple[Model, Etfe, Floats]:
 def _held_out(model: Model, etfe: Etfe, theta: Floats) -> float:
     """Log likelihood of windows to choose by, after a fit to those to fit."""
     windows = compress(etfe, lambda frequency_hz: model.response(theta, frequency_hz))
-    theta = polish(model, windows.part(share(windows, FIT)), theta)
+    theta = fit_part(model, windows, theta)
     return float(log_likelihoods(model, windows, theta)[1])

@@ -61,7 +61,7 @@ class Configurations:
         Natural values in the order of `model.names`.
         """
         assert self._path is not None and self._here is not None
-        low = np.where(self._here.log, -np.inf, self._here.low)
+        low = self._here.lowest
         parts: list[Floats] = []
         mirrored = False
         while sum(map(len, parts)) < count:

@@ -173,7 +173,7 @@ def _from_levels(
 ) -> Reweighted | None:
     """Draws of the levels inside the walls, weighed by exact over described likelihood."""
     x = below.recordings[:, r]
-    x = x[np.all(x >= walls(here), axis=1)]
+    x = x[np.all(x >= here.lowest, axis=1)]
     exact = exact_likelihood(posterior, here, x) if len(x) else None
     if posterior.windows is not None and (exact is None or not np.isfinite(exact).any()):
         return None
@@ -235,7 +235,7 @@ def _sampled(
     seed: np.random.SeedSequence,
 ) -> Reweighted | None:
     """Draws from exact likelihood times cavity; None where the sampler does not converge."""
-    low = walls(here)
+    low = here.lowest
 
     def density(x: Floats) -> Floats:
         value = np.full(len(x), -np.inf)
@@ -273,13 +273,8 @@ def _alone(posterior: Posterior, user: str, count: int) -> Reweighted:
     return Reweighted(user, draws, float(posterior.effective), float("nan"), ALONE)
 
 
-def walls(here: Coordinates) -> Floats:
-    """Lowest value of each coordinate; -inf where it is a logarithm."""
-    return np.where(here.log, -np.inf, here.low)
-
-
 def inside(x: Floats, here: Coordinates) -> Floats:
     """Mirrored at the walls, so that no damper is negative."""
-    low = walls(here)
+    low = here.lowest
     with np.errstate(invalid="ignore"):
         return np.where(x < low, 2 * low - x, x)

@@ -42,7 +42,7 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
     """
     own = [here.coordinate(one.draws) for one in posteriors]
     sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
-    walls = np.where(here.log, -np.inf, here.low)
+    walls = here.lowest
     low, high = np.maximum(low - _BEYOND * sd, walls), high + _BEYOND * sd
     x = np.clip(_expected(level, phi, walls), low, high)
     for number in range(_ROUNDS):

@@ -11,11 +11,11 @@ import numpy as np
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Damping
 from bayeshaptic.stability.walls.joint import (
-    INSIDE,
     JointRegion,
     Lowest,
     lowest,
 )
+from bayeshaptic.stability.walls.region import INSIDE
 from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.stability.walls.tail import Tail, lower_tail
 from bayeshaptic.stability.walls.width import Boundary, ZWidth, width_of

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 
 from bayeshaptic.stability.tail import ENOUGH_BELOW
 from bayeshaptic.stability.walls.damping import Backward, Damping, LowPass
-from bayeshaptic.stability.walls.region import DRAWS, KbRegion, kb_region, with_damping
+from bayeshaptic.stability.walls.region import DRAWS, INSIDE, KbRegion, kb_region, with_damping
 from bayeshaptic.types import Floats
 
-INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
 _BEYOND = 0.95
 _CLOSER = 1.5
 CUTOFF = 0.1  # of the sampling rate: the usual low-pass of a velocity

@@ -29,7 +29,7 @@ from bayeshaptic.types import Floats, Ints
 DRAWS = 4000
 LEVELS = 33  # dampings in a table
 _START = 1e-3  # of K_CR: where a loop that is stable at rest is still stable
-_INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
+INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
 _CELLS = 4_000_000  # of loops, dampings and stiffnesses at a time
 
 
@@ -170,7 +170,7 @@ class KbRegion:
     def dampings(self, count: int = LEVELS) -> Floats:
         """Dampings from zero to the largest that is stable in 95 % of the draws, shape (count,)."""
         top = float(np.quantile(self.largest_damping(), 0.05, method="inverted_cdf"))
-        return np.linspace(0.0, _INSIDE * top if np.isfinite(top) else 1.0, count)
+        return np.linspace(0.0, INSIDE * top if np.isfinite(top) else 1.0, count)
 
     @at_the_door
     def boundaries(self, risks: tuple[float, ...], damping: ArrayLike) -> tuple[Boundary, ...]:
@@ -199,7 +199,7 @@ class KbRegion:
         largest = float(np.quantile(self.largest_damping(), risk, method="inverted_cdf"))
         if not np.isfinite(largest):
             raise InputError("nothing limits the damping of this loop; it has no Z-width.")
-        (boundary,) = self.boundaries((risk,), np.linspace(0.0, _INSIDE * largest, count))
+        (boundary,) = self.boundaries((risk,), np.linspace(0.0, INSIDE * largest, count))
         return width_of(boundary)
 
 
