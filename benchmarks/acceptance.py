@@ -1,0 +1,194 @@
+"""What the rules of acceptance cost and find: each of them left out, and what then changes.
+
+    python acceptance.py --clean 24 --each 1 --workers 2
+
+Of every recording all candidates of all classes are fitted, whether or not a test raises them: so a
+clean recording shows what acceptance alone would let through.  Then the first round is decided with
+all rules, and with one of them left out at a time.  The table is that of docs/statistics.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from blind_recordings import CASES, HIDDEN_BY_A_HAND, LISTED, NEEDS_A_HAND, SINGLE
+
+from bayeshaptic.diagnosis import acceptance, thresholds
+from bayeshaptic.diagnosis.begun import begin
+from bayeshaptic.diagnosis.loop import trials_for
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.state import CHOOSE, State, Trial, held_out_rms
+from bayeshaptic.numerics.spending import BUDGET_S, RATE, metered
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+
+LEFT_OUT = {
+    "ENOUGH": -np.inf,
+    "SHARE": 0.0,
+    "A_PARAMETER": 0.0,
+    "WORSE": np.inf,
+    "RIVAL": 1.0,
+    "LEAST": 1.0,
+    "LAW_REST": 0.0,
+    "TIE": 0.0,
+    "LAW_TIE": 0.0,
+    "MENDED": 1.0,
+    "LAW_ERROR": 0.0,
+}
+"""Every rule, and the value with which it decides nothing."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One recording, and how it is analysed."""
+
+    case: str
+    with_file: bool
+    seed: int
+    effect: str = ""
+
+
+@dataclass(frozen=True)
+class Decided:
+    """The first round: what was accepted (with what ties), and the verdict on what it leaves."""
+
+    name: str
+    ties: tuple[str, ...]
+    verdict: str
+
+
+def decided(job: Job, seconds: float) -> dict[str, Decided]:
+    """The first round of one recording with all rules (""), and with each of them left out."""
+    device, held = CASES[job.case]
+    bench = Bench.from_device(device, held=held)
+    if job.effect:
+        bench = bench.with_effect(job.effect)
+    low, high = bench.band_hz
+    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds), seed=job.seed)
+    recording = recording_from_arrays(
+        made.force,
+        made.position,
+        period_s=bench.period_s,
+        force_unit=bench.force_unit,
+        position_unit=bench.position_unit,
+        encoder_resolution=bench.encoder_resolution,
+    )
+    options = Options(device=device) if job.with_file else Options(delay_s=bench.delay_s)
+    begun = begin(recording, "grasped" if held else "free", options)
+    kind = trials_for(begun.etfe, begun.fit)
+    before = kind.tests(kind.first)
+    raised = tuple(replace(test, threshold=-np.inf) for test in before)
+    with metered(10 * BUDGET_S * RATE) as meter:
+        trials = kind.trials(kind.first, raised, meter, lambda _: None)
+
+    @cache
+    def tests_of(number: int) -> tuple[Test, ...]:
+        return kind.tests(trials[number].state)
+
+    errors = _errors(kind.first)
+    errors_of = [_errors(trial.state) for trial in trials]
+
+    def left(trial: Trial) -> tuple[Test, ...]:
+        tests = tests_of(next(i for i, one in enumerate(trials) if one is trial))
+        return acceptance.remaining(tests, trial.state.accepted, before)
+
+    def first_round() -> Decided:
+        open_ = [
+            trial
+            for trial, own in zip(trials, errors_of, strict=True)
+            if trial.convincing and not any(map(acceptance.raises_error, errors, own))
+        ]
+        chosen = acceptance.choose(open_, lambda trial: acceptance.excess(left(trial)))
+        if chosen is None:
+            return Decided("", (), acceptance.verdict_of((), before)[0])
+        ties = acceptance.with_ties(chosen, open_).accepted[-1].ties
+        verdict, _ = acceptance.verdict_of(chosen.state.accepted, left(chosen))
+        return Decided(chosen.name, ties, verdict)
+
+    found = {"": first_round()}
+    for rule, value in LEFT_OUT.items():
+        with left_out(rule, value):
+            found[rule] = first_round()
+    return found
+
+
+def _errors(state: State) -> tuple[float, float]:
+    return held_out_rms(state.fit, CHOOSE), float(np.sqrt(state.fit.reduced_chi_square))
+
+
+@contextmanager
+def left_out(rule: str, value: float) -> Iterator[None]:
+    """Decide without one rule."""
+    usual = getattr(thresholds, rule)
+    setattr(thresholds, rule, value)
+    try:
+        yield
+    finally:
+        setattr(thresholds, rule, usual)
+
+
+def jobs(clean: int, each: int, seed: int) -> list[Job]:
+    """Clean recordings, and `each` of every effect but those of single samples, where it shows."""
+    ways = [(case, with_file) for with_file in (True, False) for case in CASES]
+    made = [Job(*ways[i % len(ways)], seed + i) for i in range(clean)]
+    for effect, (family, _) in list(SINGLE.items())[: LISTED + 5]:
+        hidden = [HIDDEN_BY_A_HAND, NEEDS_A_HAND]
+        able = [way for way in ways if effect not in hidden[not CASES[way[0]][1]]]
+        if family != "measurement":
+            made += [
+                Job(*able[(len(made) + 3 * i) % len(able)], seed + 1000 + len(made), effect)
+                for i in range(each)
+            ]
+    return made
+
+
+def table(found: list[tuple[Job, dict[str, Decided]]]) -> str:
+    """A row a rule: what changes where it is left out."""
+    clean = [rounds for job, rounds in found if not job.effect]
+    others = [(SINGLE[job.effect][1], rounds) for job, rounds in found if job.effect]
+    lines = [
+        f"| left out | value | {len(clean)} clean: something accepted "
+        f"| {len(others)} with an effect: named | named or tied | explained after one round |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for rule in ("", *LEFT_OUT):
+        named = [rounds[rule].name in right for right, rounds in others]
+        tied = [bool({rounds[rule].name, *rounds[rule].ties} & right) for right, rounds in others]
+        explained = [rounds[rule].verdict == "explained" for _, rounds in others]
+        value = getattr(thresholds, rule) if rule else ""
+        lines.append(
+            f"| {rule or 'none'} | {value} | {sum(r[rule].name != '' for r in clean)} "
+            f"| {sum(named)} | {sum(tied)} | {sum(explained)} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--clean", type=int, default=24, help="clean recordings")
+    parser.add_argument("--each", type=int, default=2, help="recordings of each effect")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of each recording")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=40_000)
+    asked = parser.parse_args()
+    todo = jobs(asked.clean, asked.each, asked.seed)
+    found = []
+    with ProcessPoolExecutor(asked.workers) as pool:
+        for job, rounds in zip(
+            todo, pool.map(decided, todo, [asked.seconds] * len(todo)), strict=True
+        ):
+            found.append((job, rounds))
+            print(job, rounds[""], file=sys.stderr, flush=True)
+    print(table(found))
+
+
+if __name__ == "__main__":
+    main()
