@@ -6,16 +6,21 @@ Error rates over hundreds of recordings are in `benchmarks/door.py`.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.signals.causality import NOTABLE_SHARE, Causality, causality
-from bayeshaptic.rig import Bench, run_loop
+from bayeshaptic.recordings.signals.rough_response import rough_response
+from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -121,6 +126,26 @@ def test_a_position_of_the_opposite_sign_is_seen(case: str) -> None:
     # In a force of a fifth of the band is next to nothing new that could be answered to.
     for force, position in zip(*(signals[4:] for signals in open_loops(case)), strict=True):
         assert judge(force, -position).opposite
+
+
+@pytest.mark.parametrize("excitation", ["smooth", "steps"])
+def test_the_opposite_sign_is_seen_in_a_force_with_nothing_new(excitation: str) -> None:
+    """The phase of the response contradicts its slope; with the right sign it does not."""
+    bench, rng = Bench.from_device("phantom", held=True), np.random.default_rng(4)
+    if excitation == "steps":
+        force: Any = bench.force_rms * np.repeat(rng.normal(size=120), 100)
+    else:
+        force = WhiteNoise(bench.force_rms, 25.0, 0.5, 12.0)
+    made = simulate(bench, force, seed=2)
+    right = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    wrong = replace(right, position=-right.position)
+    assert not rough_response(right).opposite(bench.period_s)
+    assert rough_response(wrong).opposite(bench.period_s)
+    try:  # a controller's force goes against the motion, too: what is known is said either way
+        told = " ".join(notice.text for notice in check_recording(wrong))
+    except InputError as error:
+        told = str(error)
+    assert "opposite sign" in told
 
 
 def test_a_command_that_is_mostly_at_its_limits_cannot_be_decided() -> None:

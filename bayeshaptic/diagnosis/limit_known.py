@@ -113,7 +113,7 @@ class LimitKnown:
         fewest = self.model.names[int(np.argmin(found.fewest))]
         facts += f", and every parameter has at least {found.ess:.0f} effective draws ({fewest})"
         asked = f"{PRECISION:.0%}, {RHAT_LIMIT} and {EFFECTIVE:.0f}"
-        return Verdict(found, done, share, facts, asked)
+        return Verdict(found, bool(done), share, facts, asked)
 
 
 def _width(limit: CriticalStiffness) -> float:

@@ -241,7 +241,8 @@ def _causality(recording: Recording, where: str) -> list[Notice]:
             "predict the position; exchange them with --columns force=...,position=...",
             topic="swapped",
         )
-    if found.opposite:
+    against = not found.relay and rough_response(recording).opposite(recording.period_s)
+    if found.opposite or (against and not found.has_feedback):
         raise InputError(
             f"{where}: the position moves against the force: one of them has the opposite sign, "
             "and the device would have a negative mass; turn one round with --columns, as in "
@@ -262,6 +263,11 @@ def _causality(recording: Recording, where: str) -> list[Notice]:
             "closed loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force "
             "that does not depend on the motion."
         )
+        if against:
+            text += (
+                " The position goes against the force: if this was an open loop, one of them has "
+                "the opposite sign; turn it round with --columns, as in position=NAME*-1."
+            )
         return [Notice("warning", "feedback", text)]
     if found.doubtful:
         text = (
