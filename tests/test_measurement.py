@@ -13,6 +13,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.clipped import clipped
 from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
 from bayeshaptic.diagnosis.samples.prediction import as_recorded
+from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
@@ -20,7 +21,7 @@ from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
+from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability import critical_stiffness
 
 SECONDS, SEED = 8.0, 4
@@ -187,3 +188,16 @@ def test_a_pause_at_the_target_is_no_clipping(bench: Bench, friction: float) -> 
     recording = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
     wrong, statistic = clipped(as_recorded(recording))
     assert not wrong.any() and statistic < thresholds.CLIPPED
+
+
+@pytest.mark.parametrize("excitation", ["noise", "multisine"])
+def test_rounding_is_no_tone(excitation: str) -> None:
+    """A recording without noise or encoder: what stands out of nothing is nothing."""
+    bench = Bench.from_device("lhifam").quiet()
+    force = WhiteNoise(4.0, 200.0, 0.7, 10.0) if excitation == "noise" else Multisine(4.0)
+    made = simulate(bench, force, seed=1)
+    recording = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    etfe = estimate_etfe(recording)
+    model = build_model("free", "lhifam")
+    fit = least_squares(model, etfe, start=model.values)
+    assert find_tones(recording, etfe.band_hz, fit.response).tones == ()

@@ -40,6 +40,13 @@ def backwards() -> Recording:
     return replace(made, position=made.position[::-1])
 
 
+def cut_off() -> Recording:
+    made = recorded(noise(rms=0.3))
+    middle = np.median(made.position)
+    reach = 0.2 * np.std(made.position)
+    return replace(made, position=np.clip(made.position, middle - reach, middle + reach))
+
+
 TIME = np.arange(8000) * 1e-3
 SAYS_TOO_LITTLE = {
     "2 s, and at least 2.5 s": lambda: recorded(noise(2.0)),
@@ -52,6 +59,7 @@ SAYS_TOO_LITTLE = {
     "stands still for": lambda: recorded(
         noise(rms=0.03), BENCH.with_effect("coulomb_friction", force=0.07)
     ),
+    "stays at .* cut off": lambda: cut_off(),
     "hardly answers": lambda: backwards(),
 }
 

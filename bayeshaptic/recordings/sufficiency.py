@@ -13,7 +13,7 @@ import numpy as np
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import find_repetition
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.types import Bools
 
@@ -29,6 +29,7 @@ FEWEST_TONES = 5
 # Share of the recording that may pass without force, or without motion.
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
+_MOSTLY = 0.5  # of the standstill, at an end of the range
 _FAINT = 1e-4  # of the strongest line's power
 _WIDEST_TONE = 9  # lines that a Hann window spreads a tone over, and its wander
 
@@ -112,9 +113,21 @@ def _standstill(recording: Recording) -> str | None:
     length = max(round(_IDLE_S / recording.period_s), 20)
     parts = recording.samples // length
     position = recording.position[: parts * length].reshape(parts, length)
-    still = np.mean(np.ptp(position, axis=1) <= 1.01 * step)
+    resting = np.ptp(position, axis=1) <= 1.01 * step
+    still = np.mean(resting)
     if still <= MOST_IDLE:
         return None
+    ends = clipping(recording.position)
+    cut_off = (ends.low_clipped & (position[:, 0] <= ends.low)) | (
+        ends.high_clipped & (position[:, 0] >= ends.high)
+    )
+    if np.mean(cut_off[resting]) > _MOSTLY:
+        return (
+            f"the position stays at {ends.low:.4g} or {ends.high:.4g} {recording.position_unit} "
+            f"for {100 * still:.0f} % of the recording: it was cut off there by its sensor, or the "
+            "device leans on a stop; widen the range, or keep the device in its middle, and record "
+            "again"
+        )
     return (
         f"the position stands still for {100 * still:.0f} % of the recording: dry friction holds "
         "the device, or the motion is smaller than a count of the encoder; excite it two or three "

@@ -26,6 +26,9 @@ Indices = NDArray[np.intp]
 _HALF = 20  # lines to each side
 _OWN = 0.05  # of a tone, what response and leakage must leave
 _MOST = 24  # a tone that wanders takes several
+# Of the position's rms, what rounding in double precision may leave after a simulation: a recording
+# without noise has tones of a hundredth of that.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,7 @@ class _Lines:
         force, position = recording.force[here], recording.position[here]
         self.force = np.fft.rfft(force - force.mean())[number] * scale
         self.position = np.fft.rfft(position - position.mean())[number] * scale
+        self.floor = float(_ROUNDING * position.std()) ** 2
 
     def around(self, at: int) -> Indices:
         """The lines around one of them; at an end of the band those beside it."""
@@ -218,7 +222,7 @@ def _strongest(lines: _Lines, windows: list[_Window]) -> tuple[float, float]:
         size = np.maximum(size, _OWN * np.max(size))
         power = np.abs(columns.conj().T @ left) ** 2 / size
         freedom = len(left) - window.basis.shape[1] - 1
-        ratio = freedom * power / np.maximum(total - power, 1e-12 * total + 1e-300)
+        ratio = freedom * power / np.maximum(total - power, freedom * lines.floor + 1e-12 * total)
         at = int(np.argmax(ratio))
         score = -float(f.logsf(ratio[at], 2, 2 * freedom)) / np.log(10)
         if score > best:
