@@ -194,7 +194,8 @@ def test_a_pause_at_the_target_is_no_clipping(bench: Bench, friction: float) -> 
 def test_rounding_is_no_tone(excitation: str) -> None:
     """A recording without noise or encoder: what stands out of nothing is nothing."""
     bench = Bench.from_device("lhifam").quiet()
-    force = WhiteNoise(4.0, 200.0, 0.7, 10.0) if excitation == "noise" else Multisine(4.0, 1.0, 200.0, 1.0, 8)
+    multisine = Multisine(4.0, 1.0, 200.0, 1.0, 8)
+    force = WhiteNoise(4.0, 200.0, 0.7, 10.0) if excitation == "noise" else multisine
     made = simulate(bench, force, seed=1)
     recording = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
     etfe = estimate_etfe(recording)
