@@ -12,8 +12,8 @@ from bayeshaptic.models.prior import (
     Prior,
     Uniform,
     draw,
-    prior_from_table,
 )
+from bayeshaptic.models.prior_table import prior_from_table
 from bayeshaptic.models.response.system import LinearSystem
 
 __all__ = [

@@ -6,7 +6,6 @@ that are positive and known up to a factor, ``"linear"`` for those that may be z
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol, runtime_checkable
@@ -290,42 +289,3 @@ class LogUniform(_ByTerms):
 
     def describe(self, unit: str) -> str:
         return f"log-uniform from {self.low:.4g} to {self.high:.4g} {unit}"
-
-
-_FORMS: dict[frozenset[str], type] = {
-    frozenset({"median", "log_sd"}): LogNormal,
-    frozenset({"scale"}): HalfNormal,
-    frozenset({"scale", "floor"}): NearZero,
-    frozenset({"scale", "floor", "rise"}): NearZero,
-    frozenset({"mean", "sd"}): Normal,
-    frozenset({"mean", "sd", "low"}): Normal,
-    frozenset({"low", "high"}): Uniform,
-}
-
-
-def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
-    """The prior that a ``[prior]`` table of a study declares for the parameter `name`.
-
-    ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{scale, floor}`` (and ``rise``)
-    near zero,
-    ``{mean, sd}`` (and ``low``) normal, ``{low, high}`` uniform, and ``{low, high, log = true}``
-    log-uniform.
-
-    Raises
-    ------
-    InputError
-        If the keys fit none of these forms, or a value is not a number in range.
-    """
-    keys = dict(table)
-    log = keys.pop("log", False)
-    form = _FORMS.get(frozenset(keys))
-    if form is None:
-        raise InputError(
-            f"prior of {name}: keys {sorted(table)} fit no prior; use {{median, log_sd}}, "
-            "{scale}, {scale, floor}, {mean, sd}, {low, high} or {low, high, log = true}."
-        )
-    try:
-        numbers = {key: float(value) for key, value in keys.items()}  # type: ignore[arg-type]
-        return LogUniform(**numbers) if log and form is Uniform else form(**numbers)
-    except (TypeError, ValueError) as problem:
-        raise InputError(f"prior of {name}: {problem}") from None
