@@ -26,6 +26,8 @@ from bayeshaptic.report.page.methods import methods
 from bayeshaptic.report.study import write as study_write
 from bayeshaptic.report.walls.section import table_of
 
+_WITH_STIFFNESS = ("answer", "answer_narrow", "loop_stiffness")
+_STIFFNESS = re.compile(r"([\d.]+)(?: \(([\d.]+) to ([\d.]+)\))? ([kM]?[NA](?: m)?/(?:m|rad))")
 _DOT = style.drawn(style.new_figure(0.5, 0.5), "dot")
 
 
@@ -61,6 +63,38 @@ def check_page(result: Any, folder: Path) -> None:
     _effects_are_named_in_words(page)
     _methods_are_those_of_this_run(result, page)
     _every_file_is_there(folder)
+    _figures_say_what_the_tables_say(result, page)
+
+
+def figure_texts(picture: Any, result: Any) -> list[str]:
+    """What stands in a figure, line by line."""
+    from matplotlib.text import Text
+
+    figure = picture.draw(result)
+    names = [getattr(axes.yaxis.get_major_formatter(), "seq", ()) for axes in figure.axes]
+    found = [text.get_text() for text in figure.findobj(Text)] + [n for row in names for n in row]
+    return [line for text in found for line in text.split("\n") if line.strip()]
+
+
+def _figures_say_what_the_tables_say(result: Any, page: str) -> None:
+    """Every stiffness that is written into a figure is on the page in the same digits."""
+    closed = result.closed
+    pictures = PICTURES if closed is None or closed.force else (*PICTURES, *LOOP_PICTURES)
+    for picture in pictures:
+        if picture.name not in _WITH_STIFFNESS or not picture.shown(result):
+            continue
+        said = [text for text in figure_texts(picture, result) if _STIFFNESS.fullmatch(text)]
+        assert said, picture.name
+        for text in said:
+            assert text in page or _as_a_row(text, page), (picture.name, text)
+
+
+def _as_a_row(text: str, page: str) -> bool:
+    """A row of a table has the unit behind each number, and the lowest first."""
+    *numbers, unit = _STIFFNESS.fullmatch(text).groups()  # type: ignore[union-attr]
+    middle, *ends = (number for number in numbers if number)
+    order = (ends[0], middle, ends[1]) if ends else ("\N{EN DASH}", middle, "\N{EN DASH}")
+    return " ".join(n if n == "\N{EN DASH}" else f"{n} {unit}" for n in order) in page
 
 
 def same(one: float | None, other: float | None) -> None:

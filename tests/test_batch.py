@@ -102,7 +102,7 @@ def test_a_batch_goes_on_and_is_resumed(folder: Path, tmp_path: Path, reports: R
     (failed,) = csv.DictReader((out / "failed.csv").read_text().splitlines())
     assert failed["error"].endswith("b.csv: refused")
     page = (out / "index.html").read_text()
-    assert 'href="a/report.html"' in page and "&lt;Ada&gt;" in page and "http" not in page
+    assert 'href="a/report.html"' in page and "&lt;Ada&gt;" in page and "://" not in page
     assert json.loads((out / "manifest.json").read_text())["versions"]["bayeshaptic"]
 
 

@@ -13,6 +13,8 @@ from fake_study import fake_study
 import bayeshaptic as bh
 from bayeshaptic.report.walls.section import case_of, table_of
 
+ROOT = Path(__file__).parents[1]
+RELAY = ROOT / "data" / "recordings" / "phantom-user-relay.csv.gz"
 ANALYSIS = fake_analysis("free", spread=0.01)
 SHOWN: dict[str, Any] = {
     "recording": ANALYSIS.recording,
@@ -25,6 +27,13 @@ SHOWN: dict[str, Any] = {
     "closed": fake_closed(),
     "study": fake_study(people=1, free=1),
     "walls": table_of([case_of(ANALYSIS)], draws=60),
+    "relay": bh.measure_relay(bh.read_recording(RELAY)),
+    "study file": bh.read_study(ROOT / "examples" / "study" / "study.toml"),
+    "case": case_of(ANALYSIS),
+    "region": bh.kb_region(ANALYSIS.posterior, draws=60),
+    "shares": bh.variance_shares(ANALYSIS.posterior, draws=200),
+    "elasticities": bh.elasticities(ANALYSIS.posterior, draws=200)[0],
+    "sweep": bh.sweep(ANALYSIS.posterior, "kc", draws=60),
 }
 
 
@@ -42,8 +51,11 @@ def test_numbers_have_units() -> None:
     assert "30.0 s" in repr(ANALYSIS.recording)
 
 
+TABLES = [("shares", 3), ("elasticities", 6), ("sweep", 25)]
+
+
 @pytest.mark.parametrize(
-    ("name", "rows"), [("fit", 6), ("posterior", 6), ("response", 110), ("study", 3)]
+    ("name", "rows"), [("fit", 6), ("posterior", 6), ("response", 110), ("study", 3), *TABLES]
 )
 def test_tables_become_data_frames(name: str, rows: int) -> None:
     pytest.importorskip("pandas", reason="pandas is not installed")

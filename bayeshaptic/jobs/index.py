@@ -7,11 +7,13 @@ import io
 import json
 import os
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import Any
 
 from bayeshaptic.files import write_whole
+from bayeshaptic.quantities import quantity
+from bayeshaptic.report.page.frame import frame, template
+from bayeshaptic.report.page.lights import BAD, DOUBT, GOOD, SIGNS
 
 COLUMNS = {
     "name": "Recording",
@@ -24,41 +26,18 @@ COLUMNS = {
     "q50": "K_CR median",
     "q95": "K_CR 95 %",
     "unit": "Unit",
-    "frequency_hz": "Hz",
+    "frequency_hz": "Frequency",
     "verdict": "Verdict",
     "error": "Error",
 }
 _NUMBERS = ("safe", "q05", "q50", "q95", "frequency_hz")
-_LIGHTS = {"safe": "#2e7d32", "caution": "#f9a825", "untrusted": "#c62828", "failed": "#616161"}
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en"><meta charset="utf-8"><title>bayeshaptic: {title}</title>
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<style>
-body {{ font: 14px/1.4 system-ui, sans-serif; margin: 2em; color: #1a1a1a }}
-table {{ border-collapse: collapse }}
-th, td {{ padding: .25em .7em; border-bottom: 1px solid #ddd; text-align: left }}
-th {{ cursor: pointer; position: sticky; top: 0; background: white }}
-td.number {{ text-align: right; font-variant-numeric: tabular-nums }}
-i {{ display: inline-block; width: .7em; height: .7em; border-radius: 50%; margin-right: .4em }}
-</style>
-<h1>{title}</h1>
-<p>{count} rows, {failed} failed. Stiffness in the unit of each row; a click on a heading sorts.</p>
-<table><thead><tr>{heads}</tr></thead><tbody>
-{rows}
-</tbody></table>
-<script>
-document.querySelectorAll("th").forEach((head, i) => head.onclick = () => {{
-  const body = document.querySelector("tbody");
-  const down = head.dataset.down = -(head.dataset.down || -1);
-  const value = row => {{ const text = row.cells[i].dataset.value;
-    return text === "" ? null : isNaN(text) ? text : Number(text); }};
-  [...body.rows].sort((a, b) => {{ const [x, y] = [value(a), value(b)];
-    return x === null ? 1 : y === null ? -1 : down * (x > y ? 1 : x < y ? -1 : 0); }})
-    .forEach(row => body.append(row));
-}});
-</script></html>
-"""
+# A sign for where there is no colour, and the class of the page's style.
+_LIGHTS = {
+    "safe": (SIGNS[GOOD], GOOD),
+    "caution": (SIGNS[DOUBT], DOUBT),
+    "untrusted": (SIGNS[BAD], BAD),
+    "failed": ("\N{EM DASH}", BAD),
+}
 
 
 def row_of(name: str, folder: Path, status: str | None, error: str | None) -> dict[str, Any]:
@@ -100,12 +79,13 @@ def write_index(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         write_whole(folder / "failed.csv", _table(failed, ("name", "folder", "error")))
     else:
         (folder / "failed.csv").unlink(missing_ok=True)
-    page = _PAGE.format(
-        title=escape(folder.name),
-        count=len(rows),
+    page = template("index.jinja").render(
+        **frame(),
+        title=folder.name,
         failed=len(failed),
-        heads="".join(f"<th>{escape(title)}</th>" for title in COLUMNS.values()),
-        rows="\n".join(_line(row, folder) for row in rows),
+        columns={key: title for key, title in COLUMNS.items() if key != "unit"},
+        numbers=_NUMBERS,
+        rows=[_shown(row, folder) for row in rows],
     )
     write_whole(folder / "index.html", page)
 
@@ -118,17 +98,18 @@ def _table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
     return text.getvalue()
 
 
-def _line(row: Mapping[str, Any], folder: Path) -> str:
-    cells = []
+def _shown(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A row as the page shows it: (text, what to sort by) of each column, its light, its report."""
+    cells = {}
     for key in COLUMNS:
         value = row[key]
-        text = "" if value is None else f"{value:.4g}" if key in _NUMBERS else escape(str(value))
-        if key == "name" and row["error"] is None:
-            page = Path(os.path.relpath(Path(row["folder"]) / "report.html", folder)).as_posix()
-            text = f'<a href="{escape(page)}">{text}</a>'
-        if key == "status":
-            text = f'<i style="background:{_LIGHTS.get(str(value), "#616161")}"></i>{text}'
-        kind = ' class="number"' if key in _NUMBERS else ""
-        shown = "" if value is None else escape(str(value))
-        cells.append(f'<td{kind} data-value="{shown}">{text}</td>')
-    return f"<tr>{''.join(cells)}</tr>"
+        text = "" if value is None else str(value)
+        if key in _NUMBERS:
+            unit = "Hz" if key == "frequency_hz" else row["unit"] or ""
+            text = "" if value is None else quantity(value, unit, digits=4)
+        cells[key] = (text, "" if value is None else value)
+    page = None
+    if row["error"] is None:
+        page = Path(os.path.relpath(Path(row["folder"]) / "report.html", folder)).as_posix()
+    sign, light = _LIGHTS.get(str(row["status"]), _LIGHTS["failed"])
+    return {"cells": cells, "page": page, "sign": sign, "light": light}

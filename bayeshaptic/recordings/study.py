@@ -15,6 +15,7 @@ from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.read import Columns, Span
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.shown import Shown, listed
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ class StudyEntry:
     more: tuple[StudyEntry, ...] = ()
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(Shown):
     """One device: its facts and all its recordings.
 
     Attributes
@@ -84,6 +85,14 @@ class Study:
     notices: tuple[Notice, ...] = ()
     references: tuple[Reference, ...] = ()
     feedback: Feedback | None = None
+
+    def _lines(self) -> tuple[str, ...]:
+        places = dict.fromkeys(one.configuration for one in self.entries)
+        return (
+            f"Study {self.name} of the device {self.device.name}: {len(self.entries)} recordings",
+            f"held by {listed(self.users)}" if self.users else "held by nobody",
+            f"configurations: {listed(str(p) for p in places if p is not None) or 'none named'}",
+        )
 
     @property
     def users(self) -> tuple[str, ...]:

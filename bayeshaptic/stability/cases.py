@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
+from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import MOST_DRAWS, CriticalStiffness
 from bayeshaptic.stability.effective import effective_draws
 from bayeshaptic.stability.tail import low_quantile, quantiles
@@ -20,8 +21,8 @@ from bayeshaptic.types import Floats, Ints
 FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
 
 
-@dataclass(frozen=True)
-class Case:
+@dataclass(frozen=True, repr=False)
+class Case(Shown):
     """A situation that a device must stay stable in: who holds it, in which configuration.
 
     Attributes
@@ -45,6 +46,12 @@ class Case:
     draws: Floats = field(repr=False)
     limit: CriticalStiffness = field(repr=False)
     joint: str | None = None
+
+    def _lines(self) -> tuple[str, ...]:
+        return (
+            f"Case: {self.label} ({self.model.name} model, {len(self.draws):,} draws)",
+            *self.limit._lines()[:2],
+        )
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.progress import told
+from bayeshaptic.quantities import estimate
+from bayeshaptic.shown import Shown, listed
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
@@ -36,8 +38,8 @@ _FIRST_STEPS = 200
 _DESCRIPTIONS = 2  # rounds of describing recordings better, at most
 
 
-@dataclass(frozen=True)
-class Population:
+@dataclass(frozen=True, repr=False)
+class Population(Shown):
     """Posterior of a population of hands, and of the device that they held.
 
     Attributes
@@ -77,6 +79,38 @@ class Population:
     _here: Coordinates | None = field(default=None, repr=False)
     _hierarchy: Hierarchy | None = field(default=None, repr=False)
     _below: Below | None = field(default=None, repr=False)
+
+    def _lines(self) -> tuple[str, ...]:
+        low, middle, high = np.quantile(np.exp(self.log_mean), (0.05, 0.5, 0.95), axis=0)
+        typical = (
+            f"{name} {estimate(m, a, b, self.model.unit(name))}"
+            for name, a, m, b in zip(self.parameters, low, middle, high, strict=True)
+        )
+        spread = (
+            f"{name} {100 * sd:.0f} %"
+            for name, sd in zip(self.parameters, np.median(self.log_sd, axis=0), strict=True)
+        )
+        return (
+            f"Population of {len(self.users)} people in {len(self.recordings)} recordings",
+            f"typical person: {listed(typical, 3)}",
+            f"people differ by {listed(spread)}",
+        )
+
+    def _lines(self) -> tuple[str, ...]:
+        low, middle, high = np.quantile(np.exp(self.log_mean), (0.05, 0.5, 0.95), axis=0)
+        typical = (
+            f"{name} {estimate(m, a, b, self.model.unit(name))}"
+            for name, a, m, b in zip(self.parameters, low, middle, high, strict=True)
+        )
+        spread = (
+            f"{name} {100 * sd:.0f} %"
+            for name, sd in zip(self.parameters, np.median(self.log_sd, axis=0), strict=True)
+        )
+        return (
+            f"Population of {len(self.users)} people in {len(self.recordings)} recordings",
+            f"typical person: {listed(typical, 3)}",
+            f"people differ by {listed(spread)}",
+        )
 
     @property
     def device_parameters(self) -> tuple[str, ...]:

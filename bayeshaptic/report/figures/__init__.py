@@ -58,6 +58,12 @@ PICTURES = (
         shown=_has_limit,
     ),
     Picture(
+        "answer_narrow",
+        answer.draw_narrow,
+        "The same estimates of the limit, for a narrow screen",
+        shown=_has_limit,
+    ),
+    Picture(
         "stiffness",
         stiffness.draw,
         "Distribution of the critical stiffness by crossing",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import estimate, quantity
+from bayeshaptic.quantities import estimate, quantity, spread_of
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import Witness, decibel, witnesses
@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NARROWEST_DB = 1.0
-_NAMES = {"posterior": "model, with its uncertainty", "least_squares": "deterministic fit"}
+# Inches of a phone's screen, on which a figure of the page's width would be scrolled.
+_PHONE_IN = 3.75
 
 
 def draw(result: Result) -> Figure:
@@ -26,12 +27,20 @@ def draw(result: Result) -> Figure:
     return figure
 
 
+def draw_narrow(result: Result) -> Figure:
+    """The same for a phone: the numbers stand under the names."""
+    rows = shown(result)
+    figure = style.new_figure(0.7 + 0.36 * max(len(rows), 1), _PHONE_IN)
+    draw_on(style.panel(figure.subplots()), result, narrow=True)
+    return figure
+
+
 def shown(result: Result) -> tuple[Witness, ...]:
     """The estimates that have a place on the axis."""
     return tuple(w for w in witnesses(result) if w.middle is not None and w.middle > 0)
 
 
-def draw_on(axes: Axes, result: Result) -> None:
+def draw_on(axes: Axes, result: Result, narrow: bool = False) -> None:
     """The same on axes that are there."""
     rows, unit = shown(result), result.analysis.limit.unit
     style.panel(axes, f"critical stiffness, dB re 1 {unit}")
@@ -57,8 +66,12 @@ def draw_on(axes: Axes, result: Result) -> None:
             linewidth=3.0 if ours else 1.2,
             capsize=3,
         )
-    names = [_NAMES.get(w.key, w.label) for w in rows]
-    style.rows(axes, names, [_number(witness, unit) for witness in rows])
+    spread = spread_of(rows[0].low or 0.0, rows[0].high or 0.0) if rows else None
+    names, numbers = [w.label for w in rows], [_number(w, unit, spread) for w in rows]
+    if narrow:
+        both = zip(names, numbers, strict=True)
+        names, numbers = [f"{name}\n{number}" for name, number in both], []
+    style.rows(axes, names, numbers)
     low, high = axes.get_xlim()
     if high - low < _NARROWEST_DB:
         centre = 0.5 * (low + high)
@@ -66,7 +79,8 @@ def draw_on(axes: Axes, result: Result) -> None:
     axes.ticklabel_format(axis="x", useOffset=False)
 
 
-def _number(witness: Witness, unit: str) -> str:
+def _number(witness: Witness, unit: str, spread: float | None) -> str:
+    """With the digits of the table of the same estimates."""
     if witness.middle is None or witness.low is None or witness.high is None:
-        return quantity(witness.middle, unit, digits=4)
+        return quantity(witness.middle, unit, spread)
     return estimate(witness.middle, witness.low, witness.high, unit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,17 +107,12 @@ def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float)
     few = slice(None, None, max(len(x) // POINTS, 1))
     axes.plot(x[few], y[few], ".", color=style.MODEL, markersize=1.1, alpha=0.35, rasterized=True)
     ranges = [_wide(x), _wide(y)]
-    count, x_edges, y_edges = np.histogram2d(x, y, 22, ranges)
-    levels = credible(count, x_edges, y_edges, x, y)
+    turned, back = _turned(x, y)
+    count, u_edges, v_edges = np.histogram2d(*turned, 22, [_wide(turned[0]), _wide(turned[1])])
+    levels = credible(count, u_edges, v_edges, *turned)
     if np.all(np.diff(levels) > 0):
-        axes.contour(
-            _middle(x_edges),
-            _middle(y_edges),
-            _smooth(count).T,
-            levels,
-            colors=style.DATA,
-            linewidths=0.7,
-        )
+        grid = np.meshgrid(_middle(u_edges), _middle(v_edges))
+        axes.contour(*back(grid), _smooth(count).T, levels, colors=style.DATA, linewidths=0.7)
     axes.set_xlim(*ranges[0])
     axes.set_ylim(*ranges[1])
     axes.text(
@@ -151,6 +147,24 @@ def _map(figure: Figure, matrix: NDArray[Any], names: tuple[str, ...]) -> None:
             text = f"{10 * matrix[i, j]:.0f}".replace("-0", "0").replace("-", "\N{MINUS SIGN}")
             axes.text(j, i, text, ha="center", va="center", fontsize=style.SMALL - 1.5)
             axes.text(i, j, text, ha="center", va="center", fontsize=style.SMALL - 1.5)
+
+
+def _turned(x: NDArray[Any], y: NDArray[Any]) -> tuple[NDArray[Any], Callable[[Any], NDArray[Any]]]:
+    """Draws along their principal axes, (2, n), and the way back.
+
+    There a narrow ridge is as round as any cloud, and a histogram does not blur it.
+    """
+    points = np.array([x, y])
+    centre, spread = points.mean(axis=1), points.std(axis=1)
+    spread = np.where(spread > 0, spread, 1.0)
+    plain = (points - centre[:, None]) / spread[:, None]
+    axes = np.linalg.eigh(np.cov(plain))[1]
+
+    def back(grid: Any) -> NDArray[Any]:
+        placed = np.einsum("ij,j...->i...", axes, np.asarray(grid))
+        return placed * spread[:, None, None] + centre[:, None, None]
+
+    return axes.T @ plain, back
 
 
 def _wide(values: NDArray[Any]) -> tuple[float, float]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 RISKS = (0.05, 0.01, 0.001)
 RULE_DRAWS = 4000
+_OURS = "model, with its uncertainty"
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,8 @@ def witnesses(result: Result) -> tuple[Witness, ...]:
     low, middle, high = (finite(limit.quantile(p)) for p in (0.05, 0.5, 0.95))
     fitted = least_squares_limit(analysis)
     found = [
-        Witness("posterior", "posterior", "the model with its uncertainty", middle, low, high),
-        Witness("least_squares", "least squares", "the same model, one number", fitted),
+        Witness("posterior", _OURS, "median and 90 % interval of the posterior", middle, low, high),
+        Witness("least_squares", "deterministic fit", "least squares, one number", fitted),
     ]
     return (*found, *_measured(result), *_rules(analysis))
 

@@ -5,9 +5,12 @@
 // Tables of the class "sortable".
 const value = (row, column) => {
   const text = row.cells[column].dataset.value ?? row.cells[column].textContent.trim();
+  if (text === "" || text === "\u2013") return null;
   const number = parseFloat(text.replace(/\u2212/g, "-").replace(/,/g, ""));
   return Number.isNaN(number) ? text.toLowerCase() : number;
 };
+const compared = (x, y, down) =>  // what is missing stands last, whichever way
+  x === null ? (y === null ? 0 : 1) : y === null ? -1 : order(x, y) * (down ? -1 : 1);
 const order = (x, y) => typeof x === typeof y ? (x < y ? -1 : x > y ? 1 : 0) : typeof x === "number" ? -1 : 1;
 for (const table of document.querySelectorAll("table.sortable")) {
   const heads = [...table.tHead.rows[0].cells];
@@ -21,7 +24,7 @@ for (const table of document.querySelectorAll("table.sortable")) {
       for (const other of heads) other.removeAttribute("aria-sort");
       head.setAttribute("aria-sort", down ? "descending" : "ascending");
       const rows = [...table.tBodies[0].rows];
-      rows.sort((a, b) => order(value(a, column), value(b, column)) * (down ? -1 : 1));
+      rows.sort((a, b) => compared(value(a, column), value(b, column), down));
       table.tBodies[0].append(...rows);
     });
   });

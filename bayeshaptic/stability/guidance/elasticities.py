@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.parameter import Parameter
+from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
 from bayeshaptic.stability.crossings import find_crossings, response_of
 from bayeshaptic.stability.walls.source import loops_of
@@ -29,8 +30,8 @@ _SMALL = 1e-3
 _TURN = 1e-5  # relative, of the angle
 
 
-@dataclass(frozen=True)
-class Elasticities:
+@dataclass(frozen=True, repr=False)
+class Elasticities(Shown):
     """d ln K_CR / d ln p at one of the crossings that may bind.
 
     Attributes
@@ -49,6 +50,23 @@ class Elasticities:
     names: tuple[str, ...]
     values: Floats = field(repr=False)
     slopes: Floats = field(repr=False)
+
+    def _lines(self) -> tuple[str, ...]:
+        ordered = sorted(self.median.items(), key=lambda pair: -abs(pair[1]))
+        return (
+            f"Elasticities of the limit at the {self.crossing.label}, {len(self.values):,} draws",
+            "1 % more of a parameter changes it by:",
+            listed(f"{name} {value:+.2g} %" for name, value in ordered),
+        )
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a parameter: 5, 50 and 95 per cent of its elasticity."""
+        quantiles = np.quantile(self.values, (0.05, 0.5, 0.95), axis=0).T.tolist()
+        rows = (
+            {"name": name, "q05": low, "q50": middle, "q95": high}
+            for name, (low, middle, high) in zip(self.names, quantiles, strict=True)
+        )
+        return data_frame(rows, "name")
 
     @property
     def median(self) -> dict[str, float]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from bayeshaptic.arguments import at_the_door
+from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.stability.crossings import find_crossings
 from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.types import Floats
@@ -40,8 +41,8 @@ class Share:
     correlation: float = 0.0
 
 
-@dataclass(frozen=True)
-class VarianceShares:
+@dataclass(frozen=True, repr=False)
+class VarianceShares(Shown):
     """First-order shares of the variance of ln K_CR.
 
     Attributes
@@ -59,6 +60,19 @@ class VarianceShares:
     log_sd: float
     beyond: float
     draws: int
+
+    def _lines(self) -> tuple[str, ...]:
+        told = (f"{' and '.join(one.names)} {100 * one.share:.0f} %" for one in self.shares)
+        return (
+            f"Shares of the variance of ln K, {self.draws:,} draws",
+            listed(told) or "none",
+            f"the limit is known to ± {20 / np.log(10) * self.log_sd:.2g} dB (sd)",
+        )
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a group of parameters: share and correlation."""
+        rows = ({**vars(one), "names": ", ".join(one.names)} for one in self.shares)
+        return data_frame(rows, "names")
 
     @property
     def together(self) -> float:

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
+from bayeshaptic.quantities import quantity
+from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import TITLES, binding_kinds
 from bayeshaptic.stability.crossings import find_crossings
 from bayeshaptic.stability.guidance.elasticities import with_delay
@@ -41,8 +43,8 @@ class Jump:
     after_hz: float
 
 
-@dataclass(frozen=True)
-class Sweep:
+@dataclass(frozen=True, repr=False)
+class Sweep(Shown):
     """K_CR over one parameter.
 
     Attributes
@@ -77,6 +79,21 @@ class Sweep:
     jumps: tuple[Jump, ...]
     stiffness_unit: str
     added: bool = False
+
+    def _lines(self) -> tuple[str, ...]:
+        ends = (self.values[0], self.values[-1])
+        limits = [quantity(float(k), self.stiffness_unit) for k in np.sort(self.middle)[[0, -1]]]
+        return (
+            f"Sweep of {self.name} from {' to '.join(quantity(float(v), self.unit) for v in ends)}",
+            f"now {quantity(self.now, self.unit)}",
+            f"limit from {' to '.join(limits)} (medians)",
+        )
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a value: K_CR, what binds, its frequency."""
+        names = ("values", "low", "middle", "high", "binds", "frequency_hz")
+        columns = (getattr(self, name) for name in names)
+        return data_frame(dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
 
 
 @at_the_door

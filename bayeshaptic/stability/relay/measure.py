@@ -24,8 +24,10 @@ import numpy as np
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.shown import Shown
 from bayeshaptic.stability.relay.estimate import estimate, jackknife, oscillation_share
 from bayeshaptic.stability.relay.spectra import (
     STEADY_DB,
@@ -49,8 +51,8 @@ _TOGETHER = 0.3  # 0.02 of a binary sequence in open loop
 _CERTAIN_DB = 0.7  # a critical stiffness that is less certain than this is none
 
 
-@dataclass(frozen=True)
-class RelayMeasurement:
+@dataclass(frozen=True, repr=False)
+class RelayMeasurement(Shown):
     """What a relay experiment says.
 
     Attributes
@@ -89,6 +91,21 @@ class RelayMeasurement:
     steady_s: tuple[float, float]
     share: float
     notices: tuple[Notice, ...] = ()
+
+    def _lines(self) -> tuple[str, ...]:
+        limit = "no crossing can be read"
+        if self.critical_stiffness is not None:
+            limit = (
+                f"critical stiffness {quantity(self.critical_stiffness, self.unit, digits=4)}, "
+                f"± {self.critical_sd_db:.2f} dB, at {self.crossing_hz:.2f} Hz"
+            )
+        return (
+            "Relay experiment: oscillates at "
+            f"{self.frequency_hz:.2f} ± {self.frequency_sd_hz:.2f} Hz",
+            f"gain margin {quantity(self.gain_margin, self.unit, digits=4)}, "
+            f"± {self.gain_margin_sd_db:.2f} dB, at {self.phase_deg:+.1f} degrees from -180",
+            f"{limit}; {self.steady_s[1] - self.steady_s[0]:.1f} s of steady oscillation",
+        )
 
     @property
     def gain_margin_db(self) -> float:

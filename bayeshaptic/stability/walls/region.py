@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
+from bayeshaptic.quantities import quantity
+from bayeshaptic.shown import Shown
 from bayeshaptic.stability.tail import ENOUGH_BELOW
 from bayeshaptic.stability.walls.count import beyond_start, unstable_at_start
 from bayeshaptic.stability.walls.curve import (
@@ -33,8 +35,8 @@ INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matte
 _CELLS = 4_000_000  # of loops, dampings and stiffnesses at a time
 
 
-@dataclass(frozen=True)
-class KbRegion:
+@dataclass(frozen=True, repr=False)
+class KbRegion(Shown):
     """The stable region of C(z) = K + B D(z) for each loop of a posterior, or of one model.
 
     Attributes
@@ -54,6 +56,15 @@ class KbRegion:
     critical: Floats = field(repr=False)
     effective: float
     unit: str
+
+    def _lines(self) -> tuple[str, ...]:
+        stiffest = float(np.median(self.critical))
+        largest = float(np.median(self.largest_damping()))
+        return (
+            f"Stable walls with velocity by {self.kind.label}: {len(self.start):,} loops",
+            f"without damping up to {quantity(stiffest, self.unit)} (median)",
+            f"damping up to {quantity(largest, self.damping_unit)} (median)",
+        )
 
     @property
     def kind(self) -> Damping:
