@@ -317,7 +317,7 @@ def test_no_text_of_a_figure_covers_another_or_is_cut_off(
         drawn_texts.clear()
         figure.canvas.draw()
         boxes = list(drawn_texts)
-        assert len(boxes) > 10, picture.name
+        assert sum(1 + text.count("\n") for _, text in boxes) > 10, picture.name
         canvas = figure.bbox
         for index, (box, text) in enumerate(boxes):
             inside = (
@@ -428,7 +428,7 @@ def test_a_real_analysis_makes_a_whole_report(tmp_path: Path) -> None:
     again = bayeshaptic.critical_stiffness(saved)
     assert again.quantile(0.5) == pytest.approx(limit["q50"], rel=1e-9)
     text = page.read_text(encoding="utf-8")
-    assert headline(analysis).sentence in html.unescape(text)
+    assert headline(analysis).sentence in html.unescape(text).replace("\xa0", " ")
     assert "rigid body at 17" in text
     assert hashlib.sha256(data.read_bytes()).hexdigest() in text
 
@@ -539,9 +539,9 @@ def test_the_page_in_a_browser(case: str, tmp_path: Path) -> None:
         assert found["width"] <= found["window"], "the page scrolls sideways"
         assert all(name.startswith("data:") for name in found["requests"])
         assert len(found["images"]) == len(NAMES)
-        assert all(natural > 300 for _, natural, _ in found["images"])
-        # The residual and the sampler are folded away; a phone scrolls figures sideways.
-        assert sum(shown > 0 for *_, shown in found["images"]) >= len(NAMES) - 2
+        assert all(natural > 250 for _, natural, _ in found["images"])
+        # Folded away: residual and sampler; one of the two bars. A phone scrolls figures sideways.
+        assert sum(shown > 0 for *_, shown in found["images"]) >= len(NAMES) - 3
 
 
 @needs_browser

@@ -94,8 +94,7 @@ def open_questions(
     if not one_mass:
         reasons.append(
             f"nothing here shows how the device vibrates above {found.motion.bandwidth_hz:.3g} Hz, "
-            "where a mode may set a lower limit than that of one mass (where it is known to be "
-            "one, say --model rigid)"
+            "where a vibration mode may set a lower limit than that of one mass"
         )
     model = posterior.model
     for name, dominated in posterior.prior_dominated.items():

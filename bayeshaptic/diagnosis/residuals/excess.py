@@ -46,7 +46,7 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     rise = 10 * np.log10(scatter / freedom / floor)
     worst = int(np.argmax(rise))
     where = float(centre[driven][worst + _TOGETHER // 2])
-    text = f"the noise around {where:.3g} Hz is {rise[worst]:.1f} dB above that beyond the band"
+    text = f"around {where:.3g} Hz the noise is {rise[worst]:.1f} dB louder than outside the band"
     return (Test(EXCESS_NOISE, "nonlinear", float(rise[worst]), thresholds.EXCESS_DB, where, text),)
 
 

@@ -25,6 +25,7 @@ from bayeshaptic.effects.measurement import (
     SampleJitter,
     WildSamples,
 )
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.recording import Recording
 
 
@@ -84,8 +85,9 @@ def of_resolution(found: Resolution, unit: str) -> Finding:
     """Counts coarser than declared."""
     text = "the positions are not multiples of anything"
     if found.count:
-        text = f"the positions are multiples of {found.count:.4g} {unit}"
-        text += f" where {found.declared:.4g} {unit} were declared" if found.declared else ""
+        text = f"the positions are multiples of {quantity(found.count, unit)}"
+        if found.declared:
+            text += f" where {quantity(found.declared, unit)} were declared"
     estimates = {"resolution": Estimate(found.count, 0.0, unit)}
     return Finding(
         Quantisation, found.statistic, thresholds.RESOLUTION, text, estimates, mended=False

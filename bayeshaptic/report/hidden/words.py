@@ -31,9 +31,9 @@ def lead(analysis: Analysis, hidden: Hidden) -> str:
     declared, limit = (interval_of(one) for one in (hidden.declared, analysis.limit))
     return (
         f"If the model is exact, the critical stiffness is {declared}. No device is exactly its "
-        "model, and what the tests of this recording cannot see may still move the limit. With "
-        f"that allowed for it is {limit}, and this is the distribution that everything on this "
-        f"page is of. That there is nothing more has a probability of {percent(hidden.nothing)}."
+        "model: what the tests of this recording cannot see may still move the limit. With that "
+        f"allowed for, the critical stiffness is {limit}. All of this page is of that "
+        f"distribution. The model is exact with a probability of {percent(hidden.nothing)}."
     )
 
 
@@ -43,8 +43,8 @@ def largest(hidden: Hidden) -> str:
     if first is None or reach(first) < FEW:
         return "Nothing that could hide here would move the limit by more than 0.005 dB."
     return (
-        f"The largest share is that of {first.title}: if it is there (probability "
-        f"{percent(first.probability)}), {size(first)}, it moves the limit by "
+        f"What could move it most: {first.title}. It is there with a probability of "
+        f"{percent(first.probability)}, and then it is {size(first)} and moves the limit by "
         f"{db(first.shift_db[0])} to {db(first.shift_db[2])} dB. To rule it out, "
         f"{ruled_out(first)}. A longer recording, or one with more force, shrinks all of them."
     )

@@ -21,11 +21,11 @@ def in_short(analysis: Analysis) -> str:
     if hidden is None:
         return ""
     first = next(iter(hidden.effects), None)
-    text = f"{interval_of(hidden.declared)} if the model is exact"
+    text = f"is allowed for: without it the limit would be {interval_of(hidden.declared)}"
     if first is None or reach(first) < FEW:
         return text
     shift = min(first.shift_db[0], 0.0) if first.shift_db[0] < 0 else first.shift_db[2]
-    return f"{text}; most of the difference is {first.title}, unseen {size(first)} ({db(shift)} dB)"
+    return f"{text}. It is mostly: {first.title}, {size(first)} of it ({db(shift)} dB)"
 
 
 def interval_of(limit: CriticalStiffness) -> str:

@@ -6,6 +6,7 @@ import base64
 import hashlib
 import html
 import json
+import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from bayeshaptic.report.figures.style import Drawn
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|dB|[kMm\N{MICRO SIGN}]?(?:N|Hz|s|m|g|A))(?:\W|$))")
 LABELS = {
     "safe": "Recommendation",
     "caution": "Recommendation, with caution",
@@ -60,6 +62,7 @@ def frame() -> dict[str, Any]:
         "written": written(),
         "faq": entry,
         "plain": without_links,
+        "unbroken": unbroken,
     }
 
 
@@ -70,6 +73,11 @@ def with_contents(page: str, contents: Sequence[tuple[str, str]]) -> str:
     )
     place = page.index("</nav>")
     return page[:place] + links + page[place:]
+
+
+def unbroken(text: str) -> str:
+    """A number and its unit stay on one line."""
+    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def embedded(name: str, drawn: Drawn, words: str) -> EmbeddedPicture:

@@ -12,6 +12,7 @@ from bayeshaptic.report.numbers.misfit import (
     misfit_is_faint,
     residual_is_noticed,
 )
+from bayeshaptic.report.numbers.result import is_unexplained
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -57,7 +58,7 @@ class Light:
 def lights(result: Result) -> tuple[Light, ...]:
     """The four lights of a result."""
     analysis = result.analysis
-    return _recording(analysis), _fit(analysis), _loop(result), _sampler(analysis)
+    return _recording(analysis), _fit(result), _loop(result), _sampler(analysis)
 
 
 def _recording(analysis: Analysis) -> Light:
@@ -69,7 +70,8 @@ def _recording(analysis: Analysis) -> Light:
     return Light("Recording", GOOD, "no objection", "measured")
 
 
-def _fit(analysis: Analysis) -> Light:
+def _fit(result: Result) -> Light:
+    analysis = result.analysis
     if analysis.in_loop is not None:
         if analysis.in_loop.doubts:
             return Light("Fit", BAD, "halves disagree", "force")
@@ -80,7 +82,8 @@ def _fit(analysis: Analysis) -> Light:
         return Light("Fit", BAD, "not noise", "notices")
     if misfit_is_faint(analysis):
         return Light("Fit", DOUBT, "slightly above noise", "leftover")
-    return Light("Fit", GOOD, "noise is left", "leftover")
+    left = "no larger than noise" if is_unexplained(result) else "noise is left"
+    return Light("Fit", GOOD, left, "leftover")
 
 
 def _loop(result: Result) -> Light:

@@ -18,9 +18,15 @@ def next_step(head: Headline, result: Result) -> str:
         return ""
     analysis, command = result.analysis, _command(result)
     if has_feedback(analysis.notices):
-        return (
+        again = (
             "Record again with a force that does not depend on the motion (white noise or a "
             f"multisine), and report on that recording: {command}"
+        )
+        if analysis.in_loop is None or analysis.in_loop.doubts:
+            return again
+        return (
+            f"{again}. Where the device is known to be one rigid mass, say so, and this recording "
+            f"will do: {command} --model rigid"
         )
     if not analysis.posterior.converged:
         return (
