@@ -96,22 +96,6 @@ class Population(Shown):
             f"people differ by {listed(spread)}",
         )
 
-    def _lines(self) -> tuple[str, ...]:
-        low, middle, high = np.quantile(np.exp(self.log_mean), (0.05, 0.5, 0.95), axis=0)
-        typical = (
-            f"{name} {estimate(m, a, b, self.model.unit(name))}"
-            for name, a, m, b in zip(self.parameters, low, middle, high, strict=True)
-        )
-        spread = (
-            f"{name} {100 * sd:.0f} %"
-            for name, sd in zip(self.parameters, np.median(self.log_sd, axis=0), strict=True)
-        )
-        return (
-            f"Population of {len(self.users)} people in {len(self.recordings)} recordings",
-            f"typical person: {listed(typical, 3)}",
-            f"people differ by {listed(spread)}",
-        )
-
     @property
     def device_parameters(self) -> tuple[str, ...]:
         """Names of the parameters that all recordings share up to a small spread."""

@@ -107,9 +107,9 @@ def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float)
     few = slice(None, None, max(len(x) // POINTS, 1))
     axes.plot(x[few], y[few], ".", color=style.MODEL, markersize=1.1, alpha=0.35, rasterized=True)
     ranges = [_wide(x), _wide(y)]
-    turned, back = _turned(x, y)
-    count, u_edges, v_edges = np.histogram2d(*turned, 22, [_wide(turned[0]), _wide(turned[1])])
-    levels = credible(count, u_edges, v_edges, *turned)
+    (u, v), back = _turned(x, y)
+    count, u_edges, v_edges = np.histogram2d(u, v, 22, [_wide(u), _wide(v)])
+    levels = credible(count, u_edges, v_edges, u, v)
     if np.all(np.diff(levels) > 0):
         grid = np.meshgrid(_middle(u_edges), _middle(v_edges))
         axes.contour(*back(grid), _smooth(count).T, levels, colors=style.DATA, linewidths=0.7)
