@@ -90,7 +90,7 @@ def test_a_figure_tells_its_values_and_switches(page: Any) -> None:
         page.keyboard.press("Escape")
         assert plot.locator(".tip").is_hidden()
     for group in page.locator(".switch").all():
-        figure = page.locator("figure", has=group)
+        figure = group.locator("xpath=ancestor::figure")
         group.get_by_text("before").click()
         assert figure.locator("svg .before").first.evaluate("e => e.style.display") == ""
         assert figure.locator("svg .after").first.evaluate("e => e.style.display") == "none"
