@@ -45,6 +45,7 @@ class Likelihood:
             return self.pointwise(theta).sum(axis=1)
         from bayeshaptic.models.response.kernels.rational import log_likelihood
 
+        spend(_CALL + len(theta) * self.windows.frequency_hz.size)
         value = np.empty(len(theta))
         log_likelihood(form, self._arrays, value)
         return value

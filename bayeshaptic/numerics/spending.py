@@ -56,10 +56,11 @@ def spend(evaluations: float) -> None:
 
 @contextmanager
 def metered(limit: float = float("inf")) -> Iterator[Meter]:
-    """Count what is spent inside."""
+    """Count what is spent inside; it counts for whoever counts around this, too."""
     meter = Meter(limit)
     token = _meter.set(meter)
     try:
         yield meter
     finally:
         _meter.reset(token)
+        spend(meter.spent)
