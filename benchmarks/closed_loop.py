@@ -11,12 +11,16 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.inference.time_domain.loop import Loop
+from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG
+from bayeshaptic.inference.time_domain.uneven import Way
 from bayeshaptic.inference.time_domain.widths import FREEDOM
 from bayeshaptic.models import rigid
 from bayeshaptic.recordings import recording_from_arrays
@@ -46,11 +50,16 @@ class Track(Effect):
 
 @dataclass(frozen=True)
 class Case:
-    """A recording, and the truth in the order of `NAMES`."""
+    """A recording, the truth in the order of `NAMES`, and what disturbed it.
+
+    `resolution` is the encoder's count, `even` says that no force depends on the position.
+    """
 
     recording: Recording
     truth: Floats
     what: str
+    resolution: float = 0.0
+    even: bool = False
 
 
 def reference(kind: str, count: int, stroke: float, rng: np.random.Generator) -> Floats:
@@ -158,7 +167,8 @@ def make(seed: int) -> Case:
         ]
     )
     recording = recording_from_arrays(done.force, done.position, PERIOD_S, name=f"seed {seed}")
-    return Case(recording, truth, f"{controller}, {kind}, {seconds:.1f} s")
+    what = f"{controller}, {kind}, {seconds:.1f} s"
+    return Case(recording, truth, what, bench.encoder_resolution, not uneven)
 
 
 def limit_draws(case: Case, values: Floats, covariance: Floats, seed: int) -> Floats:
@@ -175,12 +185,33 @@ def limit_draws(case: Case, values: Floats, covariance: Floats, seed: int) -> Fl
     return critical_stiffness(rigid(period_s=PERIOD_S), theta).samples
 
 
+def bound(case: Case) -> Floats:
+    """Least standard deviations of `NAMES` that any unbiased estimate can have: Cramer and Rao.
+
+    Where nothing but the encoder's counts disturbs: then the innovations are their white noise,
+    and the motion follows from the recorded command, whatever the controller.
+    """
+    recording = case.recording
+    alone = Follower(np.zeros(1), np.ones(1))
+    loop = replace(Loop.of(recording, 1.0, Way.of(recording.position)), follower=alone)
+    values = loop.begun(case.truth)
+    waves = np.zeros(2 * ALONG)
+    columns = loop.columns(values, waves, loop.error(values, waves))[:, : loop.plain]
+    known = np.ones(loop.plain, bool)
+    known[2] = case.truth[2] > 0  # friction that is none has no slope on either side
+    scale = np.linalg.norm(columns[:, known], axis=0)
+    information = (columns[:, known] / scale).T @ (columns[:, known] / scale)
+    sd = np.full(loop.plain, np.nan)
+    sd[known] = np.sqrt(np.diag(np.linalg.inv(information))) / scale * case.resolution / np.sqrt(12)
+    return sd[: len(NAMES)]
+
+
 def main(count: int) -> None:
     """Print the coverage of every parameter and of K_CR."""
     from scipy.stats import t as student
 
     reach = student.ppf(0.95, FREEDOM)
-    inside, ranks, widths, seconds = [], [], [], 0.0
+    inside, ranks, widths, beside, seconds = [], [], [], [], 0.0
     for seed in range(100, 100 + count):
         case = make(seed)
         began = time.process_time()
@@ -196,6 +227,8 @@ def main(count: int) -> None:
             ranks.append(float(np.mean(limits[1:] < limits[0])))
             low, high = np.quantile(limits[1:], [0.05, 0.95])
             widths.append(float(20 * np.log10(high / low)))
+        if case.even:
+            beside.append(found.sd / bound(case))
         print(f"seed {seed}: {case.what}")
     print(f"{len(inside)} recordings, {seconds / len(inside):.2f} s of CPU time each")
     for name, share in zip(NAMES, np.mean(inside, axis=0), strict=True):
@@ -208,6 +241,8 @@ def main(count: int) -> None:
             f"K_CR, intervals under {widest:g} dB ({len(some)}): holds the truth in "
             f"{100 * held:.0f} %, lies above it in {100 * np.mean(some <= 0.05):.0f} %"
         )
+    for name, ratio in zip(NAMES, np.nanmedian(beside, axis=0), strict=True):
+        print(f"{name:8s} sd over the Cramer-Rao bound, median of {len(beside)}: {ratio:.3g}")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import re
 from html import unescape
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fake_analysis import FEEDBACK, fake_closed
 from test_measured import PERIOD_S, servo
@@ -16,7 +17,9 @@ from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.feedback.explain import explain_force
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.loop import force_words, words
+from bayeshaptic.rig import Bench, run_loop
 
 FRICTION_N = 20.0
 
@@ -73,8 +76,8 @@ def test_a_servo_without_friction_gets_none() -> None:
     assert "coulomb" not in [term.name for term in force.further.terms]
     mass, sd = force.first["mass"]
     assert abs(mass - 90.0) < max(4 * sd, 0.9)
-    words = force_words.in_short(force, "N") + force_words.found(force, "N")
-    assert "friction" not in words
+    said = force_words.in_short(force, "N") + force_words.found(force, "N")
+    assert "friction" not in said
 
 
 def test_what_does_not_move_as_one_mass_or_is_too_short_is_left_to_the_response() -> None:
@@ -92,3 +95,20 @@ def test_feedback_without_a_force_leaves_the_loop_as_it_was(tmp_path: Path) -> N
     closed = fake_closed("explained", "nonlinear", notices=(FEEDBACK,))
     page = text_of(bh.write_report(closed, tmp_path))
     assert "What the model lacked" in page and "explained by the motion" not in page
+
+
+def test_nothing_is_traced_in_the_response_of_two_masses_under_a_controller() -> None:
+    bench = Bench.from_device("lhifam", False, "free")
+    goals, last = np.random.default_rng(2).uniform(-1e-3, 1e-3, 20), [0.0]
+
+    def controller(k: int, position: float) -> float:
+        rate, last[0] = (position - last[0]) * 1000 if k else 0.0, position
+        return float(3000.0 * (goals[k // 150] - position) - 60.0 * rate)
+
+    done = run_loop(bench, controller, 3.0)
+    recording = recording_from_arrays(done.force, done.position, period_s=bench.period_s)
+    closed = bh.close_loop(recording, "free", ess=100)
+    assert closed.force is None and closed.effects == () and closed.traced.candidates == ()
+    head = headline(closed)
+    assert head.status == "untrusted" and "was computed from the motion" in head.sentence
+    assert "Nothing was looked for in the response" in words.in_short(closed)

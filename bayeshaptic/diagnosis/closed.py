@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
+    left_alone,
     trace_force,
 )
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
@@ -27,7 +28,7 @@ from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
-from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown
@@ -146,8 +147,11 @@ def close_loop(
     begun = begin(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
     began = time.perf_counter()
     force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None
-    if force is not None:  # the response is biased: whatever is traced in it may be the controller
+    biased = is_certain(begun.notices)  # whatever is traced in the response may be the controller
+    if force is not None:
         traced = trace_force(begun.etfe, begun.fit, force)
+    elif biased:
+        traced = left_alone(begun.etfe, begun.fit)
     else:
         begun, traced = traced_from_best_base(begun, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
@@ -182,7 +186,7 @@ def close_loop(
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds)
     closed = Closed(base, analysis, traced, _error(base), _error(analysis), force)
-    return with_average(closed, prior, chosen) if chosen.hidden else closed
+    return with_average(closed, prior, chosen) if chosen.hidden and not biased else closed
 
 
 def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from bayeshaptic.devices.table import Table
 from bayeshaptic.errors import InputError, Notice
 
+UNDECIDED = "cannot be decided"  # in the warning where feedback is only a doubt
 _KEYS = ("law", "proportional", "derivative", "integral", "filter_hz")
 
 
@@ -40,6 +41,12 @@ class Feedback:
 def has_feedback(notices: Iterable[Notice]) -> bool:
     """Whether a warning says that the force was computed from the motion."""
     return any(n.topic == "feedback" and n.level == "warning" for n in notices)
+
+
+def is_certain(notices: Iterable[Notice]) -> bool:
+    """Whether there is feedback, and not only a doubt that cannot be decided."""
+    found = [n for n in notices if n.topic == "feedback" and n.level == "warning"]
+    return bool(found) and not any(UNDECIDED in n.text for n in found)
 
 
 def told(feedback: Feedback | None, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import estimate, percent, pure, quantity
-from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
 from bayeshaptic.report.numbers.misfit import (
@@ -102,8 +102,7 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
     if has_feedback(analysis.notices) and analysis.in_loop is None:
-        undecided = any("cannot be decided" in notice.text for notice in analysis.notices)
-        how = "may have been" if undecided else "was"
+        how = "was" if is_certain(analysis.notices) else "may have been"
         found.append(
             f"the force {how} computed from the motion (feedback), which biases the response that "
             "everything here is read from"

@@ -63,6 +63,13 @@ def trace_force(etfe: Etfe, fit: Fit, force: ForceExplained) -> Traced:
     return Traced(verdict, residual_class, state, tests, tests)
 
 
+def left_alone(etfe: Etfe, fit: Fit) -> Traced:
+    """The biased response of a device that does not move as one mass: nothing is traced in it."""
+    tests = residual_tests(fit, etfe)
+    state = State(etfe, fit, ())
+    return Traced(*verdict_of((), tests), state, tests, tests)
+
+
 def _friction(force: ForceExplained) -> tuple[Accepted, ...]:
     """Dry friction, where it is the term that mattered most."""
     linear, *added = force.further.steps

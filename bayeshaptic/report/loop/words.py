@@ -15,6 +15,7 @@ from bayeshaptic.quantities import (
     quantity,
     scale,
 )
+from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop.unexplained import remainder, worst
 from bayeshaptic.report.numbers.estimates import decibel
@@ -86,6 +87,8 @@ def in_short(closed: Closed) -> str:
     """One sentence for the top of the page."""
     if closed.force is not None:
         return force_words.in_short(closed.force, closed.base.etfe.force_unit)
+    if is_certain(closed.analysis.notices) and not closed.effects:
+        return "Nothing was looked for in the response, because feedback biases it."
     if closed.verdict == CONSISTENT:
         if misfit_is_clear(closed.analysis):
             return ""
