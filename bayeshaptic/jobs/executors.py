@@ -120,8 +120,7 @@ def _until_a_worker_dies(
                 except BrokenProcessPool:
                     suspects.append(item)
     except BaseException:
-        for worker in set(multiprocessing.active_children()) - others:
-            worker.terminate()
+        _end_children(others)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
@@ -217,6 +216,7 @@ def _local_dask(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
     import dask.config
     import distributed
 
+    others = set(multiprocessing.active_children())
     # Nobody looks at its statistics of where time goes, which cost some.
     with (
         dask.config.set({"distributed.worker.profile.enabled": False}),
@@ -229,7 +229,19 @@ def _local_dask(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
     ):
         with distributed.Client(cluster, set_as_default=False) as client:
             client.run(look_rarely)
-        yield from _on_dask(cluster.scheduler_address, job, items)
+        try:
+            yield from _on_dask(cluster.scheduler_address, job, items)
+        except BaseException:
+            for nanny in cluster.workers.values():
+                nanny.auto_restart = False
+            _end_children(others)  # closing would wait for what they are doing
+            raise
+
+
+def _end_children(others: set[Any]) -> None:
+    """Kill the processes that this one has started, but for `others`."""
+    for worker in set(multiprocessing.active_children()) - others:
+        worker.kill()
 
 
 def usable_cores() -> int:
