@@ -15,7 +15,6 @@ from bayeshaptic.files import whole_file
 from bayeshaptic.inference.saved import checkpoint
 from bayeshaptic.inference.saved.checkpoint import Checkpoint, kept_until_done
 from bayeshaptic.jobs import recording as jobs_recording
-from bayeshaptic.jobs.batch import report_source
 from bayeshaptic.jobs.job import Job, Settings
 
 RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"
@@ -132,14 +131,14 @@ def test_an_interrupted_report_goes_on(tmp_path: Path, monkeypatch: pytest.Monke
     settings = Settings(model="rigid", device="phantom", band_hz=(1, 25), close_loop=False)
     job = Job(RECORDING, tmp_path / "out", settings)
     kept = tmp_path / "out" / ".checkpoints"
-    report_source(job)
+    jobs_recording.report_recording(job, None)
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr("bayeshaptic.inference.sampler.run_until_done", interrupted)
-        report_source(job)
+        jobs_recording.report_recording(job, None)
     assert [path.suffix for path in kept.iterdir()] == [".state"]
     with monkeypatch.context() as patch:
         patch.setattr("bayeshaptic.inference.sampler.warmed_up", None)  # it is not needed
-        report_source(job)
+        jobs_recording.report_recording(job, None)
     assert not kept.exists()
     quiet, resumed = (one.analysis.limit.samples for one in found)
     np.testing.assert_array_equal(resumed, quiet)

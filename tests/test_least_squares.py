@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_bench import LHIFAM_FREE, Device
@@ -14,6 +17,7 @@ from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
+fitting = sys.modules[least_squares.__module__]
 CASES = [("lhifam", False), ("phantom", True)]
 
 
@@ -131,6 +135,34 @@ def test_a_start_of_ones_own():
     best = least_squares(model, etfe)
     assert near.log_likelihood == pytest.approx(best.log_likelihood, abs=0.1)
     assert near.starts == 1
+
+
+SETS = {  # reduced chi-square of each set of starting points: sets taken, and the one that is kept
+    (1.1,): (1, 1.1),
+    (9.0, 9.1): (2, 9.0),
+    (9.0, 4.0, 4.0): (3, 4.0),
+    (4.0, 9.0, 8.0, 4.01): (4, 4.0),
+    (9.0, 1.1): (2, 1.1),
+    (9.0, 7.0, 5.0, 3.0): (4, 3.0),
+}
+
+
+@pytest.mark.parametrize("sets", SETS)
+def test_where_the_model_misfits_sets_follow_until_two_end_alike(sets, monkeypatch):
+    model = free("phantom")
+    etfe = measure(Bench.from_device("phantom"), 5, 5.0)
+    fit = least_squares(model, etfe)
+    left = [
+        replace(fit, reduced_chi_square=chi, theta=chi * fit.theta, elsewhere=fit.theta[None])
+        for chi in sets
+    ]
+    monkeypatch.setattr(fitting, "_fit", lambda *_: left.pop(0))
+    taken, kept = SETS[sets]
+    found = least_squares(model, etfe)
+    assert (len(sets) - len(left), found.reduced_chi_square) == (taken, kept)
+    assert len(found.elsewhere) <= 2
+    if sets[0] == 9.0 and taken == 3:  # what the deepest was found beside
+        np.testing.assert_array_equal(found.elsewhere[0], 9.0 * fit.theta)
 
 
 def test_noiseless_data_give_the_truth_to_many_digits():

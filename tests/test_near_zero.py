@@ -77,6 +77,18 @@ def test_a_start_replaces_a_peak_outside_the_support(fitted):
     assert _possible(density, start, outside) is start
 
 
+def test_a_start_beside_what_follows_lies_in_the_support(fitted):
+    """A damper at zero that follows the small one below it, as a delay of nothing may."""
+    _, _, fit, _, here = fitted
+    index = fit.model.names.index("b1")
+    theta, follow = fit.theta.copy(), here.follow.copy()
+    theta[index] = here.low[index] * here.scale[index]
+    follow[index] = -1e3
+    there = replace(here, follow=follow)
+    density = Density(fit.likelihood, there)
+    assert np.isfinite(density(start_of(there, replace(fit, theta=theta))[None])[0])
+
+
 def test_coordinates_go_there_and_back_and_know_their_jacobian(fitted):
     _, _, fit, _, here = fitted
     index = fit.model.names.index("b2")

@@ -135,7 +135,7 @@ def test_a_recording_in_closed_loop_has_a_limit(
     # Nobody said that it is one mass: its modes are not known.
     auto = close_loop(recording, "auto", ess=600)
     assert headline(auto).status == "untrusted"
-    assert "where a mode may set a lower limit" in headline(auto).sentence
+    assert "where a vibration mode may set a lower limit" in headline(auto).sentence
     # A delay of another loop, from a device file, would move the limit by a third.
     other = close_loop(recording, "rigid", delay_s=0.2e-3, delay_sd_s=0.0, ess=600)
     assert headline(other).status == "untrusted"
