@@ -66,8 +66,9 @@ def _interval(limit: Any) -> str:
     text = f"{estimate(middle, low, high, limit.unit)}, median and 90 % interval"
     if low <= 0:
         return text
-    levels = (limit.db(p) for p in (0.5, 0.05, 0.95))
-    return text + "; {:.1f} ({:.1f} to {:.1f}) dB".format(*levels)
+    level, *ends = (f"{limit.db(p):.1f}" for p in (0.5, 0.05, 0.95))
+    around = "" if {level} == set(ends) else f" ({' to '.join(ends)})"
+    return f"{text}; {level}{around} dB"
 
 
 def _binding(analysis: Analysis) -> str:
