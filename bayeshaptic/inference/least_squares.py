@@ -72,14 +72,16 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
         if not fit.misfits or shorter_chain(model) is not None:
             break
         rng = np.random.default_rng([seed, another])
-        fit, worse = sorted(
-            (fit, _fit(model, etfe, starting_points(model, etfe, rng))),
-            key=lambda found: found.reduced_chi_square,
-        )
-        if worse.reduced_chi_square < (1 + _ONE_VALLEY) * fit.reduced_chi_square:
+        other = _fit(model, etfe, starting_points(model, etfe, rng))
+        here, there = fit.reduced_chi_square, other.reduced_chi_square
+        alike = abs(there - here) < _ONE_VALLEY * here
+        if not alike:
+            fit, other = (fit, other) if here < there else (other, fit)
+        beside = other.elsewhere if alike else other.theta[None]
+        elsewhere = np.concatenate([fit.elsewhere, beside])[:_OTHER_VALLEYS]
+        fit = replace(fit, elsewhere=elsewhere)
+        if alike:
             break
-        elsewhere = np.concatenate([worse.theta[None], fit.elsewhere])
-        fit = replace(fit, elsewhere=elsewhere[:_OTHER_VALLEYS])
     return fit
 
 
