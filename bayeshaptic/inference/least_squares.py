@@ -77,6 +77,7 @@ def least_squares(model: Model, etfe: Etfe, seed: int = 0, start: Floats | None 
         alike = abs(there - here) < _ONE_VALLEY * here
         if not alike:
             fit, other = (fit, other) if here < there else (other, fit)
+        # What lies beside the deepest valley: as both sets saw it, or where the other one ended.
         beside = other.elsewhere if alike else other.theta[None]
         elsewhere = np.concatenate([fit.elsewhere, beside])[:_OTHER_VALLEYS]
         fit = replace(fit, elsewhere=elsewhere)
