@@ -18,17 +18,14 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from blind_recordings import CASES, HIDDEN_BY_A_HAND, LISTED, NEEDS_A_HAND, SINGLE
+from base_fits import Job, begun_of
+from blind_recordings import CASES, LISTED, SINGLE, cases_for
 
 from bayeshaptic.diagnosis import acceptance, thresholds
-from bayeshaptic.diagnosis.begun import begin
 from bayeshaptic.diagnosis.loop import trials_for
-from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import CHOOSE, State, Trial, held_out_rms
 from bayeshaptic.numerics.spending import BUDGET_S, RATE, metered
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 LEFT_OUT = {
     "ENOUGH": -np.inf,
@@ -47,16 +44,6 @@ LEFT_OUT = {
 
 
 @dataclass(frozen=True)
-class Job:
-    """One recording, and how it is analysed."""
-
-    case: str
-    with_file: bool
-    seed: int
-    effect: str = ""
-
-
-@dataclass(frozen=True)
 class Decided:
     """The first round: what was accepted (with what ties), and the verdict on what it leaves."""
 
@@ -65,24 +52,9 @@ class Decided:
     verdict: str
 
 
-def decided(job: Job, seconds: float) -> dict[str, Decided]:
+def decided(job: Job) -> dict[str, Decided]:
     """The first round of one recording with all rules (""), and with each of them left out."""
-    device, held = CASES[job.case]
-    bench = Bench.from_device(device, held=held)
-    if job.effect:
-        bench = bench.with_effect(job.effect)
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds), seed=job.seed)
-    recording = recording_from_arrays(
-        made.force,
-        made.position,
-        period_s=bench.period_s,
-        force_unit=bench.force_unit,
-        position_unit=bench.position_unit,
-        encoder_resolution=bench.encoder_resolution,
-    )
-    options = Options(device=device) if job.with_file else Options(delay_s=bench.delay_s)
-    begun = begin(recording, "grasped" if held else "free", options)
+    begun = begun_of(job)
     kind = trials_for(begun.etfe, begun.fit)
     before = kind.tests(kind.first)
     raised = tuple(replace(test, threshold=-np.inf) for test in before)
@@ -135,13 +107,12 @@ def left_out(rule: str, value: float) -> Iterator[None]:
         setattr(thresholds, rule, usual)
 
 
-def jobs(clean: int, each: int, seed: int) -> list[Job]:
+def jobs(clean: int, each: int, seconds: float, seed: int) -> list[Job]:
     """Clean recordings, and `each` of every effect but those of single samples, where it shows."""
-    ways = [(case, with_file) for with_file in (True, False) for case in CASES]
+    ways = [(case, seconds, with_file) for with_file in (True, False) for case in CASES]
     made = [Job(*ways[i % len(ways)], seed + i) for i in range(clean)]
     for effect, (family, _) in list(SINGLE.items())[: LISTED + 5]:
-        hidden = [HIDDEN_BY_A_HAND, NEEDS_A_HAND]
-        able = [way for way in ways if effect not in hidden[not CASES[way[0]][1]]]
+        able = [way for way in ways if way[0] in cases_for(effect)]
         if family != "measurement":
             made += [
                 Job(*able[(len(made) + 3 * i) % len(able)], seed + 1000 + len(made), effect)
@@ -179,12 +150,10 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seed", type=int, default=40_000)
     asked = parser.parse_args()
-    todo = jobs(asked.clean, asked.each, asked.seed)
+    todo = jobs(asked.clean, asked.each, asked.seconds, asked.seed)
     found = []
     with ProcessPoolExecutor(asked.workers) as pool:
-        for job, rounds in zip(
-            todo, pool.map(decided, todo, [asked.seconds] * len(todo)), strict=True
-        ):
+        for job, rounds in zip(todo, pool.map(decided, todo), strict=True):
             found.append((job, rounds))
             print(job, rounds[""], file=sys.stderr, flush=True)
     print(table(found))

@@ -34,17 +34,17 @@ from blind_recordings import (
     UNKNOWN,
     Job,
     bench_of,
-    excitation_of,
     jobs_for,
     pair_jobs,
+    recorded,
+    seconds_of,
     single_jobs,
 )
 
 from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.rig import Bench, simulate
+from bayeshaptic.rig import Bench
 
 
 @dataclass(frozen=True)
@@ -72,15 +72,7 @@ def run(job: Job, known: str) -> Outcome:
     warnings.simplefilter("ignore")
     device, held = CASES[job.case]
     bench = bench_of(job)
-    simulated = simulate(bench, excitation_of(job, bench), seed=job.seed)
-    recording = recording_from_arrays(
-        simulated.force,
-        simulated.position,
-        period_s=bench.period_s,
-        force_unit=bench.force_unit,
-        position_unit=bench.position_unit,
-        encoder_resolution=bench.encoder_resolution,
-    )
+    recording = recorded(bench, seconds_of(job), job.seed)
     truth = bench.true_critical_stiffness()
     declared = "grasped" if held else "free"
     told = {

@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields, replace
 import foreign
 import numpy as np
 
-from bayeshaptic.rig import Bench, Effect, WhiteNoise
+from bayeshaptic.recordings import Recording, recording_from_arrays
+from bayeshaptic.rig import Bench, Effect, WhiteNoise, simulate
 
 CASES = {
     "LHIfAM free": ("lhifam", False),
@@ -99,12 +100,31 @@ SECONDS = (10.0, 60.0)  # evenly in the logarithm
 
 def jobs_for(effects: tuple[str, ...], count: int, seed: int) -> list[Job]:
     """`count` recordings dealt out over the devices on which the effects make sense."""
-    cases = [
+    cases = cases_for(*effects)
+    return [Job(cases[i % len(cases)], effects, seed + i) for i in range(count)]
+
+
+def cases_for(*effects: str) -> list[str]:
+    """The devices, held or free, on which all the effects make sense."""
+    return [
         case
         for case, (_, held) in CASES.items()
-        if not (NEEDS_A_HAND if not held else HIDDEN_BY_A_HAND) & set(effects)
+        if not (HIDDEN_BY_A_HAND if held else NEEDS_A_HAND) & set(effects)
     ]
-    return [Job(cases[i % len(cases)], effects, seed + i) for i in range(count)]
+
+
+def recorded(bench: Bench, seconds: float, seed: int) -> Recording:
+    """A recording of white noise at the bench's usual level, in its usual band."""
+    low, high = bench.band_hz
+    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds), seed=seed)
+    return recording_from_arrays(
+        made.force,
+        made.position,
+        period_s=bench.period_s,
+        force_unit=bench.force_unit,
+        position_unit=bench.position_unit,
+        encoder_resolution=bench.encoder_resolution,
+    )
 
 
 def bench_of(job: Job) -> Bench:
@@ -137,13 +157,11 @@ def resized(effect: Effect, rng: np.random.Generator) -> Effect:
     )
 
 
-def excitation_of(job: Job, bench: Bench) -> WhiteNoise | None:
-    """The bench's usual one, or noise of a drawn length."""
+def seconds_of(job: Job) -> float:
+    """How long its recording is: 30 s, or drawn."""
     if not job.drawn:
-        return None
-    low, high = bench.band_hz
-    seconds = float(np.exp(np.random.default_rng(job.seed + 1).uniform(*np.log(SECONDS))))
-    return WhiteNoise(bench.force_rms, high, low, seconds)
+        return 30.0
+    return float(np.exp(np.random.default_rng(job.seed + 1).uniform(*np.log(SECONDS))))
 
 
 def single_jobs(effect: str, each: int, others: int, seed: int) -> list[Job]:

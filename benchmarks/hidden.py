@@ -38,7 +38,7 @@ from hidden_recordings import (  # noqa: E402
     clean_bench,
     jobs,
     possible,
-    recording_of,
+    recorded,
     seen_in,
 )
 
@@ -100,7 +100,7 @@ def closed_of(job: Job, bench: Bench) -> tuple[Closed, float]:
     """The closed loop without the average, and its processor time."""
     device, held = CASES[job.case]
     told = {"device": device} if job.file else {"delay_s": bench.delay_s, "delay_sd_s": 0.0}
-    recording = recording_of(bench, job.seconds, job.seed)
+    recording = recorded(bench, job.seconds, job.seed)
     began = time.process_time()
     model = "grasped" if held else "free"
     closed = close_loop(recording, model, seed=job.seed, hidden=False, **told)
@@ -125,7 +125,6 @@ def run(job: Job, keep: Path | None) -> Outcome:
     closed = with_average(closed, HiddenPrior(), Options(seed=job.seed))
     averaging = time.process_time() - began
     analysis, hidden = closed.analysis, closed.analysis.hidden
-    held = CASES[job.case][1]
     there = [e for e in hidden.effects if e.name == job.effect] if hidden else []
     average = tuple(analysis.limit.db(LEVELS))
     other = [_db(hidden.sensitivity[f]) if hidden else average for f in SENSITIVE]
@@ -137,7 +136,7 @@ def run(job: Job, keep: Path | None) -> Outcome:
         tuple(analysis.declared.db(LEVELS)),
         average,
         *other,
-        oracle(analysis, possible(held)) if hidden else average,
+        oracle(analysis, possible(job.case)) if hidden else average,
         there[0].probability if there else 0.0,
         took + averaging,
         averaging,

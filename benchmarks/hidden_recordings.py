@@ -13,26 +13,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from blind_recordings import CASES, cases_for, recorded
 
 from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.diagnosis.hidden.forces import force_suspects
 from bayeshaptic.diagnosis.hidden.regression import around
 from bayeshaptic.diagnosis.hidden.sizes import seen_of
 from bayeshaptic.diagnosis.hidden.suspects import Suspect, linear_suspects
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 
-CASES = {
-    "LHIfAM free": ("lhifam", False),
-    "LHIfAM held": ("lhifam", True),
-    "PHANToM free": ("phantom", False),
-    "PHANToM held": ("phantom", True),
-}
 LENGTHS_S = (10.0, 30.0)
 LEAST, MOST = 1 / 30, 3.0
 NONE = "none"
-NEEDS_A_HAND = ("reflex", "grip_drift")
-HIDDEN_BY_A_HAND = ("centring_stiffness",)
 EFFECTS = (
     "extra_delay",
     "actuator_lag",
@@ -69,7 +61,7 @@ def jobs(count: int, seed: int) -> list[Job]:
     out = []
     for number in range(count):
         case = list(CASES)[number % len(CASES)]
-        drawn = str(rng.choice(possible(CASES[case][1])))
+        drawn = str(rng.choice(possible(case)))
         effect = NONE if rng.uniform() < 1 / 3 else drawn
         share = float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
         turn = number // len(CASES)
@@ -78,9 +70,9 @@ def jobs(count: int, seed: int) -> list[Job]:
     return out
 
 
-def possible(held: bool) -> list[str]:
+def possible(case: str) -> list[str]:
     """The effects that a device may have."""
-    return [e for e in EFFECTS if e not in (HIDDEN_BY_A_HAND if held else NEEDS_A_HAND)]
+    return [effect for effect in EFFECTS if case in cases_for(effect)]
 
 
 def clean_bench(case: str) -> Bench:
@@ -89,24 +81,10 @@ def clean_bench(case: str) -> Bench:
     return Bench.from_device(device, held=held)
 
 
-def recording_of(bench: Bench, seconds: float, seed: int):  # type: ignore[no-untyped-def]
-    """A recording of white noise at the bench's usual level."""
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds)
-    made = simulate(bench, noise, seed=seed)
-    return recording_from_arrays(
-        made.force,
-        made.position,
-        made.period_s,
-        force_unit=made.force_unit,
-        position_unit=made.position_unit,
-        encoder_resolution=bench.encoder_resolution,
-    )
-
-
 def seen_in(case: str, seconds: float) -> dict[str, Callable[[float], float]]:
     """For each effect, the strength that the tests see, as a function of a mode's frequency."""
     device, held = CASES[case]
-    clean = recording_of(clean_bench(case), seconds, 1)
+    clean = recorded(clean_bench(case), seconds, 1)
     closed = close_loop(clean, device=device, held=held, hidden=False)
     found: dict[str, Callable[[float], float]] = {"grip_drift": lambda _: _GRIP}
     for suspect, scale in _scales(closed):

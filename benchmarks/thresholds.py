@@ -13,29 +13,14 @@ import argparse
 import sys
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
-from blind_recordings import CASES, HIDDEN_BY_A_HAND, LISTED, NEEDS_A_HAND, SINGLE
+from base_fits import Job, begun_of
+from blind_recordings import CASES, LISTED, SINGLE, cases_for
 
 from bayeshaptic.diagnosis.battery import residual_tests
-from bayeshaptic.diagnosis.begun import begin
-from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 SECONDS = (10.0, 30.0, 90.0)
-
-
-@dataclass(frozen=True)
-class Job:
-    """One recording, and how it is analysed."""
-
-    case: str
-    seconds: float
-    with_file: bool
-    seed: int
-    effect: str = ""
 
 
 Found = dict[str, tuple[str, float, float]]
@@ -44,22 +29,7 @@ Found = dict[str, tuple[str, float, float]]
 
 def tested(job: Job) -> tuple[Job, Found]:
     """Every test of one recording."""
-    device, held = CASES[job.case]
-    bench = Bench.from_device(device, held=held)
-    if job.effect:
-        bench = bench.with_effect(job.effect)
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, job.seconds), seed=job.seed)
-    recording = recording_from_arrays(
-        made.force,
-        made.position,
-        period_s=bench.period_s,
-        force_unit=bench.force_unit,
-        position_unit=bench.position_unit,
-        encoder_resolution=bench.encoder_resolution,
-    )
-    options = Options(device=device) if job.with_file else Options(delay_s=bench.delay_s)
-    begun = begin(recording, "grasped" if held else "free", options)
+    begun = begun_of(job)
     tests = residual_tests(begun.fit, begun.etfe)
     return job, {t.name: (t.family, float(t.statistic), float(t.threshold)) for t in tests}
 
@@ -74,11 +44,7 @@ def power_jobs(each: int, seed: int) -> list[Job]:
     """`each` recordings of 30 s of every effect that the library promises, where it shows."""
     jobs = []
     for number, effect in enumerate(list(SINGLE)[:LISTED]):
-        cases = [
-            case
-            for case, (_, held) in CASES.items()
-            if effect not in (HIDDEN_BY_A_HAND if held else NEEDS_A_HAND)
-        ]
+        cases = cases_for(effect)
         for i in range(each):
             ways = (cases[i % len(cases)], 30.0, i // len(cases) % 2 == 0)
             jobs.append(Job(*ways, seed=seed + 1000 * (number + 1) + i, effect=effect))
