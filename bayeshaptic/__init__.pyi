@@ -56,10 +56,10 @@ from .inference.next_experiment import (
     next_experiment as next_experiment,
 )
 from .inference.population.infer import (
-    Population as Population,
-)
-from .inference.population.infer import (
     infer_population as infer_population,
+)
+from .inference.population.population import (
+    Population as Population,
 )
 from .inference.posterior import (
     Posterior as Posterior,

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.figures.axes import Plain
-from bayeshaptic.report.figures.canvas import draw_both
+from bayeshaptic.report.figures.drawing.axes import Plain
+from bayeshaptic.report.figures.drawing.canvas import draw_both
 
 
 def _figure() -> Figure:

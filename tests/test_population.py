@@ -13,11 +13,11 @@ from bayeshaptic.inference.population.gaussian_likelihood import fit_quadratic
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.hyperparameters import LKJ, Layout
 from bayeshaptic.inference.population.infer import (
-    Population,
     infer_population,
     prior_moments,
     study_coordinates,
 )
+from bayeshaptic.inference.population.population import Population
 from bayeshaptic.inference.population.sampler import sample_level
 from bayeshaptic.numerics.pareto import pareto_k
 from bayeshaptic.types import Floats

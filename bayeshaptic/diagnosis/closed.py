@@ -92,17 +92,7 @@ class Closed(Shown):
     @property
     def diagnosis(self) -> dict[str, Any]:
         """In the form of ``summary.json``."""
-        posterior = self.analysis.posterior.summary()
-        return {
-            "verdict": self.traced.verdict,
-            "residual_class": self.traced.residual_class,
-            "effects": [_effect(effect, posterior) for effect in self.effects],
-            "candidates": [
-                {"name": c.name, "score": c.score, "accepted": c.accepted}
-                for c in self.traced.candidates
-            ],
-            "not_tried": list(self.traced.skipped),
-        }
+        return self.traced.table(self.analysis.posterior.summary())
 
     def _lines(self) -> tuple[str, ...]:
         recording = self.base.recording
@@ -182,7 +172,7 @@ def close_loop(
     limit = with_discrepancy(
         analysis.limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed
     )
-    notices = analysis.notices + _notices(traced)
+    notices = analysis.notices + traced.notices
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds)
     closed = Closed(base, analysis, traced, _error(base), _error(analysis), force)
@@ -246,29 +236,6 @@ def _stages(
     return stages | {name: spent for name, spent in after.items() if name not in begun}
 
 
-def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    keys = ("mean", "sd", "q05", "q50", "q95", "unit")
-    parameters = {name: {k: posterior[name][k] for k in keys} for name in effect.parameters}
-    for name, estimate in effect.estimates.items():
-        sd = estimate.sd if np.isfinite(estimate.sd) else None
-        reach = 1.6449 * sd if sd is not None else 0.0
-        parameters[name] = {
-            "mean": estimate.mean,
-            "sd": sd,
-            "q05": estimate.mean - reach,
-            "q50": estimate.mean,
-            "q95": estimate.mean + reach,
-            "unit": estimate.unit,
-        }
-    return {
-        "name": effect.name,
-        "title": effect.title,
-        "parameters": parameters,
-        "evidence": effect.evidence,
-        "ties": list(effect.ties),
-    }
-
-
 def _error(analysis: Analysis) -> dict[str, Any]:
     """How far the model is from the measurement."""
     fit, etfe = analysis.fit, analysis.etfe
@@ -291,21 +258,3 @@ def _limit_alone(analysis: Analysis) -> dict[str, Any]:
     """Of an analysis that is not of the response, the limit; the rest is missing."""
     q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
     return {"critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)}}
-
-
-def _notices(traced: Traced) -> tuple[Notice, ...]:
-    found = []
-    if traced.verdict == "unexplained":
-        left = max((test for test in traced.after if test.flagged), key=lambda test: test.excess)
-        text = (
-            f"The residual is not explained ({traced.residual_class}): {left.text}. The critical "
-            "stiffness is widened by what remains; treat its upper half with suspicion."
-        )
-        found.append(Notice("warning", "unexplained", text))
-    if traced.skipped:
-        text = (
-            "Not tried, because the budget of the search for effects was spent: "
-            f"{', '.join(traced.skipped)}; a larger --budget tries them."
-        )
-        found.append(Notice("note", "budget", text))
-    return tuple(found)

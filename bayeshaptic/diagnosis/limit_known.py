@@ -12,7 +12,8 @@ from bayeshaptic.inference.posterior import prior_dominated
 from bayeshaptic.inference.rank_statistics import split_rhat
 from bayeshaptic.inference.stopping import Verdict
 from bayeshaptic.models import Model
-from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness, most_draws
+from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
+from bayeshaptic.stability.draws import most_draws
 from bayeshaptic.stability.tail import ENOUGH_BELOW, quantile_with_error
 from bayeshaptic.types import Floats
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.state import State, Trial
+from bayeshaptic.diagnosis.state import Accepted, State, Trial
+from bayeshaptic.errors import Notice
 
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 
@@ -66,3 +71,63 @@ class Traced:
     rejected: tuple[Trial, ...] = ()
     path: tuple[State, ...] = ()
     skipped: tuple[str, ...] = ()
+
+    def table(self, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+        """In the form of ``summary.json``.
+
+        Parameters
+        ----------
+        posterior : mapping
+            Summary of the model's parameters, the accepted effects' among them.
+        """
+        return {
+            "verdict": self.verdict,
+            "residual_class": self.residual_class,
+            "effects": [_effect(effect, posterior) for effect in self.state.accepted],
+            "candidates": [
+                {"name": c.name, "score": c.score, "accepted": c.accepted} for c in self.candidates
+            ],
+            "not_tried": list(self.skipped),
+        }
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What a reader should know of what is left, and of what was not tried."""
+        found = []
+        if self.verdict == UNEXPLAINED:
+            left = max((test for test in self.after if test.flagged), key=lambda test: test.excess)
+            text = (
+                f"The residual is not explained ({self.residual_class}): {left.text}. The critical "
+                "stiffness is widened by what remains; treat its upper half with suspicion."
+            )
+            found.append(Notice("warning", "unexplained", text))
+        if self.skipped:
+            text = (
+                "Not tried, because the budget of the search for effects was spent: "
+                f"{', '.join(self.skipped)}; a larger --budget tries them."
+            )
+            found.append(Notice("note", "budget", text))
+        return tuple(found)
+
+
+def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    keys = ("mean", "sd", "q05", "q50", "q95", "unit")
+    parameters = {name: {k: posterior[name][k] for k in keys} for name in effect.parameters}
+    for name, estimate in effect.estimates.items():
+        sd = estimate.sd if np.isfinite(estimate.sd) else None
+        reach = 1.6449 * sd if sd is not None else 0.0
+        parameters[name] = {
+            "mean": estimate.mean,
+            "sd": sd,
+            "q05": estimate.mean - reach,
+            "q50": estimate.mean,
+            "q95": estimate.mean + reach,
+            "unit": estimate.unit,
+        }
+    return {
+        "name": effect.name,
+        "title": effect.title,
+        "parameters": parameters,
+        "evidence": effect.evidence,
+        "ties": list(effect.ties),
+    }

@@ -13,7 +13,8 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.shown import Shown
-from bayeshaptic.stability.critical import MOST_DRAWS, CriticalStiffness
+from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.stability.draws import MOST_DRAWS
 from bayeshaptic.stability.effective import effective_draws
 from bayeshaptic.stability.tail import low_quantile, quantiles
 from bayeshaptic.types import Floats, Ints

@@ -15,14 +15,13 @@ from bayeshaptic.quantities import estimate, percent, quantity
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
 from bayeshaptic.stability.crossings import find_crossings, rational
+from bayeshaptic.stability.draws import vectors_of
 from bayeshaptic.stability.effective import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
 from bayeshaptic.stability.tail import LowQuantile, low_quantile, quantiles
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Ints
 
-MOST_DRAWS = 150_000
-MOST_SEARCHED = 30_000  # of a loop without a finite set of poles, whose search is slow
 _CHUNK = 4096
 _CHECKED = 64
 
@@ -222,7 +221,7 @@ def critical_stiffness(
     if approximation not in ("exact", "continuous"):
         raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
     model: Model = source if isinstance(source, Model) else source.model
-    vectors, chains = _vectors(source, theta, max_draws)
+    vectors, chains = vectors_of(source, theta, max_draws)
     if model.period_s is None:
         raise InputError("the model has no sampling period: give period_s, or a device.")
     if before is not None and len(vectors) < np.asarray(source.chains)[..., 0].size:
@@ -230,31 +229,6 @@ def critical_stiffness(
     limit = _limits(model, vectors, chains, approximation, before)
     checkable = approximation == "exact" and rational(model.system(vectors[:1]))
     return _checked(limit, model, vectors) if checkable else limit
-
-
-def draws_of(posterior: Any, max_draws: int | None = None) -> Floats:
-    """The draws of a posterior in the order of the samples of its `critical_stiffness`."""
-    return _vectors(posterior, None, max_draws)[0]
-
-
-def most_draws(model: Model, vector: Floats) -> int:
-    """How many draws `critical_stiffness` looks at, for parameters like `vector`, shape (P,)."""
-    return MOST_DRAWS if rational(model.system(vector[None])) else MOST_SEARCHED
-
-
-def _vectors(source: Any, theta: ArrayLike | None, max_draws: int | None) -> tuple[Floats, int]:
-    """Parameter vectors, chain after chain, and the number of chains."""
-    chains = getattr(source, "chains", None)
-    if theta is not None or chains is None:
-        if theta is None:
-            theta = source.values if isinstance(source, Model) else source.theta
-        vectors = np.atleast_2d(np.asarray(theta, float))
-        return vectors, len(vectors)
-    chains = np.asarray(chains)  # (E, S, W, P)
-    most = max_draws or most_draws(source.model, chains[0, 0, 0])
-    every = min(-(-chains[..., 0].size // most), chains.shape[1])
-    kept = np.swapaxes(chains[:, every - 1 :: every], 1, 2)
-    return kept.reshape(-1, kept.shape[-1]), kept.shape[0] * kept.shape[1]
 
 
 def _limits(

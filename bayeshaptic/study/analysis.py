@@ -16,7 +16,7 @@ from bayeshaptic.diagnosis.hidden.several import Together
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, describe
-from bayeshaptic.inference.population.infer import Population
+from bayeshaptic.inference.population.population import Population
 from bayeshaptic.models import prior_from_table
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.read import recording_name

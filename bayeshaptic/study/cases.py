@@ -12,7 +12,8 @@ import numpy as np
 
 from bayeshaptic.errors import Notice, describe
 from bayeshaptic.inference.population.configurations import FEWEST
-from bayeshaptic.inference.population.infer import Population, infer_population
+from bayeshaptic.inference.population.infer import infer_population
+from bayeshaptic.inference.population.population import Population
 from bayeshaptic.stability.cases import FREE, HELD, NEW_PERSON, Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.study.analysed import Analysed

@@ -10,7 +10,8 @@ import numpy as np
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.stability.cases import FREE, Case
-from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness, draws_of
+from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
+from bayeshaptic.stability.draws import draws_of
 from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.types import Floats
 

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.coordinates import Coordinates, coordinates
-from bayeshaptic.inference.population.below import Below, draw_below
+from bayeshaptic.inference.population.below import draw_below
 from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.inference.population.population import Population
 from bayeshaptic.inference.population.reweighting import (
     ALONE,
     Reweighted,
-    inside,
     redescribed,
     reweight,
 )
-from bayeshaptic.inference.population.sampler import LevelChains, sample_level
+from bayeshaptic.inference.population.sampler import sample_level
 from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.progress import told
-from bayeshaptic.quantities import estimate
-from bayeshaptic.shown import Shown, listed
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
@@ -36,111 +34,6 @@ DRAWS = 36_000  # with them 20 lie below the stiffness of 0.1 % risk, in the han
 _SOME = 2000
 _FIRST_STEPS = 200
 _DESCRIPTIONS = 2  # rounds of describing recordings better, at most
-
-
-@dataclass(frozen=True, repr=False)
-class Population(Shown):
-    """Posterior of a population of hands, and of the device that they held.
-
-    Attributes
-    ----------
-    parameters : tuple of str
-        Names of the hand's parameters, H of them.
-    log_mean, log_sd : ndarray, shape (n, H)
-        Of the logarithms over people.
-    correlation : ndarray, shape (n, H, H)
-        Of the logarithms over people.
-    users : tuple of str
-    places : tuple
-        Configurations that people were measured in; (None,) without.
-    model : Model
-    recordings : tuple of Reweighted
-        Every recording's parameters given all recordings, in the order that they came.
-    notices : tuple of Notice
-    seconds : float
-    chains : LevelChains or None
-        Of the spreads and correlations, with what it takes to trust them.
-    walkers : int
-        Number of chains that the draws consist of, one after the other.
-    """
-
-    parameters: tuple[str, ...]
-    log_mean: Floats = field(repr=False)
-    log_sd: Floats = field(repr=False)
-    correlation: Floats = field(repr=False)
-    users: tuple[str, ...]
-    places: tuple[float | str | None, ...]
-    model: Model = field(repr=False)
-    recordings: tuple[Reweighted, ...] = field(repr=False)
-    notices: tuple[Notice, ...] = ()
-    seconds: float = 0.0
-    chains: LevelChains | None = field(default=None, repr=False)
-    walkers: int = 1
-    _here: Coordinates | None = field(default=None, repr=False)
-    _hierarchy: Hierarchy | None = field(default=None, repr=False)
-    _below: Below | None = field(default=None, repr=False)
-
-    def _lines(self) -> tuple[str, ...]:
-        low, middle, high = np.quantile(np.exp(self.log_mean), (0.05, 0.5, 0.95), axis=0)
-        typical = (
-            f"{name} {estimate(m, a, b, self.model.unit(name))}"
-            for name, a, m, b in zip(self.parameters, low, middle, high, strict=True)
-        )
-        spread = (
-            f"{name} {100 * sd:.0f} %"
-            for name, sd in zip(self.parameters, np.median(self.log_sd, axis=0), strict=True)
-        )
-        return (
-            f"Population of {len(self.users)} people in {len(self.recordings)} recordings",
-            f"typical person: {listed(typical, 3)}",
-            f"people differ by {listed(spread)}",
-        )
-
-    @property
-    def device_parameters(self) -> tuple[str, ...]:
-        """Names of the parameters that all recordings share up to a small spread."""
-        return tuple(name for name in self.model.names if name not in self.parameters)
-
-    @property
-    def device_spread(self) -> Floats:
-        """Spread between recordings: of logarithms, or in prior widths; shape (n, D - H)."""
-        assert self._below is not None
-        return self._below.level.device_sd
-
-    def of_user(self, user: str) -> tuple[Reweighted, ...]:
-        """The recordings of one user."""
-        return tuple(one for one in self.recordings if one.user == user)
-
-    def new_person(self, rng: np.random.Generator, each: int = 1, place: int = 0) -> Floats:
-        """Parameters of people not yet seen: `each` from every draw of the population.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-        each : int
-            People a draw of the population; draw after draw.
-        place : int
-            Index into `places`.
-
-        Returns
-        -------
-        ndarray, shape (n * each, P)
-            Natural values in the order of `model.names`.
-        """
-        assert self._here is not None and self._hierarchy is not None and self._below is not None
-        hierarchy, level = self._hierarchy, self._below.level
-        count, hand = self.log_mean.shape
-        x = np.empty((count, each, self.model.size))
-        normal = rng.standard_normal((count, each, self.model.size))
-        root = level.hand_sd[:, :, None] * level.correlation_root
-        people = np.einsum("nij,nej->nei", root, normal[..., :hand])
-        trial = level.trial_sd[:, None, None] * rng.standard_normal(people.shape)
-        x[:, :, hierarchy.hand] = self.log_mean[:, None] + people + trial
-        device = len(hierarchy.device)
-        start = hand + place * device
-        middle = self._below.beta[:, None, start : start + device]
-        x[:, :, hierarchy.device] = middle + level.device_sd[:, None] * normal[..., hand:]
-        return self._here.natural(inside(x.reshape(-1, self.model.size), self._here))
 
 
 @at_the_door

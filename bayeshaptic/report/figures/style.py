@@ -45,7 +45,7 @@ def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
     """An empty figure with constrained layout, outside of pyplot."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from bayeshaptic.report.figures.axes import Page
+    from bayeshaptic.report.figures.drawing.axes import Page
 
     figure = Page(figsize=(width_in, height_in), dpi=DPI, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
@@ -205,7 +205,7 @@ def drawn(figure: Figure, name: str) -> Drawn:
 
     The same figure gives the same bytes.
     """
-    from bayeshaptic.report.figures.canvas import draw_both
+    from bayeshaptic.report.figures.drawing.canvas import draw_both
 
     pixels, text = draw_both(figure)
     picture, vector = png(pixels), for_a_page(text, name)

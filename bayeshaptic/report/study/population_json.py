@@ -16,7 +16,7 @@ from bayeshaptic.types import Floats
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.hidden.several import Together
-    from bayeshaptic.inference.population.infer import Population
+    from bayeshaptic.inference.population.population import Population
     from bayeshaptic.stability.cases import Case, DeviceLimit
     from bayeshaptic.stability.critical import CriticalStiffness
     from bayeshaptic.study.analysis import StudyAnalysis

@@ -17,7 +17,7 @@ from bayeshaptic.report.study.words import spread_db
 from bayeshaptic.stability.tail import ENOUGH_BELOW
 
 if TYPE_CHECKING:
-    from bayeshaptic.inference.population.infer import Population
+    from bayeshaptic.inference.population.population import Population
     from bayeshaptic.stability.cases import Case
     from bayeshaptic.study.analysed import Analysed
     from bayeshaptic.study.analysis import StudyAnalysis

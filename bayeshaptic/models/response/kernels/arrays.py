@@ -73,3 +73,20 @@ class WindowArrays(NamedTuple):
     scatter: Floats
     weight: Floats
     triangular: bool
+
+
+class Space(NamedTuple):
+    """What the response of one row is made in."""
+
+    matrix: Floats
+    far_matrix: Floats
+    tail: Floats
+    far_tail: Floats
+    ne: Floats
+    no: Floats
+    de: Floats
+    do: Floats
+    tail_re: Floats
+    tail_im: Floats
+    factor_re: Floats
+    factor_im: Floats

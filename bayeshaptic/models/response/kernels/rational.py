@@ -11,31 +11,14 @@ arrays, so that the compiler makes vector instructions of them.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from bayeshaptic.compiled import kernel
-from bayeshaptic.models.response.kernels.arrays import RationalArrays, WindowArrays
+from bayeshaptic.models.response.kernels.arrays import RationalArrays, Space, WindowArrays
 from bayeshaptic.numerics.cos_sin import cos_sin
-from bayeshaptic.types import Floats, Ints
-
-
-class Space(NamedTuple):
-    """What the response of one row is made in."""
-
-    matrix: Floats
-    far_matrix: Floats
-    tail: Floats
-    far_tail: Floats
-    ne: Floats
-    no: Floats
-    de: Floats
-    do: Floats
-    tail_re: Floats
-    tail_im: Floats
-    factor_re: Floats
-    factor_im: Floats
+from bayeshaptic.numerics.weighted_logs import weighted_logs
+from bayeshaptic.types import Floats
 
 
 @kernel(inline=True)
@@ -320,32 +303,4 @@ def log_likelihood(form: RationalArrays, windows: WindowArrays, out: Floats) -> 
     for row in range(len(out)):
         _respond(form, row, space, real, imag)
         _powers(windows, real, imag, power, re, im)
-        out[row] = -_weighted_logs(power, windows.weight, mantissa, re)
-
-
-@kernel(inline=True)
-def _weighted_logs(x: Floats, weight: Floats, mantissa: Ints, spare: Floats) -> float:
-    """Sum of weight * log(x), in vector instructions; x > 0, not subnormal."""
-    total = 0.0
-    for number in range(len(x)):
-        total += x[number]
-    if not math.isfinite(total):
-        return total
-    bits = x.view(np.int64)
-    for number in range(len(x)):
-        mantissa[number] = (bits[number] & 0xFFFFFFFFFFFFF) | 0x3FF0000000000000
-    m = mantissa.view(np.float64)
-    for number in range(len(x)):
-        high = m[number] > 1.4142135623730951
-        t = (0.5 * m[number] if high else m[number]) - 1.0
-        t /= t + 2.0
-        u = t * t
-        series = 1 / 21 + 0.0 * u
-        for odd in (19.0, 17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0):
-            series = series * u + 1.0 / odd
-        power = float((bits[number] >> 52) - 1023) + (1.0 if high else 0.0)
-        spare[number] = weight[number] * (2.0 * t * series + power * 0.6931471805599453)
-    total = 0.0
-    for number in range(len(x)):
-        total += spare[number]
-    return total
+        out[row] = -weighted_logs(power, windows.weight, mantissa, re)
