@@ -62,7 +62,7 @@ def ties(best: Trial, other: Trial) -> bool:
     if other.accepted.family != best.accepted.family:
         return False
     law = thresholds.LAW_TIE * best.score if best.accepted.family == "nonlinear" else 0.0
-    return abs(best.score - other.score) < max(thresholds.TIE, law)
+    return abs(best.score - other.score) <= max(thresholds.TIE, law)
 
 
 def with_ties(chosen: Trial, trials: Sequence[Trial]) -> State:
