@@ -14,7 +14,6 @@ from pathlib import Path
 _DRAFT = re.compile(
     r"\.(?:report|part)-(?P<host>[\w-]*)-(?P<pid>\d+)-[0-9a-f]{12}(?:-.*)?", re.DOTALL
 )
-_END = 20  # of a name: long enough for its ending, by which some libraries know what to write
 
 
 @contextmanager
@@ -25,7 +24,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     left beside it when they died is removed.
     """
     remove_dead_drafts(path.absolute().parent)
-    partial = path.with_name(f".part-{owner()}-{path.name[-_END:]}")
+    end = 20  # of a name: long enough for its ending, by which some libraries know what to write
+    partial = path.with_name(f".part-{owner()}-{path.name[-end:]}")
     try:
         yield partial
         flush(partial)

@@ -10,7 +10,6 @@ _PREFIXES = {-9: "n", -6: "\N{MICRO SIGN}", -3: "m", 0: "", 3: "k", 6: "M", 9: "
 _GRAMS = {-9: "\N{MICRO SIGN}g", -6: "mg", -3: "g", 0: "kg"}
 _PREFIXABLE = ("N", "A", "s", "m", "Hz")
 _NOTHING = "\N{EN DASH}"
-_MOST_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,8 @@ def _decimals(value: float, sd: float | None, digits: int) -> int:
     if sd is None or not math.isfinite(sd) or sd <= 0.0:
         return digits - 1 - exponent
     wanted = 1 - math.floor(math.log10(sd))
-    return min(max(wanted, 1 - exponent), _MOST_DIGITS - 1 - exponent)
+    most_digits = 9
+    return min(max(wanted, 1 - exponent), most_digits - 1 - exponent)
 
 
 def _minus(text: str) -> str:

@@ -18,7 +18,6 @@ from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
 from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.stability.critical import critical_stiffness
 
-_NINETY = 1.645  # the 90 % interval reaches what a tie would make of the limit
 _OF_THE_DATA = {"nonlinear", "measurement", "time-varying"}  # families that change the recording
 
 
@@ -75,7 +74,8 @@ def with_ties(chosen: Trial, trials: Sequence[Trial]) -> State:
             critical_stiffness(t.state.model, t.state.fit.theta).value for t in (chosen, *others)
         )
         apart = max(abs(np.log(max(limit, 1e-9) / max(here, 1e-9))) for limit in there)
-        spread = float(np.hypot(spread, apart / _NINETY))
+        ninety = 1.645  # the 90 % interval reaches what a tie would make of the limit
+        spread = float(np.hypot(spread, apart / ninety))
     names = tuple(dict.fromkeys((*own.ties, *(t.name for t in others))))
     own = replace(own, ties=names, limit_log_sd=spread)
     return replace(chosen.state, accepted=(*earlier, own))

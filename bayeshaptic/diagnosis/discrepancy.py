@@ -23,14 +23,8 @@ from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
-_DRAWS = 2000
-_GRID = 1500
 _SIZES = np.geomspace(3e-4, 1.0, 12)
 _LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
-_DAMPING_LEFT = 0.2  # of the damping, if most of it is friction that was fitted as damping
-_BEYOND = 1.25  # times a steady ramp
-_UP = 0.25  # of the least way down, and up as well: a remainder biases either way
-_FARTHEST = 2.3  # log stiffness: a factor of ten
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -53,7 +47,8 @@ def with_discrepancy(
         limit = replace(limit, samples=limit.samples * factor)
     fall = sum(effect.limit_log_fall for effect in traced.state.accepted)
     if fall > 0:  # a step stays where it is, a ramp goes on; neither goes much further
-        factor = np.exp(-fall * rng.uniform(0.0, _BEYOND, size=len(limit.samples)))
+        beyond = 1.25  # times a steady ramp
+        factor = np.exp(-fall * rng.uniform(0.0, beyond, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
     found = {effect.family for effect in traced.state.accepted}
     flagged = {test.family for test in traced.after if test.flagged}
@@ -61,13 +56,14 @@ def with_discrepancy(
     if "linear" in left:
         limit = _with_linear(limit, posterior, fit, rng)
     # A law of a force is never quite right, even where what it leaves would pass for noise.
+    up = 0.25  # of the least way down, and up as well: a remainder biases either way
     for family in sorted((found & {"nonlinear"}) | (left - {"linear"})):
         if family in found:
             low, high = -1.0, 1.0
             width = max(_rest(base, fit, traced, family), _LEAST[family] * (family in left))
         else:
             width = _downwards(fit, traced, family)
-            low, high = -1.0, _upwards(limit, width) + _UP * _LEAST[family] / width
+            low, high = -1.0, _upwards(limit, width) + up * _LEAST[family] / width
         factor = np.exp(width * rng.uniform(low, high, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
     return limit
@@ -95,7 +91,8 @@ def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
     left = min(after / before, 1.0) if before > 0 else 1.0
     limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
     moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
-    return left * min(moved, _FARTHEST)
+    farthest = 2.3  # log stiffness: a factor of ten
+    return left * min(moved, farthest)
 
 
 def _downwards(fit: Fit, traced: Traced, family: str) -> float:
@@ -111,7 +108,8 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
     nameless = {t.name for t in traced.after if t.flagged and t.family == family} == {EXCESS_NOISE}
     if nameless or {VELOCITY, LOAD_VELOCITY} & variables(raised):
         damped = np.array([n in GROUND_DAMPERS for n in fit.model.names])
-        less = np.where(damped, _DAMPING_LEFT * fit.theta, fit.theta)
+        damping_left = 0.2  # of the damping, if most of it is friction that was fitted as damping
+        less = np.where(damped, damping_left * fit.theta, fit.theta)
         others.append(critical_stiffness(fit.model, less).value)
     if here == 0:  # never stable: it cannot go further down
         return _LEAST[family]
@@ -184,20 +182,22 @@ def _with_linear(
     """Crossings of G exp(delta) over draws of both."""
     period = fit.model.period_s
     assert period is not None
-    frequency = np.geomspace(0.05 * fit.frequency_hz.min(), 0.5 / period, _GRID)
+    grid = 1500
+    frequency = np.geomspace(0.05 * fit.frequency_hz.min(), 0.5 / period, grid)
     found = _deviation(fit)
     # Below the band the mechanism alone speaks; above it the deviation may go on.
     beyond = np.arange(found.log_f[-1] + 0.05, np.log10(frequency[-1]), 0.05)
     knots = np.concatenate([found.log_f, beyond])
-    delta = _draws_of_deviation(found, knots, _DRAWS, rng)
+    draws = 2000
+    delta = _draws_of_deviation(found, knots, draws, rng)
     rng.shuffle(delta)
     knots = np.concatenate([[knots[0] - 0.1], knots])
-    delta = np.concatenate([np.zeros((_DRAWS, 1)), delta], axis=1)
-    pick = rng.integers(len(posterior.draws), size=_DRAWS)
-    samples, places = np.empty(_DRAWS), np.empty(_DRAWS)
+    delta = np.concatenate([np.zeros((draws, 1)), delta], axis=1)
+    pick = rng.integers(len(posterior.draws), size=draws)
+    samples, places = np.empty(draws), np.empty(draws)
     log_f = np.log10(frequency)
     step = 100
-    for start in range(0, _DRAWS, step):
+    for start in range(0, draws, step):
         rows = slice(start, start + step)
         g = fit.model.response(posterior.draws[pick[rows]], frequency)
         bent = np.stack(  # interpolated over log frequency

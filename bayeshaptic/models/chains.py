@@ -17,7 +17,6 @@ from bayeshaptic.models.structures import chain
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
 
-_FREQUENCIES = 45
 _SHARES = (0.03, 0.1, 0.3, 1.0, 3.0)  # weight of a new mode over that of the whole mass
 _DAMPING = (0.01, 0.05)  # ratios
 
@@ -43,7 +42,8 @@ def with_one_more_mode(shorter: Model, theta: Floats, model: Model, etfe: Etfe) 
     squares, weights = _modes_of(values, _modes(model))
     low, high = etfe.band_hz
     found = []
-    for frequency in np.geomspace(low, 1.2 * high, _FREQUENCIES):
+    frequencies = 45
+    for frequency in np.geomspace(low, 1.2 * high, frequencies):
         for share in _SHARES:
             masses, springs = _as_chain(
                 np.append(squares, (2 * np.pi * frequency) ** 2),

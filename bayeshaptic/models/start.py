@@ -13,8 +13,6 @@ from bayeshaptic.models.structures import GROUND_DAMPERS, HAND
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
 
-_HAND_KG = 0.3  # middle of what a hand, or a finger, brings along
-
 
 @dataclass(frozen=True)
 class Scales:
@@ -75,7 +73,8 @@ def informed(model: Model, etfe: Etfe) -> Model:
     found = scales(etfe)
     missing = {p.name: p.dimension for p in model.parameters if p.prior is None}
     kilograms = (model.force_unit, model.position_unit) == ("N", "m")
-    hand = _hand_priors(_HAND_KG if kilograms else found.mass)
+    hand_kg = 0.3  # middle of what a hand, or a finger, brings along
+    hand = _hand_priors(hand_kg if kilograms else found.mass)
     return model.with_prior(
         {
             name: hand[name] if name in HAND else _weak_prior(name, kind, found, etfe.period_s)

@@ -11,8 +11,6 @@ from scipy.special import gammaln, logsumexp
 
 from bayeshaptic.types import Floats
 
-_NO_WIDTH = 1e-24  # variance, of coordinates of order one, that rounding errors have
-
 
 @dataclass(frozen=True)
 class StudentMixture:
@@ -140,7 +138,8 @@ def _covariance(x: Floats, w: Floats, mean: Floats) -> Floats:
 def _root(covariance: Floats) -> Floats:
     """Cholesky factor; directions that the points do not span get a little width of their own."""
     covariance = 0.5 * (covariance + covariance.T)
-    scale = np.sqrt(np.maximum(np.diag(covariance), _NO_WIDTH))
+    no_width = 1e-24  # variance, of coordinates of order one, that rounding errors have
+    scale = np.sqrt(np.maximum(np.diag(covariance), no_width))
     correlation = covariance / np.outer(scale, scale)
     np.fill_diagonal(correlation, 1.0)  # where all points are one, there is none
     values, vectors = np.linalg.eigh(correlation)

@@ -8,9 +8,6 @@ import numpy as np
 
 from bayeshaptic.types import Floats
 
-_BELIEVED = 20.0
-_FEWEST = 5  # excesses that a shape can be fitted to
-
 
 @dataclass(frozen=True)
 class ParetoTail:
@@ -46,7 +43,8 @@ class ParetoTail:
 
         As if twenty more had been exponential: a shape that is low by chance promises too much.
         """
-        shape = self.shape * draws / (draws + _BELIEVED)
+        believed = 20.0
+        shape = self.shape * draws / (draws + believed)
         if self.shape >= 1:  # there is no mean
             return ParetoTail(shape, self.scale)
         return ParetoTail(shape, self.scale * (1 - shape) / (1 - self.shape))
@@ -105,7 +103,8 @@ def pareto_k(log_weight: Floats) -> float:
     tail = int(min(0.2 * count, 3 * np.sqrt(count)))
     weight = np.sort(np.exp(log_weight - log_weight.max()))
     excess = weight[-tail:] - weight[-tail - 1]
-    if tail < _FEWEST or excess[-1] <= 1e-12:
+    fewest = 5  # excesses that a shape can be fitted to
+    if tail < fewest or excess[-1] <= 1e-12:
         return -np.inf
     shape = fit_pareto(np.maximum(excess, 1e-12 * excess[-1])).shape
     # Few points: towards 0.5, as ten points would.

@@ -18,9 +18,6 @@ import numpy as np
 
 from bayeshaptic.types import Floats
 
-_RIDGE = 1e-3
-_POINTS_A_TERM = 30  # fewer points than that cannot decide a coefficient
-
 
 @dataclass(frozen=True)
 class Straightening:
@@ -83,11 +80,12 @@ def straighten(x: Floats) -> Straightening:
     size = x.shape[1]
     constant, linear = np.zeros(size), np.zeros((size, size))
     quadratic = np.zeros((size, size, size))
+    ridge = 1e-3
     for k in range(1, size):
         # Principal components are uncorrelated, but not with each other's squares where skewed.
         first, second = np.triu_indices(_how_many(k, len(x)))
         terms = np.column_stack([np.ones(len(v)), v[:, :k], v[:, first] * v[:, second]])
-        normal = terms.T @ terms + _RIDGE * len(v) * np.eye(terms.shape[1])
+        normal = terms.T @ terms + ridge * len(v) * np.eye(terms.shape[1])
         found = np.linalg.solve(normal, terms.T @ v[:, k])
         constant[k], linear[k, :k] = found[0], found[1 : k + 1]
         quadratic[k, first, second] = found[k + 1 :]
@@ -96,5 +94,6 @@ def straighten(x: Floats) -> Straightening:
 
 def _how_many(before: int, points: int) -> int:
     """Of the components before this one, how many the points can decide products of."""
-    affordable = points / _POINTS_A_TERM
+    points_a_term = 30  # fewer points than that cannot decide a coefficient
+    affordable = points / points_a_term
     return min(before, int((np.sqrt(1 + 8 * affordable) - 1) / 2))

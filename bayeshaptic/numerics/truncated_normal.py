@@ -6,8 +6,6 @@ import numpy as np
 
 from bayeshaptic.types import Floats
 
-_SWEEPS = 20
-
 
 def draw_above(low: Floats, mean: Floats, covariance: Floats, rng: np.random.Generator) -> Floats:
     """A draw of each normal distribution, shape (B, n), with entries not below `low`.
@@ -30,7 +28,8 @@ def draw_above(low: Floats, mean: Floats, covariance: Floats, rng: np.random.Gen
         return draw
     precision = np.linalg.inv(covariance[:, walled][:, :, walled])
     inside = np.maximum(draw[:, walled], low[walled])
-    for _ in range(_SWEEPS):
+    sweeps = 20
+    for _ in range(sweeps):
         for i in range(len(walled)):
             off = inside - mean[:, walled]
             off[:, i] = 0.0

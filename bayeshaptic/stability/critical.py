@@ -22,9 +22,6 @@ from bayeshaptic.stability.tail import LowQuantile, low_quantile, quantiles
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Ints
 
-_CHUNK = 4096
-_CHECKED = 64
-
 
 @dataclass(frozen=True, repr=False)
 class CriticalStiffness(Shown):
@@ -248,8 +245,9 @@ def _limits(
         frequency[:, :known] = before.frequency_hz.reshape(chains, -1)[:, :known]
     fresh = by_chain[:, known:].reshape(-1, vectors.shape[1])
     parts = [np.empty((2, 0))]
-    for start in range(0, len(fresh), _CHUNK):
-        system = model.system(fresh[start : start + _CHUNK])
+    chunk = 4096
+    for start in range(0, len(fresh), chunk):
+        system = model.system(fresh[start : start + chunk])
         found = find_crossings(system, model.period_s, approximation)
         parts.append(np.stack([found.critical, found.binding_hz]))
     new = np.concatenate(parts, axis=1).reshape(2, chains, -1)
@@ -258,11 +256,11 @@ def _limits(
     kinds = np.concatenate(
         [
             binding_kinds(
-                model.system(vectors[start : start + _CHUNK]),
-                frequency[start : start + _CHUNK],
+                model.system(vectors[start : start + chunk]),
+                frequency[start : start + chunk],
                 model.period_s,
             )
-            for start in range(0, len(vectors), _CHUNK)
+            for start in range(0, len(vectors), chunk)
         ]
     )
     crossings, group = group_crossings(kinds, frequency)
@@ -271,7 +269,8 @@ def _limits(
 
 def _checked(limit: CriticalStiffness, model: Model, vectors: Floats) -> CriticalStiffness:
     """With draws at equal steps of probability checked against the closed loop's own poles."""
-    count = min(_CHECKED, len(vectors))
+    checked = 64
+    count = min(checked, len(vectors))
     order = np.argsort(limit.samples)
     pick = order[np.linspace(0, len(order) - 1, count).astype(int)]
     assert model.period_s is not None

@@ -15,10 +15,7 @@ from bayeshaptic.stability.responses.linked import linked_response
 from bayeshaptic.stability.responses.response import PoleResponse, Response, pole_response
 from bayeshaptic.types import Floats, Ints
 
-_CHUNK = 64  # rows at a time: the arrays of one chunk stay in the cache
 _TOLERANCE = 1e-13  # of a crossing's angle
-_DIP_POINTS = 17
-_DIP_ROUNDS = 5
 
 
 @dataclass(frozen=True)
@@ -143,9 +140,9 @@ def plain_search(response: Response) -> tuple[Ints, Floats, Floats]:
         Of which loop, at which angle, and the real value of the response there.
     """
     batch = len(response.delay)
+    chunk = 64  # rows at a time: the arrays of one chunk stay in the cache
     scans = [
-        _scan(response, slice(start, min(start + _CHUNK, batch)))
-        for start in range(0, batch, _CHUNK)
+        _scan(response, slice(start, min(start + chunk, batch))) for start in range(0, batch, chunk)
     ]
     row, low, high = (np.concatenate(part) for part in zip(*scans, strict=True))
 
@@ -188,9 +185,11 @@ def _scan(response: Response, rows: slice) -> tuple[Ints, Floats, Floats]:
 
 def _dips(response: Response, row: Ints, low: Floats, high: Floats) -> tuple[Ints, Floats, Floats]:
     """Pairs of sign changes hidden between grid points: zoom in where |sine| has a minimum."""
-    steps = np.linspace(0.0, 1.0, _DIP_POINTS)
+    dip_points = 17
+    steps = np.linspace(0.0, 1.0, dip_points)
     found = []
-    for _ in range(_DIP_ROUNDS):
+    dip_rounds = 5
+    for _ in range(dip_rounds):
         theta = low[:, None] + (high - low)[:, None] * steps
         sine = _sine(response.at(row, theta))
         change = np.signbit(sine[:, 1:]) != np.signbit(sine[:, :-1])
@@ -203,7 +202,7 @@ def _dips(response: Response, row: Ints, low: Floats, high: Floats) -> tuple[Int
         best = np.argmin(np.abs(sine), axis=1)
         pick = np.arange(len(best))
         low = theta[pick, np.maximum(best - 1, 0)]
-        high = theta[pick, np.minimum(best + 1, _DIP_POINTS - 1)]
+        high = theta[pick, np.minimum(best + 1, dip_points - 1)]
     return tuple(np.concatenate(part) for part in zip(*found, strict=True))  # type: ignore[return-value]
 
 

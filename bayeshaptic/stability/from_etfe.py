@@ -13,15 +13,11 @@ from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
 
 DRAWS = 4000
-_STEP = 0.03  # relative distance of the places where the phase is looked at
 # Standard deviations from -180 degrees from which a stretch counts, in equal shares of the draws:
 # the nearer it is, the more likely it is the noise that has put it on its side.
 _LEVELS = (0.25, 0.7, 1.2, 1.9, 2.5)
 _DOUBTFUL = 1.0  # a stretch below this is worth a word where it is not in the numbers,
 _NEAR = 2.0  # and a place that is nearer than this without reaching the other side
-_POINTS = 201
-_ASIDE = 2  # places on either side of a crossing, over which its slope is read
-_ENOUGH = 0.95  # share of draws with a crossing inside the band that an interval needs
 
 
 @dataclass(frozen=True)
@@ -98,7 +94,8 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
     """
     data = response_data(etfe)
     low, high = etfe.band_hz
-    count = max(int(np.log(high / low) / _STEP), 2)
+    step = 0.03  # relative distance of the places where the phase is looked at
+    count = max(int(np.log(high / low) / step), 2)
     fits = [fit for hz in np.geomspace(low, high, count) if (fit := local_fit(data, hz))]
     band = f"{low:.4g} and {high:.4g} Hz"
 
@@ -120,7 +117,8 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
     crosses = np.isfinite(samples)
     if not crosses.any():
         return missing(f"the phase does not reach -180 degrees between {band}")
-    if crosses.mean() < _ENOUGH:
+    enough = 0.95  # share of draws with a crossing inside the band that an interval needs
+    if crosses.mean() < enough:
         share = f"{100 * crosses.mean():.0f} % of the draws of its noise"
         return missing(f"the phase reaches -180 degrees between {band} in {share} only")
     q05, q50, q95 = (float(q) for q in np.quantile(samples[crosses], [0.05, 0.5, 0.95]))
@@ -135,7 +133,8 @@ def _steepness(fits: list[LocalFit], frequency_hz: float) -> tuple[float, float]
     """The phase's standard deviation at a crossing in degrees, and dB of 1/abs(G) per degree."""
     centres = np.array([fit.centre_hz for fit in fits])
     nearest = int(np.abs(np.log(centres / frequency_hz)).argmin())
-    around = [fit.inverse for fit in fits[max(nearest - _ASIDE, 0) : nearest + _ASIDE + 1]]
+    aside = 2  # places on either side of a crossing, over which its slope is read
+    around = [fit.inverse for fit in fits[max(nearest - aside, 0) : nearest + aside + 1]]
     turned = np.degrees(np.abs(np.angle(around[-1] / around[0])))
     risen = 20 * np.log10(abs(around[-1]) / abs(around[0]))
     sd = float(np.degrees(fits[nearest].relative_sd))
@@ -198,7 +197,8 @@ def _lowest_crossing(
     fit = local_fit(data, centre) or before
     low = max(fits[(left.start + left.stop) // 2].centre_hz, fit.low_hz)
     high = min(fits[(right.start + right.stop) // 2].centre_hz, fit.high_hz)
-    frequency = np.linspace(min(low, before.centre_hz), max(high, after.centre_hz), _POINTS)
+    points = 201
+    frequency = np.linspace(min(low, before.centre_hz), max(high, after.centre_hz), points)
     inverse = fit.draws(rng, draws, frequency)
     early, late = inverse[:, :-1], inverse[:, 1:]
     change = np.signbit(early.imag) != np.signbit(late.imag)

@@ -11,14 +11,9 @@ from scipy.special import digamma
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.types import Complexes, Floats
 
-_ORDER = 3
 _RICHER = 5
 _SPANS = np.geomspace(0.6, 0.02, 14)  # half widths over the centre frequency, widest first
-_BETTER = 5.0  # gain in chi-square by the richer polynomial that noise exceeds in 4 % of cases
-_NARROWER = 2  # steps from the widest span where a cubic passes
-_NEIGHBOURS = 4  # windows on each side that share their noise variance
 _OUTLIER = 1.6  # share of its own noise variance that a window keeps at least: a tremor is a peak
-_NOISIEST = 0.3  # relative sd above which 1/G is not linear in the noise
 
 
 @dataclass(frozen=True)
@@ -53,7 +48,8 @@ def response_data(etfe: Etfe) -> ResponseData:
     response = np.linalg.solve(windows.design, windows.target[..., None])[..., 0]
     design = windows.design / np.sqrt(noise)[:, None, None]
     strength = np.linalg.norm(design * response[:, None, :], axis=(1, 2)) / np.sqrt(k)
-    good = strength > 1 / _NOISIEST
+    noisiest = 0.3  # relative sd above which 1/G is not linear in the noise
+    good = strength > 1 / noisiest
     frequency = windows.frequency_hz[good]
     return ResponseData(frequency, response[good], design[good], frequency.mean(axis=1))
 
@@ -66,8 +62,9 @@ def _noise(scatter: Floats, freedom: Floats) -> Floats:
     """
     own = scatter / freedom
     unbiased = np.log(own) - digamma(freedom) + np.log(freedom)
-    padded = np.pad(unbiased, _NEIGHBOURS, mode="reflect", reflect_type="odd")
-    together = np.convolve(padded, np.ones(2 * _NEIGHBOURS + 1), "valid") / (2 * _NEIGHBOURS + 1)
+    neighbours = 4  # windows on each side that share their noise variance
+    padded = np.pad(unbiased, neighbours, mode="reflect", reflect_type="odd")
+    together = np.convolve(padded, np.ones(2 * neighbours + 1), "valid") / (2 * neighbours + 1)
     return np.maximum(np.exp(together), own / _OUTLIER)
 
 
@@ -142,21 +139,24 @@ def local_fit(data: ResponseData, centre_hz: float) -> LocalFit | None:
 def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | None:
     """The fit two spans below the widest that passes, or the narrowest that there is."""
     last, accepted = None, 0
+    order = 3
+    better = 5.0  # gain in chi-square by the richer polynomial that noise exceeds in 4 % of cases
+    narrower = 2  # steps from the widest span where a cubic passes
     for span in _SPANS:
         near = np.abs(data.centre_hz / centre_hz - 1) <= span
         numbers = int(near.sum()) * data.frequency_hz.shape[1]
-        freedom, richer = numbers - _ORDER - 1, numbers - _RICHER - 1
+        freedom, richer = numbers - order - 1, numbers - _RICHER - 1
         if richer < 2:
             break
         # The triangle of both polynomials: what is left of the target stands in its last column.
         equations = _equations(data, near, centre_hz, span, inverted)
         triangle: Complexes = np.asarray(np.linalg.qr(equations, mode="r"))
         left = np.cumsum(np.abs(triangle[::-1, -1]) ** 2)[::-1]  # by k coefficients: at k
-        fewer, more = float(left[_ORDER + 1]), float(left[_RICHER + 1])
-        enough = fewer - more < _BETTER and fewer < freedom + 3 * np.sqrt(1.2 * freedom)
+        fewer, more = float(left[order + 1]), float(left[_RICHER + 1])
+        enough = fewer - more < better and fewer < freedom + 3 * np.sqrt(1.2 * freedom)
         accepted += enough or accepted > 0
         last = float(span), near, triangle, 1.0 if enough else max(more / richer, 1.0)
-        if accepted > _NARROWER:
+        if accepted > narrower:
             break
     return None if last is None else _fit(data, centre_hz, inverted, *last)
 

@@ -21,7 +21,6 @@ from bayeshaptic.types import Floats
 ENOUGH_BELOW = 20  # effective draws below a quantile that is stated as it is
 PRECISE = 0.2  # of the 90 % interval: a larger error of a fitted tail, and nothing is stated
 _SHARE = 0.05  # of the draws that a tail is fitted to; halved while it does not fit
-_FEWEST = 40  # effective draws of a tail
 # Of sqrt(n) times the largest difference of distributions: 95 % of fits to eight smooth laws stay
 # below 0.9 to 1.1.
 _FITS = 1.3
@@ -101,7 +100,8 @@ def _fitted(
     count = int(share * len(ordered))
     threshold = float(ordered[count])
     worth = share * effective(threshold)
-    if worth < _FEWEST or not np.isfinite(threshold):
+    fewest = 40  # effective draws of a tail
+    if worth < fewest or not np.isfinite(threshold):
         return None
     excess = (threshold - ordered[:count])[::-1]
     if not excess[count // 4] > 0:

@@ -27,8 +27,6 @@ from bayeshaptic.study.recorded_cases import (
 )
 from bayeshaptic.types import Progress
 
-_PEOPLE = 25_000  # at least, that are drawn from all draws of the population
-
 
 @dataclass(frozen=True)
 class StudyCases:
@@ -164,10 +162,11 @@ def _new_person(population: Population, like: Sequence[Analysed], seed: int) -> 
     wider = widening(like)
     seen = Counter(one.entry.configuration for one in like)
     cases = []
+    people = 25_000  # at least, that are drawn from all draws of the population
     for number in sorted(range(len(population.places)), key=lambda n: -seen[population.places[n]]):
         place = population.places[number]
         rng = np.random.default_rng(np.random.SeedSequence([seed, number, 1]))
-        each = -(-_PEOPLE // len(population.log_mean))
+        each = -(-people // len(population.log_mean))
         draws = population.new_person(rng, each, number)
         # People from one draw of the population, or from neighbours of one walker, are not
         # independent.

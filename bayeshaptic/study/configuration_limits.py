@@ -15,9 +15,6 @@ from bayeshaptic.stability.cases import CONFIGURATION, Case
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Progress
 
-_POINTS = 9
-_DRAWS = 22_000  # with them 20 lie below the stiffness of 0.1 % risk
-
 
 @dataclass(frozen=True)
 class ConfigurationLimits:
@@ -75,8 +72,10 @@ def configuration_limits(
     """
     inferred = infer_configurations(posteriors, coordinate, seed, progress)
     rng = np.random.default_rng(np.random.SeedSequence([seed, int(held)]))
-    grid = inferred.grid(_POINTS)
-    theta = inferred.predict(grid, rng, _DRAWS)
+    points = 9
+    grid = inferred.grid(points)
+    draws = 22_000  # with them 20 lie below the stiffness of 0.1 % risk
+    theta = inferred.predict(grid, rng, draws)
     cases = tuple(
         _case(inferred, value, theta[:, number], held) for number, value in enumerate(grid)
     )

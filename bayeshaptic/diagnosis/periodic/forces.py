@@ -15,7 +15,6 @@ from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
 from bayeshaptic.models import Model
 
 _WHERE = {MOTOR: "at the motor", LOAD: "on the body", CONNECTION: "in the connection"}
-_SHARP = 0.02  # of the variable's rms: where a jump is rounded off
 
 
 def force_candidates(model: Model, motions: Mapping[Place, Motion]) -> dict[str, tuple[Basis, ...]]:
@@ -48,10 +47,12 @@ def force_candidates(model: Model, motions: Mapping[Place, Motion]) -> dict[str,
 def _force(shape: Shape, usual: Usual) -> Callable[[Motion], Floats]:
     """Of a motion; harmonics need a jump to be rounded off."""
 
+    sharp = 0.02  # of the variable's rms: where a jump is rounded off
+
     def force(motion: Motion) -> Floats:
         variable = motion.velocity if shape.over == VELOCITY else motion.position
         unit = usual.velocity if shape.over == VELOCITY else usual.position
-        smooth = np.tanh(np.abs(variable) / (_SHARP * unit)) if shape.jumps else 1.0
+        smooth = np.tanh(np.abs(variable) / (sharp * unit)) if shape.jumps else 1.0
         return np.asarray(shape.force(variable) * smooth)
 
     return force

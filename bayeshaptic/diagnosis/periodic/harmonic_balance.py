@@ -29,10 +29,6 @@ from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
 from bayeshaptic.recordings.response.windows import Windows
 
-_ROUNDS = 25
-_SETTLED = 0.02  # of a standard deviation of the coefficients
-_TURNS = 3
-
 
 @dataclass(frozen=True)
 class Basis:
@@ -131,14 +127,16 @@ def balance(
     strength = np.zeros(len(forces)) if strength is None else np.asarray(strength, float)
     applied = no_force(period, places_of(model.system(theta)))
     converged = not forces
-    for _ in range(_ROUNDS):
+    rounds = 25
+    settled = 0.02  # of a standard deviation of the coefficients
+    for _ in range(rounds):
         motions, applied = _settle(model.system(theta), period, forces, strength, applied)
         unit = [period.transform(basis.force(motions[basis.place])) for basis in forces]
         joint = _Joint(model, windows, period, forces, np.array(unit), own)
         new_theta, new_strength = joint.solve(theta, strength)
         change = np.max(np.abs(new_strength - strength) / joint.sds(new_theta), initial=0.0)
         theta, strength = new_theta, new_strength
-        if change < _SETTLED or not forces:
+        if change < settled or not forces:
             converged = True
             break
     # Of the parameters found: without forces those of the start were the only ones so far.
@@ -181,7 +179,8 @@ def _settle(
     applied: Applied,
 ) -> tuple[dict[Place, Motion], Applied]:
     """Motion from forces and forces from motion, in turn, for given parameters and strengths."""
-    for _ in range(_TURNS if forces else 1):
+    turns = 3
+    for _ in range(turns if forces else 1):
         motions = steady_motion(system, period, applied)
         total = {place: np.zeros(period.samples) for place in applied.places}
         for basis, size in zip(forces, strength, strict=True):

@@ -27,7 +27,6 @@ from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.types import Complexes, Floats
 
 LOAD = Place(1, None)
-_OVERTONES = 2.0  # harmonics of the motion up to so many times the highest excited one
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,8 @@ def one_period(etfe: Etfe, witness: Floats | None = None) -> Period:
     position = recording.position if witness is None else witness
     force = recording.force[first : first + samples]
     excited = np.rint(spectra.frequency_hz * samples * recording.period_s).astype(int)
-    last = min(int(_OVERTONES * excited[-1]), (samples - 1) // 2)
+    overtones = 2.0  # harmonics of the motion up to so many times the highest excited one
+    last = min(int(overtones * excited[-1]), (samples - 1) // 2)
     return Period(
         force=force - force.mean(),
         position=position[first:stop].reshape(-1, samples).mean(axis=0),

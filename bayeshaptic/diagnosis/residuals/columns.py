@@ -24,8 +24,6 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
-_HAND_HZ = 20.0  # below it a hand moves the device, and the encoder sees it well
-
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     """One test for each nonlinear function of command and motion; none without a recording."""
@@ -119,7 +117,8 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
     if fit.model.name == "grasped":
         rest = recording.position - recording.position.mean() - x
         rate = 1 / recording.period_s
-        low = butter(4, min(_HAND_HZ, 0.4 * rate), fs=rate, output="sos")
+        hand_hz = 20.0  # below it a hand moves the device, and the encoder sees it well
+        low = butter(4, min(hand_hz, 0.4 * rate), fs=rate, output="sos")
         v = v + np.gradient(sosfiltfilt(low, rest), recording.period_s)
     else:
         v = v + drift_velocity(system, recording.position - x, recording.period_s)

@@ -13,11 +13,8 @@ from bayeshaptic.recordings.response.etfe import Etfe, RandomSpectra
 from bayeshaptic.recordings.response.local_polynomial import leakage_terms
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 
-_HAND_HZ, _FREE_HZ = 45.0, 20.0  # below it a hand, or a draught, moves the device
-_QUIET = 3e-3  # power of the force, over that in the band, which moves nothing up there
 _LINES, _FEWEST = 60, 5
 _TOGETHER = 3
-_ROUNDED = 0.25  # counts a sample; rounding a slower motion does not make white noise
 
 
 def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
@@ -32,12 +29,14 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     recording, spectra = etfe.unbroken, etfe.spectra
     if recording is None or not isinstance(spectra, RandomSpectra):
         return ()
-    if _counts_a_sample(recording) < _ROUNDED:
+    rounded = 0.25  # counts a sample; rounding a slower motion does not make white noise
+    if _counts_a_sample(recording) < rounded:
         return ()
     floor = _floor(recording, etfe.band_hz)
     windows = RandomSpectra.windows(spectra, fit.response)  # as measured, nothing discounted
     centre = windows.frequency_hz[:, 1]
-    driven = centre > (_HAND_HZ if fit.model.name == "grasped" else _FREE_HZ)
+    hand_hz, free_hz = 45.0, 20.0  # below it a hand, or a draught, moves the device
+    driven = centre > (hand_hz if fit.model.name == "grasped" else free_hz)
     if floor is None or driven.sum() < _TOGETHER:
         return ()
     together = np.ones(_TOGETHER)
@@ -71,9 +70,10 @@ def _floor(recording: Recording, band_hz: tuple[float, float]) -> float | None:
     first, last = np.searchsorted(frequency, [1.05 * band_hz[1], 0.48 / recording.period_s])
     x = np.linspace(-1, 1, _LINES)
     found = []
+    quiet = 3e-3  # power of the force, over that in the band, which moves nothing up there
     for start in range(first, last - _LINES, _LINES):
         lines = slice(start, start + _LINES)
-        if power[lines].mean() > _QUIET * inside:
+        if power[lines].mean() > quiet * inside:
             continue
         basis = np.linalg.qr(leakage_terms(x, frequency[lines], frequency[[start]]))[0]
         left = y[lines] - basis @ (basis.T @ y[lines])

@@ -10,8 +10,6 @@ import numpy as np
 
 from bayeshaptic.inference.fit import MISFIT, Fit
 
-_FURTHEST = 0.25  # of the windows: how far apart neighbours may be
-
 
 def noise_scale(fit: Fit) -> float:
     """Factor on the noise variance of a posterior around `fit`; 1 where the model fits.
@@ -40,7 +38,8 @@ def correlation_length(fit: Fit) -> float:
     deviation = deviation[np.argsort(nodes.mean(axis=1), kind="stable")]
     count = len(deviation)
     padded = np.fft.fft(deviation, 2 * count)
-    sums = np.fft.ifft(np.abs(padded) ** 2).real[: max(int(_FURTHEST * count), 2)]
+    furthest = 0.25  # of the windows: how far apart neighbours may be
+    sums = np.fft.ifft(np.abs(padded) ** 2).real[: max(int(furthest * count), 2)]
     if not sums[0] > 0:
         return 1.0
     correlation = sums[1:] / sums[0]

@@ -19,7 +19,6 @@ from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 
-_BAND_DECADES = 0.15
 _KNOTS = 16
 
 
@@ -102,7 +101,8 @@ def _upper_score(log_p: Floats) -> Floats:
 def _band_test(fit: Fit) -> Test:
     scores = window_scores(fit)
     centre = np.log10(fit.windows.frequency_hz.mean(axis=1))
-    band = np.floor((centre - centre[0]) / _BAND_DECADES).astype(int)
+    band_decades = 0.15
+    band = np.floor((centre - centre[0]) / band_decades).astype(int)
     worst, where = -np.inf, 0.0
     bands = np.unique(band)
     for index in bands:

@@ -8,16 +8,12 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
 from bayeshaptic.types import Bools, Floats
 
-_FEWEST = 4  # samples on an extreme that are worth a look
-_LEVELS = 4  # a position that takes fewer is none
 # A motion that comes from rest has gone a quarter of the way in half of the time; one that comes
 # back over an extreme more than 0.4 of it, at a quarter of the time that it was beyond.
 _FROM_REST = 0.35
-_LONG = 20  # samples on an extreme from which on it may be a pause
 # Of the runs of a position that was cut off; of noise up to 60 Hz half begin or end slowly.
 _MOST_RESTS = 0.75
 _QUIET = 0.5
-_CLEAR_COUNTS, _FEWEST_COUNTS = 20, 4
 
 
 def clipped(samples: Samples) -> tuple[Bools, float]:
@@ -43,8 +39,10 @@ def clipped(samples: Samples) -> tuple[Bools, float]:
         (sign, there & ~at_rest(position, samples.recording.force, there, unit))
         for sign, there in extremes
     ]
-    extremes = [(sign, there) for sign, there in extremes if there.sum() >= _FEWEST]
-    if not extremes or len(np.unique(position)) <= _LEVELS:
+    fewest = 4  # samples on an extreme that are worth a look
+    extremes = [(sign, there) for sign, there in extremes if there.sum() >= fewest]
+    levels = 4  # a position that takes fewer is none
+    if not extremes or len(np.unique(position)) <= levels:
         return wrong, statistic
     at_extremes = np.any([there for _, there in extremes], axis=0)
     trial = samples.without(at_extremes)
@@ -55,11 +53,11 @@ def clipped(samples: Samples) -> tuple[Bools, float]:
     inner[trial.predictor.order : -trial.predictor.order] = True
     for sign, there in extremes:
         beyond = sign * (trial.position - position)[there & inner] / error
-        if len(beyond) < _FEWEST:
+        if len(beyond) < fewest:
             continue
         beyond = np.sort(beyond)
-        statistic = max(statistic, float(beyond[-_FEWEST // 2]))
-        if beyond[-_FEWEST // 2] > thresholds.CLIPPED:
+        statistic = max(statistic, float(beyond[-fewest // 2]))
+        if beyond[-fewest // 2] > thresholds.CLIPPED:
             wrong |= there
     return wrong, statistic
 
@@ -79,7 +77,8 @@ def at_rest(position: Floats, force: Floats, there: Bools, unit: float) -> Bools
         What positions differ by at least.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], there, [0]])))
-    runs = [run for run in zip(edges[::2], edges[1::2], strict=True) if run[1] - run[0] >= _LONG]
+    long = 20  # samples on an extreme from which on it may be a pause
+    runs = [run for run in zip(edges[::2], edges[1::2], strict=True) if run[1] - run[0] >= long]
     changes = np.abs(np.diff(force, prepend=force[0]))
     usual = float(np.median(changes[~there])) if not there.all() else 0.0
     rests = []
@@ -98,8 +97,9 @@ def at_rest(position: Floats, force: Floats, there: Bools, unit: float) -> Bools
 
 def _from_rest(away: Floats) -> bool:
     """Whether a motion begins slowly, by its distance in counts after each sample."""
-    clear = np.flatnonzero(away >= _CLEAR_COUNTS)
+    clear_counts, fewest_counts = 20, 4
+    clear = np.flatnonzero(away >= clear_counts)
     whole = max(int(clear[0]) + 1, 4) if len(clear) else len(away)
-    if not 4 <= whole <= len(away) or away[whole - 1] < _FEWEST_COUNTS:
+    if not 4 <= whole <= len(away) or away[whole - 1] < fewest_counts:
         return True  # it hardly moves, or there is nothing before the first sample
     return bool(away[whole // 2 - 1] < _FROM_REST * away[whole - 1])

@@ -13,13 +13,7 @@ from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Predictor, S
 
 _ERRORS = 5.0  # how badly a sample must be predicted to be looked at
 _WILD = 8.0  # how far off a wild one must be, in the same measure
-_MOST = 300  # more are no faults but noise
-_PASSES = 3  # what lies close behind a gap is seen when the gap is mended
-_LONGEST = 3  # rows missing in one place
 _EQUATIONS = (24, 10, 6)  # predictions that a fault must explain; fewer where faults lie close
-_CONVINCING = 30.0  # gain in squared errors over their variance
-_APART = 12  # samples badly predicted closer to each other have one cause
-_LEFT = 2.5  # squared error a prediction over its variance that may remain
 _A_ROW = 4.0  # squared errors that a further missing row must explain
 _SIMPLER = 8.0  # and that a gap must explain more than a wild sample
 
@@ -84,7 +78,8 @@ def faults(samples: Samples) -> Faults:
     if predictor is None:
         return Faults(0, samples, np.zeros(samples.recording.samples, dtype=bool), 0.0)
     look = _look(samples, predictor)
-    for _ in range(_PASSES):
+    passes = 3  # what lies close behind a gap is seen when the gap is mended
+    for _ in range(passes):
         if len(look.gaps) <= look.unexplained:
             break
         lost += sum(len(gap.force) for gap in look.gaps)
@@ -99,10 +94,11 @@ def _look(samples: Samples, predictor: Predictor) -> _Look:
     """Explain every badly predicted sample, with a predictor that has not seen it."""
     wild = np.zeros(samples.recording.samples, dtype=bool)
     suspects = _suspects(samples, predictor)
-    if 0 < len(suspects) <= _MOST:
+    most = 300  # more are no faults but noise
+    if 0 < len(suspects) <= most:
         predictor = samples.without(_marked(suspects, wild)).predictor or predictor
         suspects = _suspects(samples, predictor)
-    if len(suspects) > _MOST:
+    if len(suspects) > most:
         return _Look([], wild, len(suspects), predictor)
     gaps: list[_Gap] = []
     unexplained = 0
@@ -123,7 +119,8 @@ def _suspects(samples: Samples, predictor: Predictor) -> NDArray[np.intp]:
     errors = predictor.errors(samples.position, samples.recording.force)
     bad = np.flatnonzero(np.abs(errors) > _ERRORS * predictor.spread)
     bad = bad[(bad > predictor.order + 2) & (bad < len(errors) - max(_EQUATIONS) - 2)]
-    return bad[np.diff(bad, prepend=-_APART) >= _APART]
+    apart = 12  # samples badly predicted closer to each other have one cause
+    return bad[np.diff(bad, prepend=-apart) >= apart]
 
 
 def _marked(index: NDArray[np.intp], like: Bools) -> Bools:
@@ -142,14 +139,17 @@ def _explanation(
 
     here = (suspect, suspect - 1)
     wild = _best(trial(at, position=1) for at in here)
+    longest = 3  # rows missing in one place
     gap = _best(
         trial(at, missing=length, position=length, force=length)
-        for length in range(1, min(_LONGEST, equations // 4) + 1)
+        for length in range(1, min(longest, equations // 4) + 1)
         for at in (*here, suspect + 1)
     )
     best = min(wild.left, gap.left)
     rival = _best([trial(suspect), *(trial(at, force=1) for at in here)])
-    if rival.left - best < _CONVINCING or best > _LEFT * equations:
+    convincing = 30.0  # gain in squared errors over their variance
+    left = 2.5  # squared error a prediction over its variance that may remain
+    if rival.left - best < convincing or best > left * equations:
         return None
     if wild.left > gap.left + _SIMPLER:
         return _Gap(gap.at, gap.force)

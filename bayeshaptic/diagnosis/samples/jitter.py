@@ -12,7 +12,6 @@ from bayeshaptic.diagnosis.samples.prediction import Samples
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
 from bayeshaptic.types import Floats
 
-_ALIKE = 0.5
 _BLOCK = 100
 _FILTERS = (np.array([1.0]), np.array([1.0, 1.0]), np.array([1.0, -1.0]))
 
@@ -62,7 +61,8 @@ def jitter(samples: Samples) -> Jitter:
         slope, sd = _slope(power[there], expected[there])
         slopes.append(slope)
         scores.append(slope / sd)
-    if min(slopes) <= _ALIKE * max(slopes):
+    alike = 0.5
+    if min(slopes) <= alike * max(slopes):
         return nothing
     lateness = float(np.sqrt(slopes[0])) * recording.period_s
     return Jitter(min(scores), threshold, lateness, 0.5 * lateness / scores[0])

@@ -20,9 +20,6 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Bools, Floats
 
 ORDER = 48
-_MOST_ROWS = 20_000  # a regression on more gains nothing
-_ROWS_A_COLUMN = 8
-_UNSEEN = 1e-8  # power of the force, over all of it, below which nothing is learnt from it
 
 
 @dataclass(frozen=True)
@@ -123,9 +120,11 @@ def fit_predictor(
     rows = np.arange(order, len(position))
     rows = rows[gaps[rows + 1] == gaps[rows - order]]
     columns = 2 * order + 2
-    if len(rows) < _ROWS_A_COLUMN * columns:
+    rows_a_column = 8
+    if len(rows) < rows_a_column * columns:
         return None
-    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), _MOST_ROWS)).astype(int)]
+    most_rows = 20_000  # a regression on more gains nothing
+    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), most_rows)).astype(int)]
     centre = float(position[~missing].mean())
     lags = np.arange(order + 1)
     sizes = (np.ptp(position[~missing]), np.abs(force).max())
@@ -136,7 +135,8 @@ def fit_predictor(
     target = (position[rows] - centre) / sizes[0]
     # Where the force has no power its coefficients are anything; they had better be zero.
     ridge = np.zeros((order + 1, columns))
-    ridge[:, order:-1] = np.eye(order + 1) * np.sqrt(_UNSEEN) * np.linalg.norm(design[:, order])
+    unseen = 1e-8  # power of the force, over all of it, below which nothing is learnt from it
+    ridge[:, order:-1] = np.eye(order + 1) * np.sqrt(unseen) * np.linalg.norm(design[:, order])
     stacked = np.concatenate([design, ridge]), np.append(target, np.zeros(order + 1))
     found = np.linalg.lstsq(*stacked, rcond=1e-13)[0]
     spread = 1.4826 * float(np.median(np.abs(target - design @ found)))

@@ -6,12 +6,6 @@ import numpy as np
 
 from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Samples
 
-_ERRORS = 5.0  # how far off a repeated sample must be, in errors of the prediction
-_UNITS = 1.5  # increments a sample that no rounding turns into zero
-_SPREADS = 4.0  # nor the noise
-_CONFIRMED = 0.6  # of that, how far the filled-in position must lie from the repeated one
-_ROUNDS = 6
-
 
 def held(samples: Samples) -> tuple[Bools, float]:
     """Repeated samples that are not where all others say that the device was.
@@ -28,20 +22,25 @@ def held(samples: Samples) -> tuple[Bools, float]:
     repeated = np.concatenate([[False], np.diff(position) == 0]) & ~samples.missing
     if samples.predictor is None:
         return np.zeros_like(repeated), 0.0
-    fast = max(_UNITS * samples.unit, _SPREADS * samples.predictor.spread)
+    units = 1.5  # increments a sample that no rounding turns into zero
+    spreads = 4.0  # nor the noise
+    fast = max(units * samples.unit, spreads * samples.predictor.spread)
     wrong = repeated & _obvious(position, fast)
-    for _ in range(_ROUNDS):
+    errors = 5.0  # how far off a repeated sample must be, in errors of the prediction
+    rounds = 6
+    for _ in range(rounds):
         trial = samples.without(wrong)
         if trial.predictor is None:
             return np.zeros_like(repeated), 0.0
-        limit = _ERRORS * trial.predictor.spread
+        limit = errors * trial.predictor.spread
         off = np.abs(trial.errors) > limit
         more = repeated & off & ~wrong
         if not more.any():
             break
         wrong |= more
     # What was filled in must be elsewhere, too; a device that rests is not.
-    wrong &= np.abs(trial.position - position) > _CONFIRMED * limit
+    confirmed = 0.6  # of that, how far the filled-in position must lie from the repeated one
+    wrong &= np.abs(trial.position - position) > confirmed * limit
     return wrong, float(wrong.sum() - np.sum(off & ~repeated))
 
 

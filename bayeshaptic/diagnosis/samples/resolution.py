@@ -10,9 +10,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
 from bayeshaptic.recordings.response.etfe import Etfe
 
-_SLOW = 350.0  # counts a second, in the mean: usual encoders give twice that and more
 _POOR = 0.075  # median relative standard deviation of the response
-_ITS_OWN = 3.0  # squared prediction error over what rounding leaves
 
 
 @dataclass(frozen=True)
@@ -48,8 +46,10 @@ def resolution(samples: Samples, etfe: Etfe) -> Resolution:
     recording = samples.recording
     speed = float(np.mean(np.abs(np.diff(recording.position)))) / (unit * recording.period_s)
     poor = float(np.median(etfe.relative_sd)) / _POOR
+    its_own = 3.0  # squared prediction error over what rounding leaves
     rounding = samples.predictor is not None and (
-        samples.predictor.spread**2 < _ITS_OWN * unit**2 / 6
+        samples.predictor.spread**2 < its_own * unit**2 / 6
     )
-    coarse = min(_SLOW / speed, poor) if rounding else 0.0
+    slow = 350.0  # counts a second, in the mean: usual encoders give twice that and more
+    coarse = min(slow / speed, poor) if rounding else 0.0
     return Resolution(unit, None, thresholds.RESOLUTION * coarse)

@@ -24,8 +24,6 @@ from bayeshaptic.types import Complexes, Floats
 Indices = NDArray[np.intp]
 
 _HALF = 20  # lines to each side
-_OWN = 0.05  # of a tone, what response and leakage must leave
-_MOST = 24  # a tone that wanders takes several
 # Of the position's rms, what rounding in double precision may leave after a simulation: a recording
 # without noise has tones of a hundredth of that.
 _ROUNDING = 1e-9
@@ -184,7 +182,8 @@ def find_tones(recording: Recording, band_hz: tuple[float, float], reference: Re
         return Tones((), 0.0)
     windows = _windows(lines)
     strongest = score = _strongest(lines, windows)
-    while score[0] > thresholds.LOG_CHANCE and len(found) < _MOST:
+    most = 24  # a tone that wanders takes several
+    while score[0] > thresholds.LOG_CHANCE and len(found) < most:
         tone = _fitted(lines, score[1])
         lines.position = lines.position - 0.5 * tone.amplitude * lines.of(
             tone.frequency_hz, slice(None)
@@ -211,6 +210,7 @@ def _strongest(lines: _Lines, windows: list[_Window]) -> tuple[float, float]:
     """
     best, where = 0.0, 0.0
     spacing = 1 / (lines.count * lines.period_s)
+    own = 0.05  # of a tone, what response and leakage must leave
     for window in windows:
         judged = lines.frequency_hz[window.lines[window.judged]]
         candidates = np.concatenate([judged, judged + 0.5 * spacing])
@@ -219,7 +219,7 @@ def _strongest(lines: _Lines, windows: list[_Window]) -> tuple[float, float]:
         total = np.sum(np.abs(left) ** 2)
         size = np.sum(np.abs(columns) ** 2, axis=0)
         # A tone that response and leakage can imitate is none to be seen.
-        size = np.maximum(size, _OWN * np.max(size))
+        size = np.maximum(size, own * np.max(size))
         power = np.abs(columns.conj().T @ left) ** 2 / size
         freedom = len(left) - window.basis.shape[1] - 1
         ratio = freedom * power / np.maximum(total - power, freedom * lines.floor + 1e-12 * total)

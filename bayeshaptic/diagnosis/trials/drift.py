@@ -31,8 +31,6 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Tick
 
 PARTS = 3
-_SHORTEST_S = 5.0
-_GAIN_PART_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,8 @@ def drift_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[T
     `meter` says whether one more is affordable, `tick` is called with the title of each.
     """
     recording = state.etfe.recording
-    if recording is None or recording.duration_s < PARTS * _SHORTEST_S:
+    shortest_s = 5.0
+    if recording is None or recording.duration_s < PARTS * shortest_s:
         return []
     edges = np.linspace(0, recording.samples, PARTS + 1).astype(int)
     try:
@@ -139,7 +138,8 @@ def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> t
     """
     recording = state.etfe.recording
     assert recording is not None
-    count = int(np.clip(recording.duration_s / _GAIN_PART_S, PARTS, 12))
+    gain_part_s = 3.0
+    count = int(np.clip(recording.duration_s / gain_part_s, PARTS, 12))
     edges = np.linspace(0, recording.samples, count + 1).astype(int)
     gains = []
     for a, b in zip(edges[:-1], edges[1:], strict=True):

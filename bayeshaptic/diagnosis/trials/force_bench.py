@@ -31,8 +31,6 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 SUBSTEPS = 8
-_STEP = 4.0  # what a step costs, with the motion around it, in values of a rational model
-_HAND_HZ = 20.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,8 @@ class ForceBench:
     def _hand(self, besides: Floats) -> Floats:
         """Velocity that a hand adds: what is slow, because there the encoder sees it well."""
         rate = 1 / self.recording.period_s
-        low = butter(2, min(_HAND_HZ, 0.4 * rate), fs=rate, output="sos")
+        hand_hz = 20.0
+        low = butter(2, min(hand_hz, 0.4 * rate), fs=rate, output="sos")
         return np.gradient(sosfiltfilt(low, besides), 1 / rate)
 
     def _drift(self, besides: Floats, theta: Floats) -> Floats:
@@ -116,7 +115,8 @@ class ForceBench:
         system, period = self.model.system(theta), self.recording.period_s
         if isinstance(effect, CommandEffect):
             return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
-        spend(_STEP * SUBSTEPS * self.recording.samples)
+        step = 4.0  # what a step costs, with the motion around it, in values of a rational model
+        spend(step * SUBSTEPS * self.recording.samples)
         motion = self.motions(theta, (effect.place,))[effect.place]
         return forced_motion(
             system.mechanism,

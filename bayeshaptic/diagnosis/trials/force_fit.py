@@ -20,14 +20,12 @@ from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
-_ROUNDS = 12
 _NO_GAIN, _SHARE = 0.5, 1e-3  # of the log likelihood, and of what the force gains in all
 _ON, _BACK = 2.0, 0.3  # factors on a step that goes well, and on one that does not
 _NUDGE = 0.1  # relative, of strength and shape for the slopes
 _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
 _NEAREST, _NEAR = 0.1, 0.5  # least share of these distances, and what counts as a small one
 _MOST = 0.8  # log change a round
-_SHAPE_SD = 1.0  # log; how far a shape may be from the grid's
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,8 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     form = _Form.of(found)
     first, best = form.logs(found), found
     nudges, near, failed = _nudges(bench), 1.0, False
-    for _ in range(_ROUNDS):
+    rounds = 12
+    for _ in range(rounds):
         logs = form.logs(best)
         step = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near)
         factor, point = _advanced(bench, form, best, step)
@@ -201,6 +200,8 @@ def _solved(
     own = Likelihood(bench.model, replace(windows, design=windows.design[:, :, :nodes]))
     weight = np.sqrt(2 / noise)[:, None]
 
+    shape_sd = 1.0  # log; how far a shape may be from the grid's
+
     def residuals(phi: Floats) -> Floats:
         steps = phi[:, size:]
         if linear:
@@ -208,7 +209,7 @@ def _solved(
         left = own.deviations(here.natural(phi[:, :size]))
         left = (left - np.einsum("wrj,bj->bwr", columns, steps)) * weight
         flat = left.reshape(len(phi), -1)
-        far = (moved + phi[:, size:])[:, 1:] / _SHAPE_SD
+        far = (moved + phi[:, size:])[:, 1:] / shape_sd
         return np.concatenate([flat.real, flat.imag, far], axis=1)
 
     start = np.concatenate([here.coordinate(theta[None])[0], np.zeros(inputs)])[None]

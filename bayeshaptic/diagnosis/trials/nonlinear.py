@@ -29,11 +29,7 @@ from bayeshaptic.types import Floats
 
 _Called = list[NonlinearEffect]  # variants of one effect
 
-_LAW_SD = 0.03  # relative; how well a law and its shape are known at best
-_HOPELESS = 0.3  # share of the best gain so far below which a scan is not followed up
 _NEAR = np.array([0.8, 1.0])
-_TOO_STRONG = 10.0  # drop of the log likelihood at which a scan stops
-_FAINT = 10.0  # gain below which nothing is tried
 
 
 def nonlinear_trials(
@@ -102,11 +98,13 @@ def _fitted(
 ) -> list[Point]:
     """The points fitted, the most promising first; the hopeless as they are, the faint left out."""
     found = list(before)
+    hopeless = 0.3  # share of the best gain so far below which a scan is not followed up
+    faint = 10.0  # gain below which nothing is tried
     for point in sorted(points, key=lambda point: -point.gain_fit):
-        if point.gain_fit < _FAINT:
+        if point.gain_fit < faint:
             continue
         best = max((other.gain_fit for other in found), default=0.0)
-        worth = point.gain_fit > _HOPELESS * best
+        worth = point.gain_fit > hopeless * best
         follow = worth and meter.affords(f"{point.effect.title}, its fit")
         found.append(fit_force(bench, point) if follow else point)
     return found
@@ -140,10 +138,11 @@ def _scan(
 ) -> list[Point]:
     """From faint to strong, until it is clearly too strong."""
     points: list[Point] = []
+    too_strong = 10.0  # drop of the log likelihood at which a scan stops
     for strength in strengths:
         start = points[-1].theta if points else theta
         points.append(bench.point(effect, float(strength), start))
-        if len(points) > 1 and points[-1].gain_fit < points[-2].gain_fit - _TOO_STRONG:
+        if len(points) > 1 and points[-1].gain_fit < points[-2].gain_fit - too_strong:
             break
     return points
 
@@ -172,7 +171,8 @@ def _spread(bench: ForceBench, point: Point) -> tuple[float, float]:
     # Half of the windows were used: the whole recording has twice the information.
     relative = step / np.sqrt(2 * 2 * max(drop, 1e-3))
     # Neither the law nor its shape is known better than this.
-    relative = float(np.clip(np.hypot(relative, _LAW_SD), 0.0, 0.5))
+    law_sd = 0.03  # relative; how well a law and its shape are known at best
+    relative = float(np.clip(np.hypot(relative, law_sd), 0.0, 0.5))
     limits = critical_stiffness(bench.model, np.stack([low.theta, high.theta])).samples
     slope = abs(float(np.log(max(limits[1], 1e-9) / max(limits[0], 1e-9)))) / (2 * step)
     return relative * abs(point.strength), min(slope * relative, 1.0)

@@ -18,17 +18,15 @@ from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.types import Bools, Complexes, Floats
 
-_FAST = 1.0  # |q| T
-
-
 Filters = tuple[Filter, ...]
 
 
 def fast_filters(filters: Filters, batch: int, period_s: float) -> Bools:
     """Where a filter is faster than the series over aliases bears, shape (B,)."""
     found = np.zeros(batch, bool)
+    fast = 1.0  # |q| T
     for factor in filters:
-        found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > _FAST
+        found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > fast
     return found
 
 

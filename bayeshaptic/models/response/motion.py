@@ -10,8 +10,6 @@ from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.types import Complexes, Floats
 
-_SLOW = 1e-5  # rad/s: what a pole at zero may be moved by, 6e-8 of the motion after a minute
-
 
 def linear_motion(
     system: LinearSystem, force: Floats, period_s: float, mass: int = 0, substeps: int = 1
@@ -45,7 +43,8 @@ def linear_motions(
     """
     from bayeshaptic.models.response.motion_kernel import modal_motion
 
-    own = moved_apart(system.poles()[0], _SLOW)
+    slow = 1e-5  # rad/s: what a pole at zero may be moved by, 6e-8 of the motion after a minute
+    own = moved_apart(system.poles()[0], slow)
     poles = own[0]
     h = period_s / substeps
     delay = float(system.delay_s[0])

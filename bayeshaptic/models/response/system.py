@@ -16,8 +16,6 @@ from bayeshaptic.models.response.remainder import Remainder, remainder_of, sampl
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Complexes, Floats
 
-_CHUNK = 64  # vectors at a time: the arrays of one chunk stay in the cache
-
 
 @dataclass(frozen=True)
 class LinearSystem:
@@ -105,8 +103,9 @@ class LinearSystem:
         response = sampled_response(self.rational_form(frequency_hz, period_s))
         if self.dynamic_links:
             remainder = self.remainder
-            for start in range(0, self.batch, _CHUNK):
-                rows = slice(start, start + _CHUNK)
+            chunk = 64  # vectors at a time: the arrays of one chunk stay in the cache
+            for start in range(0, self.batch, chunk):
+                rows = slice(start, start + chunk)
                 response[rows] += sampled_remainder(
                     remainder.rows(rows), self.delay_s[rows], frequency_hz, period_s
                 )

@@ -25,8 +25,6 @@ from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.types import Floats
 
 DRAWS = 160
-_STEP = 1e-4  # relative, of finite differences
-_SMALL = 1e-3
 _TURN = 1e-5  # relative, of the angle
 
 
@@ -136,7 +134,8 @@ def _slopes(
     before, after = theta * (1 - _TURN), np.minimum(theta * (1 + _TURN), np.pi)
     h_theta = _difference(model, vectors, vectors, before, after, period_s) / (after - before)
     slopes = np.empty(vectors.shape)
-    steps = _STEP * _sizes(model, vectors)
+    step = 1e-4  # relative, of finite differences
+    steps = step * _sizes(model, vectors)
     for column in range(vectors.shape[1]):
         low, high = vectors.copy(), vectors.copy()
         low[:, column] -= steps[:, column]
@@ -152,9 +151,10 @@ def _sizes(model: Model, vectors: Floats) -> Floats:
     """Magnitudes of the parameters; of one near zero, a part of the largest of its kind."""
     kinds = np.array([parameter.dimension for parameter in model.parameters])
     sizes = np.abs(vectors)
+    small = 1e-3
     for kind in np.unique(kinds):
         columns = np.flatnonzero(kinds == kind)
-        least = _SMALL * sizes[:, columns].max(axis=1, keepdims=True)
+        least = small * sizes[:, columns].max(axis=1, keepdims=True)
         sizes[:, columns] = np.maximum(sizes[:, columns], least)
     return np.maximum(sizes, np.finfo(float).tiny ** 0.5)
 

@@ -16,8 +16,6 @@ from bayeshaptic.stability.walls.source import loops_of
 
 _STIFFNESSES = ("kc", "ks")  # cable pretension; the link that the hand holds
 _DAMPERS = ("b1", "b")  # where damping can be added
-_MOST_ADDED = 4.0  # times what there is
-_POINTS = 25
 
 
 @dataclass(frozen=True)
@@ -62,6 +60,8 @@ def usual_sweeps(source: Any, draws: int = DRAWS) -> tuple[Sweep, ...]:
     damper = next((name for name in _DAMPERS if name in model.names), None)
     total = float(np.median(ground_damping(model.system(loops.draws))))
     if damper is not None and total > 0:
-        added = np.linspace(0.0, _MOST_ADDED * total, _POINTS)
+        most_added = 4.0  # times what there is
+        points = 25
+        added = np.linspace(0.0, most_added * total, points)
         found.append(sweep(source, damper, add=added, draws=draws))
     return tuple(found)

@@ -17,9 +17,6 @@ from bayeshaptic.types import Floats
 
 DRAWS = 3000
 TIED = 0.7  # rank correlation from which parameters are told apart no more
-_DEGREE = 6  # of the polynomial in one parameter's rank
-_JOINT_DEGREE = 3  # of the polynomial in a group's scores; 2 in large groups
-_LARGE = 4
 _WIDENED = 0.95  # a stated variance that is less wide than this makes it is the parameters' own
 
 
@@ -145,7 +142,8 @@ def explained(columns: Floats, values: Floats, effective: float) -> float:
 
     if columns.shape[1] == 1:
         rank = 2 * ndtr(columns[:, 0]) - 1
-        basis = legendre.legvander(rank, _DEGREE)
+        degree = 6  # of the polynomial in one parameter's rank
+        basis = legendre.legvander(rank, degree)
     else:
         basis = _joint_basis(columns)
     left = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
@@ -174,7 +172,9 @@ def _joint_basis(columns: Floats) -> Floats:
     _, sizes, axes = np.linalg.svd(centred, full_matrices=False)
     scores = centred @ axes.T / np.maximum(sizes, 1e-12) * np.sqrt(len(columns))
     count = columns.shape[1]
-    degree = _JOINT_DEGREE if count <= _LARGE else 2
+    joint_degree = 3  # of the polynomial in a group's scores; 2 in large groups
+    large = 4
+    degree = joint_degree if count <= large else 2
     terms = [np.ones(len(columns))]
     for power in range(1, degree + 1):
         for chosen in combinations_with_replacement(range(count), power):

@@ -12,7 +12,6 @@ from bayeshaptic.stability.relay.spectra import NEAR, PieceSpectra, oscillation
 from bayeshaptic.types import Floats
 
 BLOCKS = 10  # of the jackknife
-_LINES = 4  # reach of the local fit on either side, at least
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,8 @@ def estimate(spectra: PieceSpectra, order: int) -> Estimate:
     The dynamic stiffness D = 1/G is smooth where G has a resonance.
     """
     centre, width = oscillation(spectra)
-    half = max(3 * width, _LINES * spectra.bin_hz)
+    lines = 4  # reach of the local fit on either side, at least
+    half = max(3 * width, lines * spectra.bin_hz)
     use = np.abs(spectra.frequency_hz - centre) < half
     x = (spectra.frequency_hz[use] - centre) / half
     basis = (spectra.position[:, use, None] * x[:, None] ** np.arange(order + 1)).reshape(

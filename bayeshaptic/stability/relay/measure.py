@@ -46,9 +46,7 @@ LEAST_STEADY_S = 15.0  # what Diaz and Gil recorded
 # as near), and its sign and the position's are those of one oscillation, up to a delay in samples.
 _NEAR_LEVEL = 0.4
 _AT_LEVEL = 0.8
-_LATEST = 64
 _TOGETHER = 0.3  # 0.02 of a binary sequence in open loop
-_CERTAIN_DB = 0.7  # a critical stiffness that is less certain than this is none
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,9 +137,10 @@ def _refuse_no_relay(force: Floats, position: Floats, name: str) -> None:
             "±h of a relay; use 'bayeshaptic report'"
         )
     signs = np.sign(force), np.sign(position - np.median(position))
+    latest = 64
     together = max(
         abs(float(np.mean(signs[0][: len(force) - lag] * signs[1][lag:])))
-        for lag in range(0, min(_LATEST, len(force) // 2))
+        for lag in range(0, min(latest, len(force) // 2))
     )
     if together < _TOGETHER:
         raise InputError(
@@ -196,7 +195,8 @@ def measure_relay(recording: Recording | str | Path) -> RelayMeasurement:
     curved = 0.5 * abs(np.log(quadratic.critical / linear.critical))
     log_sd = float(np.hypot(sd["critical"], curved))
     reach = abs(quadratic.crossing_hz - quadratic.frequency_hz) < 0.2 * quadratic.frequency_hz
-    known = bool(reach and _relative_db(log_sd) < _CERTAIN_DB)
+    certain_db = 0.7  # a critical stiffness that is less certain than this is none
+    known = bool(reach and _relative_db(log_sd) < certain_db)
     measured = RelayMeasurement(
         quadratic.frequency_hz,
         float(np.hypot(sd["frequency_hz"], spectra.bin_hz / np.sqrt(12))),

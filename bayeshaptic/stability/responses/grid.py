@@ -8,11 +8,8 @@ from bayeshaptic.stability.responses.response import Response
 from bayeshaptic.types import Floats
 
 LOWEST = 1e-9  # radians a sample: 0.16 microhertz at T = 1 ms
-_TOP = np.pi * (1 - 1e-7)  # a crossing nearer to the Nyquist frequency has its K to 1e-13
 # No point on the pole itself: an undamped one is infinite there.
 _TANGENTS = np.tan(np.deg2rad(np.array([-88.0, -80, -60, -30, -8, 8, 30, 60, 80, 88])))
-_SHARPEST = 1e-8  # relative half width around an undamped pole
-_PER_TURN = 16  # points for each turn of the delay's phase
 
 
 def search_grid(response: Response, rows: slice) -> Floats:
@@ -25,7 +22,9 @@ def search_grid(response: Response, rows: slice) -> Floats:
     delay = response.delay[rows]
     batch = len(delay)
     turns = (np.max(delay) + 1.5) / 2
-    linear = np.linspace(0, _TOP, int(np.ceil(_PER_TURN * turns)) + 1)[1:]
+    top = np.pi * (1 - 1e-7)  # a crossing nearer to the Nyquist frequency has its K to 1e-13
+    per_turn = 16  # points for each turn of the delay's phase
+    linear = np.linspace(0, top, int(np.ceil(per_turn * turns)) + 1)[1:]
     low = np.full((batch, 1), LOWEST)
     parts = [np.broadcast_to(linear, (batch, len(linear)))]
     if features.shape[1]:
@@ -35,11 +34,12 @@ def search_grid(response: Response, rows: slice) -> Floats:
         # Conjugates see the same angles: the half with the largest imaginary parts is enough.
         order = np.argsort(-features.imag, axis=1)[:, : (features.shape[1] + 1) // 2]
         upper = np.take_along_axis(features, order, axis=1)
-        width = np.maximum(np.abs(upper.real), _SHARPEST * np.abs(upper.imag))
+        sharpest = 1e-8  # relative half width around an undamped pole
+        width = np.maximum(np.abs(upper.real), sharpest * np.abs(upper.imag))
         # A pole beyond the Nyquist frequency shows at its alias.
         angle = np.abs(upper.imag - 2 * np.pi * np.round(upper.imag / (2 * np.pi)))
         around = angle[:, :, None] + width[:, :, None] * _TANGENTS
-        parts.append(np.clip(around.reshape(batch, -1), low, _TOP))
+        parts.append(np.clip(around.reshape(batch, -1), low, top))
     steps = np.linspace(0.0, 1.0, response.log_points)
-    parts.append(low * np.exp(steps * np.log(_TOP / low)))
+    parts.append(low * np.exp(steps * np.log(top / low)))
     return np.sort(np.concatenate(parts, axis=1), axis=1)

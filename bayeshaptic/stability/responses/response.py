@@ -28,8 +28,6 @@ from bayeshaptic.types import Complexes, Floats
 
 Rows = NDArray[np.int_]
 
-_SLOW = 1e-10  # radians a sample: what a pole at zero may be moved by
-
 
 class Response(Protocol):
     """What the search for crossings needs to know of a batch of loops.
@@ -166,7 +164,8 @@ def _simple_poles(
     integrators = np.cumprod(denominator == 0, axis=0).sum(axis=0)
     at_zero = np.arange(poles.shape[1]) < integrators[:, None]
     poles[at_zero] = 0.0
-    poles = moved_apart(poles, _SLOW / period_s)
+    slow = 1e-10  # radians a sample: what a pole at zero may be moved by
+    poles = moved_apart(poles, slow / period_s)
     # Nothing may sit on the line where the response is read.
     poles.real = np.where((poles.real == 0) & ~at_zero, -1e-14 * np.abs(poles), poles.real)
     return poles, residues(numerator, denominator[-1], poles), integrators

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from bayeshaptic.stability.walls.curve import Events, KbCurve, along_damping
 from bayeshaptic.types import Floats, Ints
 
-_MANY = 1000  # poles outside, of a loop that is never stable
-
 
 def unstable_at_start(curve: KbCurve, start: Floats, levels: Floats) -> Ints:
     """Poles outside the unit circle at the stiffness `start` (n,) and dampings (J,); (n, J).
@@ -22,7 +20,8 @@ def unstable_at_start(curve: KbCurve, start: Floats, levels: Floats) -> Ints:
         between = (events.place > min(level, 0)) & (events.place < max(level, 0))
         change = np.bincount(events.row[between], events.poles[between], len(start))
         poles[:, number] = np.sign(level) * np.rint(change)
-    poles[np.isnan(start)] = _MANY
+    many = 1000  # poles outside, of a loop that is never stable
+    poles[np.isnan(start)] = many
     return poles
 
 

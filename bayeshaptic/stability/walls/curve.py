@@ -30,10 +30,6 @@ from bayeshaptic.stability.responses.response import Response
 from bayeshaptic.stability.walls.damping import Damping, derivative, derivative_at_nyquist
 from bayeshaptic.types import Complexes, Floats, Ints
 
-_CHUNK = 64  # rows at a time: the arrays of one chunk stay in the cache
-_TOLERANCE = 1e-8  # of a bracket's angle
-_TOP = np.pi * (1 - 1e-4)  # beyond it both imaginary parts are too small to divide
-
 
 @dataclass(frozen=True)
 class InverseCurve:
@@ -145,10 +141,12 @@ def inverse_curve(system: LinearSystem | EvaluableSystem, period_s: float) -> In
     look = _Features(response.delay, features, response.log_points)
     every = np.arange(len(response.delay))
     theta = search_grid(look, slice(0, len(every)))  # type: ignore[arg-type]
-    theta = np.minimum(theta, _TOP)
+    top = np.pi * (1 - 1e-4)  # beyond it both imaginary parts are too small to divide
+    theta = np.minimum(theta, top)
     value = np.empty(theta.shape, complex)
-    for start in range(0, len(every), _CHUNK):
-        rows = every[start : start + _CHUNK]
+    chunk = 64  # rows at a time: the arrays of one chunk stay in the cache
+    for start in range(0, len(every), chunk):
+        rows = every[start : start + chunk]
         value[rows] = -1 / response.at(rows, theta[rows])
     with np.errstate(divide="ignore"):  # without damping G may be zero there: no limit
         nyquist = -1 / response.at_ends()[1]
@@ -235,11 +233,12 @@ def _roots(
     """The angle in each segment where a function changes its sign."""
     every = np.arange(len(row))
     low, high = theta[row, segment], theta[row, segment + 1]
+    tolerance = 1e-8  # of a bracket's angle
     found = elementwise.find_root(
         lambda place, index: off(index, place),
         (low, high),
         args=(every,),
-        tolerances={"xrtol": _TOLERANCE},
+        tolerances={"xrtol": tolerance},
     )
     return np.asarray(found.x)
 

@@ -14,8 +14,6 @@ from bayeshaptic.stability.walls.damping import Backward, Damping, LowPass
 from bayeshaptic.stability.walls.region import DRAWS, INSIDE, KbRegion, kb_region, with_damping
 from bayeshaptic.types import Floats
 
-_BEYOND = 0.95
-_CLOSER = 1.5
 CUTOFF = 0.1  # of the sampling rate: the usual low-pass of a velocity
 
 
@@ -70,11 +68,13 @@ class JointRegion:
         """
         largest = [np.sort(region.largest_damping())[:, None] for region in self.regions]
         totals = [len(part) for part in largest]
-        every = (*risks, _BEYOND)
+        beyond = 0.95
+        every = (*risks, beyond)
         ends = lowest(largest, totals)
         wanted = np.array([ends.quantile(risk)[0] for risk in every])
         known = INSIDE * wanted[np.isfinite(wanted)]
-        steps = np.linspace(0.0, 1.0, count) ** _CLOSER * (known.max() if len(known) else 1.0)
+        closer = 1.5
+        steps = np.linspace(0.0, 1.0, count) ** closer * (known.max() if len(known) else 1.0)
         return np.unique(np.concatenate([steps, known]))
 
 

@@ -29,7 +29,6 @@ from bayeshaptic.version import __version__
 
 RISKS = (0.05, 0.01, 0.001)
 _FORMAT = "bayeshaptic limits 1"
-_DIGITS = 6
 
 
 @dataclass(frozen=True, repr=False)
@@ -255,7 +254,8 @@ def limit_table(
 def _plain(value: float | None) -> float | None:
     if value is None or not math.isfinite(value):
         return None
-    return float(f"{value:.{_DIGITS}g}")
+    digits = 6
+    return float(f"{value:.{digits}g}")
 
 
 def _in_a_name(unit: str) -> str:

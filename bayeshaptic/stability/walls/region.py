@@ -32,7 +32,6 @@ DRAWS = 4000
 LEVELS = 33  # dampings in a table
 _START = 1e-3  # of K_CR: where a loop that is stable at rest is still stable
 INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
-_CELLS = 4_000_000  # of loops, dampings and stiffnesses at a time
 
 
 @dataclass(frozen=True, repr=False)
@@ -152,7 +151,8 @@ class KbRegion(Shown):
         unstable = unstable_at_start(self.curve, self.start, levels)
         events = along_stiffness(self.curve, levels)
         count = len(self.start)
-        step = max(_CELLS // (len(heights) * len(levels)), 1)
+        cells = 4_000_000  # of loops, dampings and stiffnesses at a time
+        step = max(cells // (len(heights) * len(levels)), 1)
         parts = []
         for first in range(0, count, step):
             rows = np.arange(first, min(first + step, count))

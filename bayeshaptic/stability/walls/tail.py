@@ -17,10 +17,6 @@ from bayeshaptic.stability.tail import ENOUGH_BELOW
 from bayeshaptic.stability.walls.region import KbRegion, region_of_draws
 from bayeshaptic.types import Floats
 
-_MOST = 24_000  # draws in all: 24 below 0.1 %
-_REACH = 3.0  # times the risk: how far up the predicted tail is looked at
-_MARGIN = 4.0  # and standard deviations of the prediction's error more
-_LOOKED_AT = 6000
 _LOW = 0.3  # of the draws that were looked at: those with the lowest limits are fitted
 
 
@@ -74,7 +70,8 @@ def lower_tail(
     samples = case.limit.samples
     if len(samples) != len(case.draws) or case.limit.effective_below(risk) < ENOUGH_BELOW:
         return None
-    index = np.linspace(0, len(samples) - 1, min(len(samples), _MOST)).astype(int)
+    most = 24_000  # draws in all: 24 below 0.1 %
+    index = np.linspace(0, len(samples) - 1, min(len(samples), most)).astype(int)
     possible = np.all(limits > 0, axis=0)  # near the ends the ends themselves tell
     columns = np.column_stack([limits[:, possible], some.largest_damping()])
     found = _candidates(draws, columns, case.draws[index], risk)
@@ -108,9 +105,12 @@ def _candidates(
         coefficients = np.linalg.lstsq(basis[low], column[low], rcond=None)[0]
         predicted[:, level] = every_basis @ coefficients
         error[level] = (column[low] - basis[low] @ coefficients).std()
-    edge = np.quantile(predicted, _REACH * risk, axis=0) + _MARGIN * error
+    reach = 3.0  # times the risk: how far up the predicted tail is looked at
+    margin = 4.0  # and standard deviations of the prediction's error more
+    edge = np.quantile(predicted, reach * risk, axis=0) + margin * error
     chosen = np.flatnonzero(np.any(predicted < edge, axis=1))
-    return (chosen, edge - _MARGIN * error) if len(chosen) <= _LOOKED_AT else None
+    looked_at = 6000
+    return (chosen, edge - margin * error) if len(chosen) <= looked_at else None
 
 
 def _quadratic(scores: Floats) -> Floats:
