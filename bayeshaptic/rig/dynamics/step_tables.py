@@ -75,7 +75,7 @@ class Memory(NamedTuple):
 
 
 def tables(plant: Plant, period_s: float, substeps: int, halvings: int) -> Tables:
-    """What `stepper_plain.run` and `stepper_kernel.run` need to know of a plant."""
+    """What `stepper_kernel.run` needs to know of a plant."""
     parts = stretches(plant.delay_s, period_s, substeps)
     found = [[_step(plant, part.step_s / 2**h) for h in range(halvings + 1)] for part in parts]
     matrix, constant, ramp, grip = (

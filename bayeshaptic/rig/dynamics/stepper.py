@@ -12,7 +12,6 @@ from bayeshaptic.rig.dynamics.laws import DryFriction, SmoothLaw
 from bayeshaptic.rig.dynamics.plant import Array, Plant
 from bayeshaptic.rig.dynamics.propagate import layout
 from bayeshaptic.rig.dynamics.step_tables import Memory, tables
-from bayeshaptic.rig.dynamics.stepper_plain import run as run_plain
 
 SUBSTEPS = 8
 HALVINGS = 6
@@ -52,8 +51,6 @@ class Stepper:
         Steps a period, at least; one where there is nothing but linear dynamics.
     halvings : int
         How often a step may be halved to find where friction reverses.
-    plain : bool
-        Step in plain Python, the reference.
     """
 
     def __init__(
@@ -62,12 +59,10 @@ class Stepper:
         period_s: float,
         substeps: int = SUBSTEPS,
         halvings: int = HALVINGS,
-        plain: bool = False,
     ) -> None:
         self.period_s = period_s
         self.substeps = substeps if plant.laws or plant.delayed else 1
         self.halvings = halvings if any(law.dry for law in plant.laws) else 0
-        self.plain = plain
         self.retune(plant)
         springs = len(plant.delayed)
         self.memory = Memory(
@@ -82,7 +77,7 @@ class Stepper:
         self.plant = plant
         self.tables = tables(plant, self.period_s, self.substeps, self.halvings)
         smooth = [law.force if isinstance(law, SmoothLaw) else _no_force for law in plant.laws]
-        self._forces = tuple(f if self.plain else callback(f) for f in smooth or [_no_force])
+        self._forces = tuple(map(callback, smooth or [_no_force]))
 
     def start(self, state: Array) -> None:
         """Begin with a mechanical state, shape (n,)."""
@@ -133,8 +128,7 @@ class Stepper:
         states = np.empty((len(acting) - 1, self.plant.states))
         self._make_room(len(states) * int(self.tables.steps.sum()))
         acting, hand = np.ascontiguousarray(acting), np.ascontiguousarray(hand)
-        run = run_plain if self.plain else _run_compiled
-        run(self.tables, self._forces, self.memory, acting, hand, states)
+        _run_compiled(self.tables, self._forces, self.memory, acting, hand, states)
         return states
 
     def _make_room(self, steps: int) -> None:

@@ -1,4 +1,4 @@
-"""Periods of a plant, compiled: the plain form in the same words is `stepper_plain`."""
+"""Periods of a plant, compiled: the plain form is `tests/plain_bench_stepper.py`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Periods of a plant in plain Python: the reference of `stepper_kernel`."""
+"""Periods of a plant of the bench in plain Python: the reference of `stepper_kernel`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,27 @@ import numpy as np
 from bayeshaptic.rig.dynamics.laws import sliding
 from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.dynamics.step_tables import Memory, Tables
+from bayeshaptic.rig.dynamics.stepper import Stepper
 
 _CORRECTIONS = 2
 _POSITION, _VELOCITY = 0, 2
 
-Forces = Sequence[Callable[..., float]]
+Forces = Sequence[Callable[..., float] | None]  # of dry friction none
 
 
-def run(
+def plainly(stepper: Stepper, acting: Array, hand: Array) -> Array:
+    """`Stepper.run`, step by step in Python."""
+    states = np.empty((len(acting) - 1, stepper.plant.states))
+    stepper._make_room(len(states) * int(stepper.tables.steps.sum()))
+    forces = [getattr(law, "force", None) for law in stepper.plant.laws]
+    _run(stepper.tables, forces, stepper.memory, acting, hand, states)
+    return states
+
+
+def _run(
     tables: Tables, forces: Forces, memory: Memory, acting: Array, hand: Array, states: Array
 ) -> None:
-    """Take periods and note the state at the beginning of each; see `Stepper.run`."""
+    """Take periods and note the state at the beginning of each."""
     z, n = memory.z, states.shape[1]
     for k in range(len(states)):
         states[k] = z[:n]
@@ -46,7 +56,9 @@ def _take(tables: Tables, forces: Forces, memory: Memory, part: int, level: int)
         q = _at(end, tables.place[j], _POSITION)
         moved = q - _at(z, tables.place[j], _POSITION)
         v = _at(end, tables.place[j], _VELOCITY)
-        return forces[j](q, v, z[first + j], moved, tables.constants[j])
+        law = forces[j]
+        assert law is not None
+        return law(q, v, z[first + j], moved, tables.constants[j])
 
     applied = z[first:].copy()
     for _ in range(_CORRECTIONS):
