@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from bayeshaptic.models import Model
 from bayeshaptic.types import Floats
 
-_LARGEST = 100.0  # logarithm: what follows something as large as that is far outside anyway
 _SUMS = ("mass", "damping")  # quantities whose sums the data know best
 _KNOWN = 0.8  # log standard deviation, of prior and data together, below which one is known
 
@@ -75,7 +74,8 @@ class Coordinates:
         return phi
 
     def _small(self, phi: Floats) -> Floats:
-        return self.floor * np.expm1(np.minimum(phi[..., self.near_zero], _LARGEST))
+        largest = 100.0  # logarithm: what follows something as large as that is far outside anyway
+        return self.floor * np.expm1(np.minimum(phi[..., self.near_zero], largest))
 
     def own(self, phi: Floats) -> Floats:
         """Of each parameter by itself: its logarithm, or its value over the scale."""

@@ -13,8 +13,6 @@ RHAT_LIMIT = 1.01
 # Draws that a statistic is computed from: R-hat is known to a few thousandths from so many, and
 # effective draws can be counted from ten times as many as are asked for.
 _FOR_RHAT = 8000
-_FOR_ESS = 10.0
-_FEWEST_STEPS = 16  # of a chain, for its autocorrelation
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,8 @@ def diagnose(chains: Floats, ess: float | None = None) -> Diagnostics:
     ensembles, steps, walkers, size = few.shape
     # A whole ensemble as a chain, in the order of time.
     as_ensembles = few.reshape(ensembles, steps * walkers, size)
-    counted = chains if ess is None else thinned(chains, _FOR_ESS * ess)
+    for_ess = 10.0
+    counted = chains if ess is None else thinned(chains, for_ess * ess)
     as_walkers = counted.transpose(0, 2, 1, 3).reshape(ensembles * walkers, -1, size)
     return Diagnostics(
         np.array([split_rhat(as_ensembles[..., p]) for p in range(size)]),
@@ -73,6 +72,7 @@ def diagnose(chains: Floats, ess: float | None = None) -> Diagnostics:
 def thinned(chains: Floats, draws: float) -> Floats:
     """Every so many steps of chains (ensembles, S, walkers, P), at least `draws` draws if there."""
     ensembles, steps, walkers = chains.shape[:3]
-    wanted = max(draws / (ensembles * walkers), _FEWEST_STEPS)
+    fewest_steps = 16  # of a chain, for its autocorrelation
+    wanted = max(draws / (ensembles * walkers), fewest_steps)
     every = max(int(steps / wanted), 1)
     return chains[:, every - 1 :: every]

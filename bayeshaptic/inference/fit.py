@@ -20,7 +20,6 @@ from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Floats
 
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
-_CHANCE_SDS = 4.0
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
 REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
 
@@ -74,7 +73,8 @@ class Fit(Shown):
 
         It scatters by one over the root of the number of points.
         """
-        return 1.0 + _CHANCE_SDS / math.sqrt(max(len(self.residual), 1))
+        chance_sds = 4.0
+        return 1.0 + chance_sds / math.sqrt(max(len(self.residual), 1))
 
     @property
     def misfits(self) -> bool:

@@ -15,11 +15,9 @@ from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
-_LANES = 32
 # What a call costs, and a value of a model with dynamic links, in values of a rational model:
 # 0.4 ms and 0.15 to 0.3 us beside 12 to 25 ns.
 _CALL, _LINKED = 2e4, 10.0
-_CHUNK = 128  # vectors at a time, of what is done in plain NumPy
 
 
 @dataclass(frozen=True)
@@ -84,14 +82,15 @@ class Likelihood:
         count, nodes = self.windows.frequency_hz.shape
         frequency_hz = np.ascontiguousarray(self.windows.frequency_hz.ravel())
         out = np.empty((len(theta), *self.windows.target.shape), complex)
-        for start in range(0, len(theta), _CHUNK):
-            part = theta[start : start + _CHUNK]
+        chunk = 128  # vectors at a time, of what is done in plain NumPy
+        for start in range(0, len(theta), chunk):
+            part = theta[start : start + chunk]
             g = self.model.response(part, frequency_hz).reshape(len(part), count, nodes)
             if nodes == 1:
                 fitted = self.windows.design[:, :, 0] * g
             else:  # one small matrix product a window, the batch last
                 fitted = (self.windows.design @ g.transpose(1, 2, 0)).transpose(2, 0, 1)
-            out[start : start + _CHUNK] = self.windows.target - fitted
+            out[start : start + chunk] = self.windows.target - fitted
         return out
 
     def _rational_form(self, theta: Floats) -> RationalArrays | None:
@@ -131,7 +130,8 @@ class Likelihood:
 
     def _windows_last(self, values: NDArray[Any]) -> NDArray[Any]:
         """With the windows last, the first one repeated until vector instructions leave no rest."""
-        repeated = np.repeat(values[:1], -len(values) % _LANES, axis=0)
+        lanes = 32
+        repeated = np.repeat(values[:1], -len(values) % lanes, axis=0)
         return np.ascontiguousarray(np.moveaxis(np.concatenate([values, repeated]), 0, -1))
 
     @property

@@ -25,9 +25,6 @@ from bayeshaptic.models.structures import FREE, GRASPED, HAND
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 
-_OCTAVE = 2**0.5  # half an octave to either side of a crossing
-_FEWEST = 6  # windows in that band
-
 
 @dataclass(frozen=True)
 class Experiment:
@@ -164,9 +161,11 @@ def _experiments(
         ("louder", "one more with twice the force", 4 * fisher),
     ]
     if crossing_hz:
-        low, high = crossing_hz / _OCTAVE, crossing_hz * _OCTAVE
+        octave = 2**0.5  # half an octave to either side of a crossing
+        low, high = crossing_hz / octave, crossing_hz * octave
         inside = (known.frequency_hz >= low) & (known.frequency_hz <= high)
-        if inside.sum() >= _FEWEST and not inside.all():
+        fewest = 6  # windows in that band
+        if inside.sum() >= fewest and not inside.all():
             louder = known.lines.sum() / known.lines[inside].sum()
             title = f"one more with all of its power from {low:.3g} to {high:.3g} Hz"
             found.append(("band", title, known.fisher(np.where(inside, louder, 0.0))))

@@ -20,8 +20,6 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Floats
 
-_DOMINATED = 0.5  # posterior sd over prior sd from which the prior decides
-
 
 @dataclass(frozen=True, repr=False)
 class Posterior(Shown):
@@ -146,11 +144,12 @@ class Posterior(Shown):
 def prior_dominated(model: Model, draws: Floats) -> list[bool]:
     """Whether `draws`, shape (n, P), of each parameter are hardly narrower than its prior."""
     out = []
+    dominated = 0.5  # posterior sd over prior sd from which the prior decides
     for name, column in zip(model.names, draws.T, strict=True):
         prior = model.prior(name)
         own = np.quantile(column, [0.16, 0.84])
         believed = prior.quantile([0.16, 0.84])
         if prior.coordinate == "log":
             own, believed = np.log(own), np.log(believed)
-        out.append(bool(np.ptp(own) > _DOMINATED * np.ptp(believed)))
+        out.append(bool(np.ptp(own) > dominated * np.ptp(believed)))
     return out

@@ -32,8 +32,6 @@ from bayeshaptic.version import __version__
 
 DEFAULT_ESS = 2000
 MOST_EVALUATIONS = 1_500_000
-_PROBE = 0.01  # sampling coordinates, between points whose densities tell computations apart
-_POLISH, _SETTLED = 200, 1e-3  # steps of the fit, at most, and the gain that is none
 
 
 @dataclass
@@ -166,7 +164,8 @@ def _converged(fit: Fit) -> Fit:
     low, high = (here.coordinate(end) for end in reach(fit.model, REACH_SDS))
     start = here.coordinate(fit.theta[None])
     residuals = weighted_residuals(fit.likelihood, here)
-    phi, _ = minimise(residuals, start, low, high, _POLISH, _SETTLED)
+    polish, settled = 200, 1e-3  # steps of the fit, at most, and the gain that is none
+    phi, _ = minimise(residuals, start, low, high, polish, settled)
     return fit.at(here.natural(phi)[0])
 
 
@@ -176,7 +175,8 @@ def _checkpoint(
     """Where a sampler keeps its state, by what it is asked for and the density around its start."""
     if folder is None or None in about:
         return Checkpoint(None, "")
-    places = start + np.concatenate([np.zeros((1, len(start))), _PROBE * np.eye(len(start))])
+    probe = 0.01  # sampling coordinates, between points whose densities tell computations apart
+    places = start + np.concatenate([np.zeros((1, len(start))), probe * np.eye(len(start))])
     theta = density.coordinates.natural(places)
     about = (__version__, np.__version__, density.likelihood.model.names, *about)
     return Checkpoint(Path(folder), key_of(*about, theta, density(places)))

@@ -26,7 +26,6 @@ from bayeshaptic.report.study.write import write_study_report
 from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
 from bayeshaptic.types import Progress
 
-_RECORDINGS = 0.8  # share of the progress that the recordings take
 _WRITING = 0.95
 
 
@@ -234,7 +233,8 @@ def _part(progress: Progress | None, index: int, count: int, name: str) -> Progr
     """The progress of one recording as that of the whole study."""
     if progress is None:
         return None
-    whole = _scaled(progress, _WRITING * _RECORDINGS)
+    recordings = 0.8  # share of the progress that the recordings take
+    whole = _scaled(progress, _WRITING * recordings)
     return lambda share, word: whole((index + share) / count, f"{name}: {word}")
 
 

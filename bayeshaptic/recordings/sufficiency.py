@@ -29,9 +29,6 @@ FEWEST_TONES = 5
 # Share of the recording that may pass without force, or without motion.
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
-_MOSTLY = 0.5  # of the standstill, at an end of the range
-_FAINT = 1e-4  # of the strongest line's power
-_WIDEST_TONE = 9  # lines that a Hann window spreads a tone over, and its wander
 
 _USUAL = (
     "record some 30 s of white noise or of a multisine (bayeshaptic simulate phantom -o noise.csv "
@@ -84,9 +81,11 @@ def _few_steps(recording: Recording) -> str | None:
 def _few_tones(recording: Recording) -> str | None:
     force = recording.force - recording.force.mean()
     power = np.abs(np.fft.rfft(force * np.hanning(len(force)))) ** 2
-    lines = np.flatnonzero(power > _FAINT * power.max())
+    faint = 1e-4  # of the strongest line's power
+    lines = np.flatnonzero(power > faint * power.max())
     tones = np.split(lines, np.flatnonzero(np.diff(lines) > 2) + 1)
-    if len(tones) >= FEWEST_TONES or max(np.ptp(tone) for tone in tones) >= _WIDEST_TONE:
+    widest_tone = 9  # lines that a Hann window spreads a tone over, and its wander
+    if len(tones) >= FEWEST_TONES or max(np.ptp(tone) for tone in tones) >= widest_tone:
         return None
     hertz = ", ".join(f"{tone.mean() / recording.duration_s:.3g}" for tone in tones)
     what = "a single tone" if len(tones) == 1 else f"{len(tones)} tones"
@@ -121,7 +120,8 @@ def _standstill(recording: Recording) -> str | None:
     cut_off = (ends.low_clipped & (position[:, 0] <= ends.low)) | (
         ends.high_clipped & (position[:, 0] >= ends.high)
     )
-    if np.mean(cut_off[resting]) > _MOSTLY:
+    mostly = 0.5  # of the standstill, at an end of the range
+    if np.mean(cut_off[resting]) > mostly:
         return (
             f"the position stays at {ends.low:.4g} or {ends.high:.4g} {recording.position_unit} "
             f"for {100 * still:.0f} % of the recording: it was cut off there by its sensor, or the "

@@ -16,7 +16,6 @@ from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 
-_ONE_MASS = 0.3  # of the force that may be left where the device moves as one mass
 _FRICTION = "coulomb"
 
 
@@ -49,7 +48,8 @@ def explain_force(recording: Recording | None) -> ForceExplained | None:
         further = inverse_dynamics(recording)
     except InputError:
         return None
-    if further.relative_error > _ONE_MASS:
+    one_mass = 0.3  # of the force that may be left where the device moves as one mass
+    if further.relative_error > one_mass:
         return None
     terms = tuple(step.term for step in further.steps[1:2])
     return ForceExplained(inverse_dynamics(recording, terms=terms) if terms else further, further)

@@ -27,14 +27,9 @@ from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
-_BAND = 0.05  # of the sampling rate: the usual cut-off
-_FEWEST = 100  # samples left after decimation
-_BLOCK_S = 1.0  # residuals further apart are taken to be independent
-_BLOCKS_A_TERM = 5  # of a recording that has fewer seconds, shorter blocks
 _ITS_OWN = (
     1e-3  # of a column's power that no others make, or it is no new term: a tone's spring is a mass
 )
-_WORTH = 0.02  # a term must lower the held-out error by so much, in both halves
 
 
 @dataclass(frozen=True)
@@ -147,10 +142,12 @@ def inverse_dynamics(
     InputError
         Where the recording is too short for the cut-off, or a term has no such name.
     """
-    cutoff_hz = _BAND / recording.period_s if cutoff_hz is None else cutoff_hz
+    band = 0.05  # of the sampling rate: the usual cut-off
+    cutoff_hz = band / recording.period_s if cutoff_hz is None else cutoff_hz
     every = max(int(0.5 / (cutoff_hz * recording.period_s)), 1)
     edge = int(np.ceil(2 / (cutoff_hz * recording.period_s)))  # where the filters are not settled
-    if (recording.samples - 2 * edge) // every < _FEWEST:
+    fewest = 100  # samples left after decimation
+    if (recording.samples - 2 * edge) // every < fewest:
         raise InputError(
             f"{recording.name}: {recording.samples} samples are too few for inverse dynamics below "
             f"{cutoff_hz:g} Hz; raise cutoff_hz"
@@ -178,7 +175,8 @@ def inverse_dynamics(
     else:
         tried = _grow(columns, chosen, force, steps)
     design = np.stack([columns[name] for name in chosen], axis=1)
-    value, sd = _solve(design, force, max(int(_BLOCK_S / (every * recording.period_s)), 1))
+    block_s = 1.0  # residuals further apart are taken to be independent
+    value, sd = _solve(design, force, max(int(block_s / (every * recording.period_s)), 1))
     left = force - design @ value
     return InverseDynamics(
         tuple(known[name] for name in chosen),
@@ -261,6 +259,7 @@ def _grow(
     columns: dict[str, Floats], chosen: list[str], force: Floats, steps: list[Addition]
 ) -> list[Addition]:
     """Add terms to `chosen` while both halves gain; what is left over comes back."""
+    worth = 0.02  # a term must lower the held-out error by so much, in both halves
     while True:
         _, halves = _held_out(columns, chosen, force)
         found = {
@@ -269,7 +268,7 @@ def _grow(
             if name not in chosen and _says_more(columns, chosen, name)
         }
         order = sorted(found, key=lambda name: found[name][0])
-        if not order or np.any(found[order[0]][1] > (1 - _WORTH) * halves):
+        if not order or np.any(found[order[0]][1] > (1 - worth) * halves):
             return [Addition(name, found[name][0]) for name in order]
         chosen.append(order[0])
         steps.append(Addition(order[0], found[order[0]][0]))
@@ -301,7 +300,8 @@ def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:
     Sandwich of the scores summed over blocks (K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986).
     """
     value = np.linalg.lstsq(design, force, rcond=None)[0]
-    block = max(min(block, len(force) // (_BLOCKS_A_TERM * design.shape[1])), 1)
+    blocks_a_term = 5  # of a recording that has fewer seconds, shorter blocks
+    block = max(min(block, len(force) // (blocks_a_term * design.shape[1])), 1)
     scores = design * (force - design @ value)[:, None]
     sums = np.add.reduceat(scores, np.arange(0, len(force), block))
     bread = np.linalg.inv(design.T @ design)

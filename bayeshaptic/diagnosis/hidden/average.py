@@ -18,8 +18,6 @@ from bayeshaptic.diagnosis.hidden.regression import Around
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, systematic
 from bayeshaptic.types import Floats, Ints
 
-_MOST_GAIN = 3.0  # log evidence that two effects may gain by cancelling each other
-
 
 @dataclass(frozen=True)
 class Looked:
@@ -72,7 +70,8 @@ def looked_at(weighed: Sequence[Weighed], known: Around) -> Looked:
     every = np.concatenate([one.changes for one in weighed])
     count, draws = len(weighed), len(weighed[0].changes)
     shared = known.overlap(every, every).reshape(count, draws, count, draws)
-    meeting = np.minimum(-shared.transpose(0, 2, 1, 3), _MOST_GAIN)
+    most_gain = 3.0  # log evidence that two effects may gain by cancelling each other
+    meeting = np.minimum(-shared.transpose(0, 2, 1, 3), most_gain)
     return Looked(tuple(weighed), meeting, _gain(meeting))
 
 

@@ -18,9 +18,6 @@ from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.types import Bools, Floats
 
-_LARGEST = 1.0  # log change from the beginning to the end
-_STEPS = 60
-
 
 @dataclass(frozen=True)
 class Drift:
@@ -60,8 +57,10 @@ def weigh_drift(drift: Drift, known: Around, rng: np.random.Generator) -> Weighe
     change = slope[:, member] @ stretch[member]
     # Half of the ramp at the ends, t^2 on average a third.
     sd = 2 * np.sqrt(3) / np.sqrt(max(float(change @ change), 1e-300))
-    seen = min(SEEN * sd, _LARGEST / MOST)
-    strength = seen * np.exp(np.linspace(np.log(LEAST), np.log(MOST), 2 * _STEPS + 1)[1::2])
+    largest = 1.0  # log change from the beginning to the end
+    seen = min(SEEN * sd, largest / MOST)
+    steps = 60
+    strength = seen * np.exp(np.linspace(np.log(LEAST), np.log(MOST), 2 * steps + 1)[1::2])
     likelihood = np.exp(-0.5 * (strength / sd) ** 2)
     kept = strength[systematic(likelihood, KEPT, rng)]
     factor = _worst(known, member, kept)

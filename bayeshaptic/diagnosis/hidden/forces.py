@@ -40,8 +40,6 @@ _ENDS = {
     POSITION: (MASSES[MOTOR], None, False),
     STRETCH: (MASSES[MOTOR], MASSES[BODY], False),
 }
-_NODES = 200
-_LEAST = 1e-3  # of a slope in units of force: an even force has none
 _STRENGTH = "unseen_force"
 
 
@@ -97,6 +95,7 @@ def force_suspects(
     seen = {test.name: test.force for test in tests if test.force is not None}
     suspects: list[Suspect] = []
     looked: set[str] = set()
+    least = 1e-3  # of a slope in units of force: an even force has none
     for kind in effects("nonlinear"):
         known = [s for s in kind.tests if s.over in (*_ENDS, COMMAND)]
         places = [s for s in known if s.name in seen and s.name not in looked]
@@ -104,7 +103,7 @@ def force_suspects(
         if kind.name in found:
             continue
         slopes = [slope_of(shape.force) for shape in places]
-        pulls = [(s, a) for s, a in zip(places, slopes, strict=True) if abs(a) > _LEAST]
+        pulls = [(s, a) for s, a in zip(places, slopes, strict=True) if abs(a) > least]
         for shape, slope in pulls:
             force = seen[shape.name]
             assert force is not None
@@ -148,7 +147,8 @@ def _power_of(shape: Shape) -> float:
 @cache
 def slope_of(force: Callable[[Floats], Floats]) -> float:
     """E[f(z) z] of a standard normal z."""
-    z, weight = hermegauss(_NODES)
+    nodes = 200
+    z, weight = hermegauss(nodes)
     return float(np.sum(weight * force(z) * z) / weight.sum())
 
 

@@ -24,11 +24,6 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.stability.crossings import find_crossings
 from bayeshaptic.types import Floats
 
-_LEANS = 3.0  # standard deviations from its wall, from where a parameter may be moved
-_LEAST, _MOST = 1e-3, 30.0  # times its value: no parameter gives way further than that
-_RIDGE = 1e-12
-_IMPOSSIBLE = 1e6
-
 
 @dataclass(frozen=True)
 class Around:
@@ -95,7 +90,8 @@ class Around:
             found = residuals(coordinates(model).coordinate(vectors)) - self.left
         if moved is not None:
             found -= moved @ self.slope.T
-        return np.where(np.isfinite(found), found, _IMPOSSIBLE)
+        impossible = 1e6
+        return np.where(np.isfinite(found), found, impossible)
 
     def density(self, model: Model, vectors: Floats, phi: Floats) -> Floats:
         """Log posterior density in `here`, (B,): of extended `model` with the base at `phi`."""
@@ -120,11 +116,10 @@ class Around:
     def moved(self, changes: Floats) -> Floats:
         """How far the parameters give way, in `here`, shape (C, P); no further than makes sense."""
         there = self.centre - (changes @ self.pull.T) @ self.root
-        far = np.abs(self.centre) * np.array([[_LEAST], [_MOST]])
-        low = np.where(
-            self.here.log, self.centre - np.log(_MOST), np.maximum(far[0], self.here.low)
-        )
-        high = np.where(self.here.log, self.centre + np.log(_MOST), far[1])
+        least, most = 1e-3, 30.0  # times its value: no parameter gives way further than that
+        far = np.abs(self.centre) * np.array([[least], [most]])
+        low = np.where(self.here.log, self.centre - np.log(most), np.maximum(far[0], self.here.low))
+        high = np.where(self.here.log, self.centre + np.log(most), far[1])
         return np.clip(there, np.minimum(low, self.centre), high) - self.centre
 
     def overlap(self, one: Floats, other: Floats) -> Floats:
@@ -165,7 +160,8 @@ def _leaning(model: Model, here: Coordinates, phi: Floats) -> NDArray[np.bool_]:
     ends = here.walls | np.array([isinstance(model.prior(n), NearZero) for n in model.names])
     with np.errstate(invalid="ignore"):
         room = phi.mean(axis=0) - here.low
-    return ends & (room < _LEANS * phi.std(axis=0))
+    leans = 3.0  # standard deviations from its wall, from where a parameter may be moved
+    return ends & (room < leans * phi.std(axis=0))
 
 
 def _root(slope: Floats, curvature: Floats, free: NDArray[np.bool_]) -> Floats:
@@ -178,7 +174,8 @@ def _root(slope: Floats, curvature: Floats, free: NDArray[np.bool_]) -> Floats:
     scale = 1 / np.sqrt(np.diag(normal))
     values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
     out = np.zeros((int(free.sum()), len(free)))
-    out[:, free] = (vectors / np.sqrt(np.maximum(values, _RIDGE))).T * scale
+    ridge = 1e-12
+    out[:, free] = (vectors / np.sqrt(np.maximum(values, ridge))).T * scale
     return out
 
 

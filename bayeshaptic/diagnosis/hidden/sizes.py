@@ -14,7 +14,6 @@ from bayeshaptic.types import Floats
 SEEN = 6.0
 # Log-uniform in between, as shares of what is seen.
 LEAST, MOST = 1 / 30, 3.0
-_FINE, _COARSE = 60, 12  # steps: of one number, and beside a grid of shapes
 _PROBE = 1e-3  # of the largest strength: small enough to be linear
 
 
@@ -46,7 +45,8 @@ def sizes_of(suspect: Suspect, known: Around) -> Sizes:
     """
     unseen = suspect.unseen
     seen = seen_of(suspect, known)
-    steps = _FINE if len(seen) == 1 else _COARSE
+    fine, coarse = 60, 12  # steps: of one number, and beside a grid of shapes
+    steps = fine if len(seen) == 1 else coarse
     ladder = np.exp(np.linspace(np.log(LEAST), np.log(MOST), 2 * steps + 1)[1::2])
     strength = (np.minimum(seen, unseen.largest / MOST)[:, None] * ladder).ravel()
     shape = np.repeat(np.arange(len(seen)), steps)

@@ -24,11 +24,8 @@ from bayeshaptic.types import Floats, Ints
 
 KEPT = 200  # equally weighted draws of an effect
 PAIRED = 5  # every so many of them meet those of another effect
-_BOLD = 0.25  # share of the sizes that are drawn from the flatter distribution
 # Steps of Gauss and Newton towards where the parameters give way to: of few cases, and of many.
 _STEPS, _FEW, _STEPS_EACH = 8, 200, 2
-_LEAST_LOG = -1e3  # log evidence: less is as impossible
-_FARTHEST = 5.0  # log stiffness: a factor of 150 either way is far enough
 
 
 @dataclass(frozen=True)
@@ -120,7 +117,8 @@ def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
     size = sizes.strength * suspect.unit_size
     log = guess + said - np.log(sizes.weight)
     log = log - (float(logsumexp(said + guess)) - evidence)
-    told = Evidence(size, sizes.shape, sizes.weight, np.maximum(log, _LEAST_LOG))
+    least_log = -1e3  # log evidence: less is as impossible
+    told = Evidence(size, sizes.shape, sizes.weight, np.maximum(log, least_log))
     return Weighed(
         suspect.name,
         suspect.title,
@@ -155,7 +153,8 @@ def _followed(suspect: Suspect, known: Around, own: Floats) -> tuple[Floats, Flo
 def _drawn(log_weight: Floats, count: int, rng: np.random.Generator) -> tuple[Ints, Floats]:
     """Cells by their weight, some by a flatter one; and the log probability of each drawn."""
     sharp = _normalised(log_weight)
-    share = (1 - _BOLD) * sharp + _BOLD * _normalised(0.5 * log_weight)
+    bold = 0.25  # share of the sizes that are drawn from the flatter distribution
+    share = (1 - bold) * sharp + bold * _normalised(0.5 * log_weight)
     cells = rng.permutation(systematic(share, count, rng))
     return cells, np.log(share[cells])
 
@@ -188,7 +187,8 @@ def _log_factor(
     else:
         new = log_limits(known.model, theta[used])
     with np.errstate(invalid="ignore"):
-        factor = np.clip(new - own[used], -_FARTHEST, _FARTHEST)
+        farthest = 5.0  # log stiffness: a factor of 150 either way is far enough
+        factor = np.clip(new - own[used], -farthest, farthest)
     factor = np.where(np.isnan(factor), 0.0, factor)
     drift = float(own[kept].mean() - own.mean()) if np.isfinite(own).all() else 0.0
     return np.asarray(factor[place] + drift)

@@ -11,8 +11,6 @@ from bayeshaptic.inference.population.hyperparameters import Hyperparameters
 from bayeshaptic.numerics.truncated_normal import draw_above
 from bayeshaptic.types import Floats
 
-_CHUNK = 256
-
 
 @dataclass(frozen=True)
 class Below:
@@ -44,9 +42,10 @@ def draw_below(hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.
         Lowest value of each coordinate of the mean; -inf where there is none.
     rng : numpy.random.Generator
     """
+    chunk = 256
     parts = [
-        _draw(hierarchy, phi[start : start + _CHUNK], walls, rng)
-        for start in range(0, len(phi), _CHUNK)
+        _draw(hierarchy, phi[start : start + chunk], walls, rng)
+        for start in range(0, len(phi), chunk)
     ]
     beta, recordings = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Below(hierarchy.layout.read(phi), beta, recordings)

@@ -18,13 +18,6 @@ from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.numerics.weights import tempered
 from bayeshaptic.types import Floats
 
-_COMPONENTS = 120  # draws of the hyperparameters that a cavity is a mixture over
-_CHUNK = 2000
-_LOOKED_AT = 2000
-_VAGUE = 1e3  # prior standard deviations of a recording that says nothing
-_COUNT = 0.2  # share of the hyperparameters that must count: a few vectors say nothing
-_LEAST = 0.02  # curvature of a description, in units of the tilted distribution's
-
 
 @dataclass(frozen=True)
 class Cavity:
@@ -42,7 +35,8 @@ class Cavity:
 
     def __call__(self, x: Floats) -> Floats:
         """Log density of points of shape (B, D); shape (B,)."""
-        parts = [self._density(x[start : start + _CHUNK]) for start in range(0, len(x), _CHUNK)]
+        chunk = 2000
+        parts = [self._density(x[start : start + chunk]) for start in range(0, len(x), chunk)]
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _density(self, x: Floats) -> Floats:
@@ -74,12 +68,14 @@ def cavity(hierarchy: Hierarchy, r: int, phi: Floats, rng: np.random.Generator) 
     rng : numpy.random.Generator
     """
     own, sd = hierarchy.likelihoods[r], hierarchy.prior_sd
-    phi = phi[:: -(-len(phi) // _LOOKED_AT)]
+    looked_at = 2000
+    phi = phi[:: -(-len(phi) // looked_at)]
+    vague = 1e3  # prior standard deviations of a recording that says nothing
     nothing = replace(
         own,
         mean=hierarchy.prior_mean,
-        precision=np.diag((_VAGUE * sd) ** -2),
-        covariance=np.diag((_VAGUE * sd) ** 2),
+        precision=np.diag((vague * sd) ** -2),
+        covariance=np.diag((vague * sd) ** 2),
     )
     others = list(hierarchy.likelihoods)
     others[r] = nothing
@@ -91,8 +87,10 @@ def cavity(hierarchy: Hierarchy, r: int, phi: Floats, rng: np.random.Generator) 
     seen = covariance + own.covariance
     off = own.mean - mean
     far = np.einsum("bi,bi->b", off, np.linalg.solve(seen, off[..., None])[..., 0])
-    weight = tempered(0.5 * far + 0.5 * np.linalg.slogdet(seen)[1], _COUNT * len(phi))
-    chosen = rng.choice(len(phi), min(_COMPONENTS, len(phi)), p=weight)
+    count = 0.2  # share of the hyperparameters that must count: a few vectors say nothing
+    weight = tempered(0.5 * far + 0.5 * np.linalg.slogdet(seen)[1], count * len(phi))
+    components = 120  # draws of the hyperparameters that a cavity is a mixture over
+    chosen = rng.choice(len(phi), min(components, len(phi)), p=weight)
     return Cavity(mean[chosen], np.linalg.inv(np.linalg.cholesky(covariance[chosen])))
 
 
@@ -106,4 +104,5 @@ def described(x: Floats, rest: Cavity) -> GaussianLikelihood:
     precision, known = np.linalg.inv(covariance), np.linalg.inv(wide)
     gradient = known @ (mean - before)  # of the likelihood at the mean: both slopes cancel there
     unit = np.sqrt(np.diag(covariance))
-    return at_peak(mean, gradient, precision - known, 0.0, unit, _LEAST)
+    least = 0.02  # curvature of a description, in units of the tilted distribution's
+    return at_peak(mean, gradient, precision - known, 0.0, unit, least)

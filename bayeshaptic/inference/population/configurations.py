@@ -22,9 +22,6 @@ from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
 FEWEST = 3  # configurations from which one is predicted between them
-_FIRST_STEPS = 200
-_BATCH = 2000
-_RARE = 0.2
 
 
 @dataclass(frozen=True)
@@ -64,11 +61,13 @@ class Configurations:
         low = self._here.lowest
         parts: list[Floats] = []
         mirrored = False
+        batch = 2000
+        rare = 0.2
         while sum(map(len, parts)) < count:
-            x = self._path.draw(self.chains.thinned(_BATCH, rng), coordinate, rng)
+            x = self._path.draw(self.chains.thinned(batch, rng), coordinate, rng)
             good = np.all(x >= low, axis=(1, 2))
             # Paths on which no damper is negative; where there are hardly any, mirrored at zero.
-            mirrored = mirrored or (not parts and good.mean() < _RARE)
+            mirrored = mirrored or (not parts and good.mean() < rare)
             parts.append(x if mirrored else x[good])
         found = np.concatenate(parts)[:count]
         flat = inside(found.reshape(-1, self.model.size), self._here)
@@ -127,7 +126,8 @@ def infer_configurations(
     tune, run, rest = np.random.SeedSequence(seed).spawn(3)
     report(0.0, "configurations: first look")
     path = settled(path, posteriors, here, path.guess()[0])
-    chains = sample_level(path, tune, steps=_FIRST_STEPS)
+    first_steps = 200
+    chains = sample_level(path, tune, steps=first_steps)
     report(0.5, "configurations: sampling")
     middle = np.median(chains.thinned(1000, np.random.default_rng(rest)), axis=0)
     path = settled(path, posteriors, here, middle)

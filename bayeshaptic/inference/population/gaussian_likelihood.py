@@ -18,7 +18,6 @@ from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.types import Floats
 
-_MOST_POINTS = 5000
 STEP = 0.05  # of a derivative, in posterior standard deviations
 # Least curvature in units of these, and of a cloud: where the data say nothing, or a ridge is bent.
 _LEAST, _LEAST_OF_CLOUD = 1e-3, 0.3
@@ -49,7 +48,8 @@ class GaussianLikelihood:
 
 def gaussian_likelihood(posterior: Posterior, here: Coordinates) -> GaussianLikelihood:
     """The likelihood of a recording, described over the draws of its own posterior."""
-    every = -(-len(posterior.draws) // _MOST_POINTS)
+    most_points = 5000
+    every = -(-len(posterior.draws) // most_points)
     x = here.coordinate(posterior.draws[::every])
     return fit_quadratic(x, posterior.log_likelihood.ravel()[::every])
 

@@ -31,9 +31,6 @@ from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
 DRAWS = 36_000  # with them 20 lie below the stiffness of 0.1 % risk, in the hands of each user
-_SOME = 2000
-_FIRST_STEPS = 200
-_DESCRIPTIONS = 2  # rounds of describing recordings better, at most
 
 
 @at_the_door
@@ -91,17 +88,20 @@ def infer_population(
     rng = np.random.default_rng(rest)
     report(0.0, "population: first look")
     hierarchy = settled(hierarchy, posteriors, here, hierarchy.guess()[0])
-    chains = sample_level(hierarchy, tune, steps=_FIRST_STEPS)
-    hierarchy = settled(hierarchy, posteriors, here, np.median(chains.thinned(_SOME, rng), axis=0))
-    chains = sample_level(hierarchy, again, chains, steps=_FIRST_STEPS)
+    first_steps = 200
+    chains = sample_level(hierarchy, tune, steps=first_steps)
+    some = 2000
+    hierarchy = settled(hierarchy, posteriors, here, np.median(chains.thinned(some, rng), axis=0))
+    chains = sample_level(hierarchy, again, chains, steps=first_steps)
     report(0.3, "population: describing recordings")
-    for own_seed in first.spawn(_DESCRIPTIONS):
-        phi = chains.thinned(_SOME, rng)
+    descriptions = 2  # rounds of describing recordings better, at most
+    for own_seed in first.spawn(descriptions):
+        phi = chains.thinned(some, rng)
         better = redescribed(hierarchy, posteriors, users, phi, here, own_seed)
         if better is hierarchy:
             break
         hierarchy = better
-        chains = sample_level(hierarchy, again, chains, steps=_FIRST_STEPS)
+        chains = sample_level(hierarchy, again, chains, steps=first_steps)
     report(0.5, "population: sampling")
     chains = sample_level(hierarchy, run, chains)
     report(0.8, "population: users")

@@ -34,11 +34,7 @@ from bayeshaptic.types import Floats
 POOR_K = 0.7  # Pareto k from which importance weights are not to be trusted
 _FEW = 1000  # effective draws that are too few
 _HARMLESS = 0.5  # share of effective draws from which a heavy tail is harmless
-_SAMPLED = 2000.0  # effective draws to sample
 _ENOUGH, _MOST = 21_000, 22_000  # draws, for risks down to 0.1 %
-_PROPOSED = 2.0  # draws of a proposal for each that is wanted
-_MOST_OWN = 40_000
-_START = 3000
 DESCRIBED, OWN, SAMPLED, ALONE = "described", "own", "sampled", "alone"
 
 
@@ -190,7 +186,8 @@ def _from_own(
     rng: np.random.Generator,
 ) -> Reweighted:
     """The recording's own draws, weighed by the cavity over its own prior."""
-    x = _own(posterior, here, _MOST_OWN)
+    most_own = 40_000
+    x = _own(posterior, here, most_own)
     return _resampled(x, _own_weight(posterior, rest, here, x), user, here, count, rng, OWN)
 
 
@@ -246,21 +243,24 @@ def _sampled(
             value[inside] = exact + rest(x[inside])
         return value
 
-    x = _own(posterior, here, _START)
+    start = 3000
+    x = _own(posterior, here, start)
     weight = tempered(_own_weight(posterior, rest, here, x), 0.05 * len(x))
     mean = weight @ x
     off = x - mean
     first = student(mean, (weight[:, None] * off).T @ off, 8.0)
     ensembles = warmed_up(density, first, seed, x[int(np.argmax(density(x)))])
     proposal = ensembles.proposal
-    y = proposal.mixture.sample(rng, int(_PROPOSED * count))
+    proposed = 2.0  # draws of a proposal for each that is wanted
+    y = proposal.mixture.sample(rng, int(proposed * count))
     x = proposal.straightening.bent(y)
     found = _resampled(
         x, density(x) - proposal.mixture.log_density(y), user, here, count, rng, SAMPLED
     )
     if found.good:
         return found
-    chains = run_ensembles(ensembles, np.random.default_rng(seed.spawn(1)[0]), _SAMPLED)
+    sampled = 2000.0  # effective draws to sample
+    chains = run_ensembles(ensembles, np.random.default_rng(seed.spawn(1)[0]), sampled)
     if chains.diagnostics.rhat.max() > TOLERABLE or chains.diagnostics.ess < _FEW:
         return None
     draws = here.natural(chains.thinned(min(count, int(chains.diagnostics.ess)), rng))

@@ -20,11 +20,6 @@ from bayeshaptic.numerics.mixture import student
 from bayeshaptic.types import Floats
 
 ESS = 500.0
-_REFITS = 4  # at most
-_AGAIN = 40  # steps to forget a description that has changed a little
-_FIRST_STEPS = 100
-_WARM_UP = 200
-_LEVEL_STEPS = 600
 _MOST_STEPS = 5000
 TOLERABLE = 1.02  # R-hat from which chains are not to be used
 
@@ -107,13 +102,16 @@ def sample_level(
     density = level.log_density
     if before is None:
         walkers = [_begin(level, own) for own in seed.spawn(ENSEMBLES)]
+        warm_up = 200
         for one in walkers:
-            one.advance(_WARM_UP)
+            one.advance(warm_up)
     else:
         walkers = [replace(one, density=density) for one in before.walkers]
+    again = 40  # steps to forget a description that has changed a little
     for one in walkers:
-        one.advance(_AGAIN)
-    joined = _advance(walkers, _LEVEL_STEPS if steps is None else steps)
+        one.advance(again)
+    level_steps = 600
+    joined = _advance(walkers, level_steps if steps is None else steps)
     diagnostics = diagnose(joined)
     while steps is None and EVERY * joined.shape[1] < _MOST_STEPS and not _done(diagnostics):
         gone = EVERY * joined.shape[1]
@@ -128,8 +126,10 @@ def run_ensembles(ensembles: Ensembles, rng: np.random.Generator, ess: float) ->
 
     Their proposal is fitted again until one that is frozen gives `ess` effective draws.
     """
-    steps = _FIRST_STEPS
-    for _ in range(_REFITS):
+    first_steps = 100
+    steps = first_steps
+    refits = 4  # at most
+    for _ in range(refits):
         chains, values = ensembles.advance(steps)
         diagnostics = diagnose(chains)
         if diagnostics.ess >= ess and diagnostics.rhat.max() < RHAT_LIMIT:

@@ -17,9 +17,6 @@ from bayeshaptic.numerics.truncated_normal import moments_above
 from bayeshaptic.types import Floats
 
 L = TypeVar("L", Hierarchy, Trend)
-_ROUNDS = 8
-_BEYOND = 2.0  # posterior standard deviations that an expectation may lie outside its own draws
-_DRAWS = 400
 _SETTLED = 0.02  # move, in posterior standard deviations, that is none
 
 
@@ -43,9 +40,11 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
     own = [here.coordinate(one.draws) for one in posteriors]
     sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
     walls = here.lowest
-    low, high = np.maximum(low - _BEYOND * sd, walls), high + _BEYOND * sd
+    beyond = 2.0  # posterior standard deviations that an expectation may lie outside its own draws
+    low, high = np.maximum(low - beyond * sd, walls), high + beyond * sd
     x = np.clip(_expected(level, phi, walls), low, high)
-    for number in range(_ROUNDS):
+    rounds = 8
+    for number in range(rounds):
         found = [
             linearised(one, here, x[r], STEP * sd[r]) or level.likelihoods[r]
             for r, one in enumerate(posteriors)
@@ -69,4 +68,5 @@ def _expected(level: Hierarchy | Trend, phi: Floats, walls: Floats) -> Floats:
     if not np.isfinite(walls).any():
         return mean
     every = zip(mean, covariance, strict=True)
-    return np.stack([moments_above(walls, m, c, _DRAWS)[0] for m, c in every])
+    draws = 400
+    return np.stack([moments_above(walls, m, c, draws)[0] for m, c in every])

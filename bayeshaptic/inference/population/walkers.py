@@ -20,9 +20,6 @@ from bayeshaptic.types import Floats
 
 LogDensity = Callable[[Floats], Floats]
 EVERY = 5  # steps that are kept: neighbours are nearly the same
-_MOST = 4  # coordinates at a time
-_JITTER = 1e-5
-_STRETCH = 0.3  # log standard deviation of the length of a step
 
 
 @dataclass
@@ -78,10 +75,13 @@ def _subspace_move() -> Any:
 def subspace_steps(walkers: Floats, others: Floats, rng: np.random.RandomState) -> Floats:
     """Proposals, as probable there as back: differences of two others in a few coordinates."""
     count, size = walkers.shape
-    many = rng.randint(1, min(_MOST, size) + 1, size=count)
+    most = 4  # coordinates at a time
+    many = rng.randint(1, min(most, size) + 1, size=count)
     order = np.argsort(rng.rand(count, size), axis=1).argsort(axis=1)
     one = rng.randint(len(others), size=count)
     other = (one + rng.randint(1, len(others), size=count)) % len(others)
-    length = 2.38 / np.sqrt(2 * many) * np.exp(_STRETCH * rng.randn(count))
-    step = length[:, None] * (others[one] - others[other]) + _JITTER * rng.randn(count, size)
+    stretch = 0.3  # log standard deviation of the length of a step
+    length = 2.38 / np.sqrt(2 * many) * np.exp(stretch * rng.randn(count))
+    jitter = 1e-5
+    step = length[:, None] * (others[one] - others[other]) + jitter * rng.randn(count, size)
     return np.where(order < many[:, None], walkers + step, walkers)

@@ -16,24 +16,13 @@ from bayeshaptic.types import Floats
 LogDensity = Callable[[Floats], Floats]
 Move = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
 """From walkers (W, P) to proposed ones, with log density of proposing the way back over there."""
-_REDRAWN = 0.25  # of redrawing moves, for each of the others
 ENSEMBLES = 4
 WALKERS = 64
 _WARM_UP = (2, 2, 4, 4, 6, 6, 6, 6)  # steps a parameter in each round
-_FEWEST = 8  # steps that a proposal is fitted to
 _IDLE = 2  # rounds without a gain
 _WARM, _FROZEN = 0.6, 0.75  # of the moves that are independent proposals; the others differences
-_GOOD = 0.4  # acceptance of independent proposals from which another round gains nothing
-_CLIMB = 0.1  # rise of the mean log density, in its standard deviations, that is no accident
-_MOST_POINTS = 20_000  # that a proposal is fitted to
-_POINTS_A_COMPONENT = 2000
-_MOST_COMPONENTS = 6  # more follow the accidents of the draws
 _MISSED = 2.0  # log of density over proposal, above the median, from which a place is missed
-_TAILS = 3
-_TRIED = 1000
 _ARCHIVE = 4000
-_LEAPS = 0.1  # of the differences that are taken whole: from one hump to another
-_JITTER = 1e-5
 
 
 @dataclass(frozen=True)
@@ -67,9 +56,11 @@ class Proposal:
         """
         generator, (count, size) = _generator(rng), walkers.shape
         ends = self.archive[generator.integers(len(self.archive), size=(2, count))]
-        length = np.where(generator.uniform(size=count) < _LEAPS, 1.0, 2.38 / np.sqrt(2 * size))
+        leaps = 0.1  # of the differences that are taken whole: from one hump to another
+        length = np.where(generator.uniform(size=count) < leaps, 1.0, 2.38 / np.sqrt(2 * size))
         step = length[:, None] * (ends[0] - ends[1])
-        step += _JITTER * generator.standard_normal(walkers.shape)
+        jitter = 1e-5
+        step += jitter * generator.standard_normal(walkers.shape)
         return walkers + step, np.zeros(count)
 
 
@@ -116,7 +107,8 @@ class Ensembles:
                 drawn, factor = redraw(straightening.bent(walkers), _generator(rng))
                 return straightening.straight(drawn), factor
 
-            moves.append((alone, _REDRAWN))
+            redrawn = 0.25  # of redrawing moves, for each of the others
+            moves.append((alone, redrawn))
         self.sampler = emcee.EnsembleSampler(
             len(self.positions),
             size,
@@ -168,16 +160,19 @@ def warmed_up(
     state = np.random.RandomState(np.random.MT19937(last)).get_state()
     ensembles = Ensembles(density, proposal, _WARM, np.concatenate(starts), state, redraw)
     best, level, idle = 0.0, -np.inf, 0
+    fewest = 8  # steps that a proposal is fitted to
+    good = 0.4  # acceptance of independent proposals from which another round gains nothing
+    climb = 0.1  # rise of the mean log density, in its standard deviations, that is no accident
     for share in _WARM_UP:
-        steps = max(share * size, 2 * _FEWEST)
+        steps = max(share * size, 2 * fewest)
         chains, log_density = ensembles.advance(steps)
         late = slice(steps // 2, None, max(steps // 24, 1))
         found, values = chains[:, late].reshape(-1, size), log_density[:, late].ravel()
         acceptance = _acceptance(density, ensembles.proposal, found, values, rng)
         ensembles = _with(ensembles, _fitted(found, values, rng))
-        climbing = values.mean() - level > _CLIMB * values.std()
+        climbing = values.mean() - level > climb * values.std()
         idle = 0 if acceptance > 1.1 * best or climbing else idle + 1
-        if acceptance > _GOOD or idle == _IDLE:
+        if acceptance > good or idle == _IDLE:
             break
         best, level = max(best, acceptance), max(level, values.mean())
     return ensembles
@@ -191,7 +186,8 @@ def refitted(
     `values` are the log densities there, (E, S, W).
     """
     found = chains.reshape(-1, chains.shape[-1])
-    every = max(2, -(-len(found) // _MOST_POINTS))
+    most_points = 20_000  # that a proposal is fitted to
+    every = max(2, -(-len(found) // most_points))
     return _with(ensembles, _fitted(found[::every], values.ravel()[::every], rng))
 
 
@@ -217,12 +213,15 @@ def _fitted(found: Floats, values: Floats, rng: np.random.Generator) -> Proposal
     """
     straightening = straighten(found)
     y = straightening.straight(found)
-    components = int(np.clip(len(y) // _POINTS_A_COMPONENT, 3, _MOST_COMPONENTS))
+    points_a_component = 2000
+    most_components = 6  # more follow the accidents of the draws
+    components = int(np.clip(len(y) // points_a_component, 3, most_components))
     mixture = fit_student_mixture(y, np.ones(len(y)), components, 10.0, rng)
     wide = student(y.mean(axis=0), 1.5 * np.cov(y.T), 5.0)
     mixture = mixture.with_component(wide, 0.1)
     _, once = np.unique(values, return_index=True)  # a walker that stays is found many times
-    for _ in range(_TAILS):
+    tails = 3
+    for _ in range(tails):
         excess = values[once] - mixture.log_density(y[once])
         missed = y[once][excess > np.median(excess) + _MISSED]
         if len(missed) <= 4 * y.shape[1]:
@@ -240,8 +239,9 @@ def _acceptance(
     rng: np.random.Generator,
 ) -> float:
     """How often walkers at `found`, whose log densities are `values`, would accept a proposal."""
-    here = rng.choice(len(found), _TRIED)
-    drawn = proposal.mixture.sample(rng, _TRIED)
+    tried = 1000
+    here = rng.choice(len(found), tried)
+    drawn = proposal.mixture.sample(rng, tried)
     there = density(proposal.straightening.bent(drawn)) - proposal.mixture.log_density(drawn)
     straight = proposal.straightening.straight(found[here])
     gain = there - (values[here] - proposal.mixture.log_density(straight))

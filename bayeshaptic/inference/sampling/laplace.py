@@ -13,8 +13,6 @@ from bayeshaptic.numerics.truncated_normal import moments_above
 from bayeshaptic.types import Floats
 
 _STEP = 0.1  # of finite differences, in conditional standard deviations
-_SETTLED = 1e-2  # gain of log density that is none
-_DRAWS = 2000  # for the moments of a truncated normal
 _MARGIN = 2.5 * _STEP  # from where second differences stay inside the support
 
 
@@ -50,7 +48,8 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
         return _possible(density, peak, phi), student(peak, covariance)
 
     block = covariance[np.ix_(leaning, leaning)]
-    mean, spread = moments_above(here.low[leaning], peak[leaning], block, _DRAWS)
+    draws = 2000  # for the moments of a truncated normal
+    mean, spread = moments_above(here.low[leaning], peak[leaning], block, draws)
     # Along the ridge: across it, the others would not find their way back.
     along = np.linalg.solve(block, mean - peak[leaning])
     inside = peak + covariance[:, leaning] @ along
@@ -101,6 +100,7 @@ def _climb(
     phi = phi.copy()
     value = float(density.beyond_walls(phi)[0])
     damping = 1e-3
+    settled = 1e-2  # gain of log density that is none
     for _ in range(steps):
         gradient = _gradient(density, phi[None], widths)[0][free] * widths[free]
         scaled = np.outer(widths, widths) * _hessian(density, phi, widths)
@@ -119,7 +119,7 @@ def _climb(
             return phi
         gain = trial_value - value
         phi, value, damping = trial, trial_value, damping * 0.1
-        if gain < _SETTLED:
+        if gain < settled:
             break
     return phi
 

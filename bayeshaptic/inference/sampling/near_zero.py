@@ -25,8 +25,6 @@ _SEEN = 5.0  # standard deviations from zero, from which a parameter is sampled 
 # Coordinate units, of a ridge that is straight: e^10 in a logarithm.  A guard: the ridges of
 # 12 simulated recordings, held and free, clean and with effects, are all shorter than 1.
 _LONGEST = 10.0
-_INSIDE = 1e-6  # of a prior's width, or of a logarithm
-_BEGIN = 0.3  # quantile of the prior at which to begin: zero is an end
 
 
 def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
@@ -78,13 +76,15 @@ def _followed(slope: Floats, small: list[int]) -> Floats:
 def start_of(here: Coordinates, fit: Fit) -> Floats:
     """The fit in the coordinates `here`, shape (P,), inside the support."""
     phi = here.coordinate(fit.theta)
+    begin = 0.3  # quantile of the prior at which to begin: zero is an end
     for index in here.near_zero:  # the others follow
         inner = fit.theta.copy()
-        inner[index] = float(fit.model.prior(fit.model.names[index]).quantile(_BEGIN))
+        inner[index] = float(fit.model.prior(fit.model.names[index]).quantile(begin))
         phi[index] = max(phi[index], here.coordinate(inner)[index])
     # One that follows to beyond its own end, a delay of nothing say, stays at that.
     own = here.own(phi)
-    return phi + np.clip(own, here.low + _INSIDE, here.high - _INSIDE) - own
+    inside = 1e-6  # of a prior's width, or of a logarithm
+    return phi + np.clip(own, here.low + inside, here.high - inside) - own
 
 
 def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:

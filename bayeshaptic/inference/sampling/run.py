@@ -25,10 +25,7 @@ from bayeshaptic.numerics.straightening import Straightening
 from bayeshaptic.types import Floats, Progress
 
 _FIRST_STEPS = 32
-_MARGIN = 1.1  # a forecast of the steps that are needed, and a little further
-_LEAST_GROWTH, _MOST_GROWTH = 1.3, 2.0
 _MIXED = 0.06  # effective draws a draw, an autocorrelation of 16 steps: below, a proposal is refit
-_REFITS = 4
 
 
 @dataclass
@@ -87,7 +84,8 @@ class Run:
         """
         steps, every, few = self.steps, self.every, _MIXED * self.values.size
         slow = verdict.diagnostics.ess < few
-        if slow and self.refits < _REFITS and 2 * every * steps <= affordable * every:
+        refits = 4
+        if slow and self.refits < refits and 2 * every * steps <= affordable * every:
             self.ensembles = refitted(self.ensembles, self.chains, self.values, self.rng)
             self.chains, self.values = np.empty(0), np.empty(0)
             self.more, self.every, self.refits = 2 * every * steps, 1, self.refits + 1
@@ -95,8 +93,10 @@ class Run:
         if np.median(verdict.diagnostics.fewest) < few and steps > _FIRST_STEPS:
             self.chains, self.values = self.chains[:, 1::2], self.values[:, 1::2]
             self.every = 2 * every
-        growth = _MARGIN / max(verdict.share, 1e-3)
-        growth = float(np.clip(growth, _LEAST_GROWTH, _MOST_GROWTH))
+        margin = 1.1  # a forecast of the steps that are needed, and a little further
+        growth = margin / max(verdict.share, 1e-3)
+        least_growth, most_growth = 1.3, 2.0
+        growth = float(np.clip(growth, least_growth, most_growth))
         self.more = max(min(int((growth - 1) * self.steps), affordable), 1)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:

@@ -23,9 +23,6 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
-_PREDICTIVE_DRAWS = 4  # a walker: the response at every frequency is large
-_LIKELIHOOD_DRAWS = 20  # a walker
-_PRIOR_DRAWS = 2000
 MARK = "bayeshaptic"
 
 
@@ -116,7 +113,8 @@ def _groups(posterior: Sampled) -> dict[str, Group]:
     chains = as_chains(posterior.chains)
     draws = _numbered(chains)
     rng = np.random.default_rng(posterior.seed)
-    prior = np.stack([draw(model.prior(n), rng, _PRIOR_DRAWS) for n in model.names], axis=-1)[None]
+    prior_draws = 2000
+    prior = np.stack([draw(model.prior(n), rng, prior_draws) for n in model.names], axis=-1)[None]
     level = Variable(("chain", "draw"), as_chains(posterior.log_likelihood))
     groups = {
         "posterior": Group(_sampled(posterior, chains), draws, _about(posterior)),
@@ -190,7 +188,8 @@ def _thinned(posterior: Sampled, count: int) -> Floats:
 def _pointwise(posterior: Sampled) -> Group:
     windows = posterior.windows
     assert windows is not None
-    some = _thinned(posterior, _LIKELIHOOD_DRAWS)
+    likelihood_draws = 20  # a walker
+    some = _thinned(posterior, likelihood_draws)
     values = Likelihood(posterior.model, windows).pointwise(some.reshape(-1, some.shape[2]))
     values = values.reshape(*some.shape[:2], -1)
     along = {
@@ -205,7 +204,8 @@ def _predictive(posterior: Sampled, rng: np.random.Generator) -> dict[str, Group
     """The measured response, and what the posterior predicts of it with its noise."""
     etfe = posterior.etfe
     assert etfe is not None
-    some = _thinned(posterior, _PREDICTIVE_DRAWS)
+    predictive_draws = 4  # a walker: the response at every frequency is large
+    some = _thinned(posterior, predictive_draws)
     response = posterior.model.response(some.reshape(-1, some.shape[2]), etfe.frequency_hz)
     noise = rng.standard_normal((2, *response.shape)) * np.sqrt(etfe.variance / 2)
     shape = (*some.shape[:2], -1)

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from bayeshaptic.files import whole_file
 
-_ROOM = 1 << 20  # bytes, beside the arrays
-
 
 @dataclass(frozen=True)
 class Variable:
@@ -79,7 +77,8 @@ def write(groups: Mapping[str, Group], path: Path) -> None:
     """
     import h5netcdf
 
-    needed = sum(group.nbytes for group in groups.values()) + _ROOM
+    room = 1 << 20  # bytes, beside the arrays
+    needed = sum(group.nbytes for group in groups.values()) + room
     if shutil.disk_usage(path.absolute().parent).free < needed:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
     with whole_file(path) as partial, h5netcdf.File(partial, "w") as file:

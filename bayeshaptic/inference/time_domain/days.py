@@ -9,8 +9,6 @@ import numpy as np
 from bayeshaptic.inference.time_domain.uneven import Ridge
 from bayeshaptic.types import Floats, Ints
 
-_FEWEST = 3  # pieces beyond these say how well the spread is known
-
 
 def between_pieces(
     columns: Floats,
@@ -44,13 +42,14 @@ def between_pieces(
     """
     total = np.zeros((columns.shape[1],) * 2)
     count = len(pieces)
-    if count <= _FEWEST:
+    fewest = 3  # pieces beyond these say how well the spread is known
+    if count <= fewest:
         return total
     thin = len(residual) / effective
     parts = [_alone(columns, residual, *one, differ, thin) for one in zip(pieces, own, strict=True)]
     apart, variance = (np.array(values) for values in zip(*parts, strict=True))
     for number, index in enumerate(differ):
-        spread = _spread(apart[:, number], variance[:, number]) * (count - 1) / (count - _FEWEST)
+        spread = _spread(apart[:, number], variance[:, number]) * (count - 1) / (count - fewest)
         for piece in pieces:
             moved = found.inverse @ (columns[piece].T @ columns[piece, index])
             total += spread * np.outer(moved, moved)

@@ -28,9 +28,6 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
 NAMES = ("m", "b", "coulomb", "offset", "delay_s")
-_BAND = 0.025  # of the sampling rate: of the inverse dynamics that the fit begins with
-_OTHER = 0.4  # bandwidth of the second follower over that of the first
-_STEPS = 10
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,8 @@ def fit_motion(recording: Recording, feedback: Follower | None = None) -> Motion
     start = loop.begun(_inverse_dynamics(recording))
     loop = loop.led(feedback, start)
     first = _fit(loop, start, recording.name)
-    second = _fit(loop.led(None, start, _OTHER), first.inside, recording.name)
+    other = 0.4  # bandwidth of the second follower over that of the first
+    second = _fit(loop.led(None, start, other), first.inside, recording.name)
     apart = (second.values - first.values)[: len(NAMES)]
     spread = first.covariance[: len(NAMES), : len(NAMES)] + np.outer(apart, apart)
     for index in (NAMES.index("coulomb"), NAMES.index("offset")):
@@ -146,9 +144,10 @@ def _fit(loop: Loop, start: Floats, name: str) -> _Found:
     """Gauss-Newton steps, first without the uneven force, then with it."""
     values, uneven = start, np.zeros(2 * WAVES)
     plain = loop.plain
+    steps = 10
     for with_waves in (False, True):
         converged = False
-        for _ in range(_STEPS):
+        for _ in range(steps):
             error, columns, solved = _linearised(loop, values, uneven, with_waves, name)
             better = _step(loop, values, uneven, error, solved)
             if better is None:
@@ -210,7 +209,8 @@ def _inverse_dynamics(recording: Recording) -> Floats:
     """Where to begin, shape (5,): least squares of the force on the filtered motion."""
     from scipy.signal import butter, sosfiltfilt
 
-    low, period_s = butter(4, 2 * _BAND, output="sos"), recording.period_s
+    band = 0.025  # of the sampling rate: of the inverse dynamics that the fit begins with
+    low, period_s = butter(4, 2 * band, output="sos"), recording.period_s
     speeds = [np.gradient(sosfiltfilt(low, p.position), period_s) for p in recording.pieces]
     usual = float(np.std(np.concatenate(speeds)))
     if not usual > 0:

@@ -13,10 +13,6 @@ from bayeshaptic.types import Floats, Ints
 
 SHARED = 5  # mass, damping, dry friction, constant force, delay: the same in all pieces
 _LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
-_INDEPENDENT = 3.0  # samples that a second is worth, a hertz of bandwidth
-_FEWEST = 20  # independent samples
-_TRIALS = 10
-_CALMER = 1.6  # the bandwidth is lowered by this until the start can be simulated
 
 
 @dataclass(frozen=True)
@@ -89,18 +85,22 @@ class Loop:
     def independent(self) -> float:
         """How many independent samples this is worth, about."""
         seconds = len(self.force) * self.period_s
-        return max(_INDEPENDENT * self.bandwidth_hz * seconds, _FEWEST)
+        independent = 3.0  # samples that a second is worth, a hertz of bandwidth
+        fewest = 20  # independent samples
+        return max(independent * self.bandwidth_hz * seconds, fewest)
 
     def led(self, feedback: Follower | None, start: Floats, share: float = 1.0) -> Loop:
         """With the declared follower, or one of `share` times the bandwidth that is stable."""
         width = share * self.bandwidth_hz
-        for _ in range(_TRIALS):
+        trials = 10
+        calmer = 1.6  # the bandwidth is lowered by this until the start can be simulated
+        for _ in range(trials):
             chosen = feedback or spring_and_damper(start[0], width, self.period_s)
             loop = replace(self, bandwidth_hz=width, follower=chosen)
             error = loop.error(start, np.zeros(2 * WAVES))
             if np.all(np.isfinite(error)) and np.abs(error).max() < 10 * np.ptp(self.position):
                 break
-            width, feedback = width / _CALMER, None
+            width, feedback = width / calmer, None
         return loop
 
     def error(self, values: Floats, uneven: Floats) -> Floats:

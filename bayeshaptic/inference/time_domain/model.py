@@ -13,8 +13,6 @@ from bayeshaptic.models import HalfNormal, LogNormal, Model, Normal, Parameter, 
 from bayeshaptic.models.build import delay_prior
 from bayeshaptic.recordings.recording import Recording
 
-_MASS_LOG_SD = 1.0
-
 
 def rigid_with_friction(
     recording: Recording,
@@ -46,8 +44,9 @@ def rigid_with_friction(
         base, force_unit=recording.force_unit, position_unit=recording.position_unit
     ).with_period(period_s)
     mass, size = float(motion.inside[0]), float(np.std(recording.force))
+    mass_log_sd = 1.0
     weak: dict[str, Prior] = {
-        "m": LogNormal(mass, _MASS_LOG_SD),
+        "m": LogNormal(mass, mass_log_sd),
         "b": HalfNormal(2 * np.pi * motion.bandwidth_hz * mass),
     }
     free = delay_prior(None, None, period_s)

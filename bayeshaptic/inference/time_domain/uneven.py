@@ -11,7 +11,6 @@ from bayeshaptic.types import Floats
 WAVES = 12  # half waves along the way, a direction
 _LENGTHS = (1.0, 3.0, 8.0)  # waves from which they are smaller
 _SIZES = (1e-5, 1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6)  # of the command's rms
-_ROUNDS = 15
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,8 @@ class _Evidence:
         weight = np.zeros(len(self.scale))
         noise = 0.1 * self.power / self.samples
         freedom = max(float(self.effective) - self.plain, 1.0)
-        for _ in range(_ROUNDS):
+        rounds = 15
+        for _ in range(rounds):
             weight[self.plain :] = self.thin * noise / prior
             full = self.gram + np.diag(weight / self.scale**2 + 1e-12)
             left = self.power - float(self.along @ np.linalg.solve(full, self.along))

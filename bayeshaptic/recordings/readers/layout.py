@@ -16,7 +16,6 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.units import is_unit
 
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.I)
-_SAMPLED_ROWS = 64
 
 Fields = list[str]
 
@@ -61,7 +60,8 @@ def find_layout(
     InputError
         Where there are no rows of numbers, or the header does not fit them, or has a name twice.
     """
-    sample = sorted({round(i * (rows - 1) / _SAMPLED_ROWS) for i in range(_SAMPLED_ROWS + 1)})
+    sampled_rows = 64
+    sample = sorted({round(i * (rows - 1) / sampled_rows) for i in range(sampled_rows + 1)})
     bulk = [fields for fields in map(fields_of, sample) if any(map(_is_number, fields))]
     if not bulk:
         header = [name for name in fields_of(0) if name]

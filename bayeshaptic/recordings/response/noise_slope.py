@@ -23,9 +23,6 @@ _WIDE = 1.15
 _POWERS = np.arange(-4.0, 17.0)
 # One window of 24 lines, 16 of which are left over, knows its slope to some 1 (an octave) to 3.
 _BELIEF_SD = 2.0
-_NEAR = 0.5  # of log frequency: neighbours that tell a slope
-_NEIGHBOURS = 4
-_ROUNDS = 3
 
 
 def noise_slopes(spectra: RandomSpectra) -> Floats:
@@ -35,10 +32,12 @@ def noise_slopes(spectra: RandomSpectra) -> Floats:
     slopes = np.zeros(len(first))
     if wide == 0:
         return slopes
-    low = _lowest(spectra, min(wide + _NEIGHBOURS, len(first)))
+    neighbours = 4
+    low = _lowest(spectra, min(wide + neighbours, len(first)))
     found = np.zeros(len(low.edges) - 1)
     log_f = np.log(low.nodes_hz[:, 1])
-    for _ in range(_ROUNDS):
+    rounds = 3
+    for _ in range(rounds):
         windows = replace(low, noise_slope=found).windows()
         level = np.log(windows.scatter / windows.lines)
         found[:wide] = -_local_slopes(log_f, level)[:wide]
@@ -63,7 +62,8 @@ def _lowest(spectra: RandomSpectra, count: int) -> RandomSpectra:
 
 def _local_slopes(x: Floats, y: Floats) -> Floats:
     """Slope of y over x around each x: weighted least squares."""
-    weight = np.exp(-0.5 * ((x - x[:, None]) / _NEAR) ** 2)
+    near = 0.5  # of log frequency: neighbours that tell a slope
+    weight = np.exp(-0.5 * ((x - x[:, None]) / near) ** 2)
     weight /= weight.sum(axis=1, keepdims=True)
     apart = x - (weight @ x)[:, None]
     return np.asarray(np.sum(weight * apart * y, axis=1) / np.sum(weight * apart**2, axis=1))

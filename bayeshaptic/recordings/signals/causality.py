@@ -35,20 +35,16 @@ DOUBTFUL = 4.0
 _ANSWERS, _MAY_ANSWER = 40.0, 30.0
 # So is a correlation as strong as this that comes and goes.
 _STRONG = 0.8
-_HARDLY_CLEAR = 3.0
 
-_MOST_SAMPLES = 60_000
 _FLOOR = 1e-4
 # A computed force differs from period to period by the noise of the position; a played one never.
 _SAME = 1e-6
 # A force that is held at its limits, but is no sequence of steps, saturates.
 _FEWEST_AT_LIMIT = 10
-_FEWEST_LEVELS = 100
 _MOST_AT_LIMIT = 0.5
 # A device answers late and then more and more; a controller at once.
 _AT_ONCE = 0.1
 _SOON = 0.3
-_CLEAR_ANSWER = 8.0
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,8 @@ class Causality:
         if self.has_feedback or self.swapped or self.opposite or self.repeats:
             return False
         strong = min(self.same_sample, self.next_sample, key=lambda share: share.value)
-        bursts = strong.value < -_STRONG and strong.z < -_HARDLY_CLEAR
+        hardly_clear = 3.0
+        bursts = strong.value < -_STRONG and strong.z < -hardly_clear
         return self._position_drives(DOUBTFUL) or bursts or self.at_limits > _MOST_AT_LIMIT
 
     @property
@@ -115,7 +112,8 @@ class Causality:
         later = max(late, key=lambda share: abs(share.value))
         answers = abs(now.value) / _AT_ONCE, abs(soon.value) / _SOON
         at_once = max(answers) > abs(later.value)
-        clear = later.z < -_CLEAR_ANSWER and self._force_drives
+        clear_answer = 8.0
+        clear = later.z < -clear_answer and self._force_drives
         return clear and not at_once and not self._past_drives(SIGNIFICANT)
 
     @property
@@ -190,9 +188,10 @@ def causality(recording: Recording) -> Causality:
     -------
     Causality
     """
-    start = max(0, (recording.samples - _MOST_SAMPLES) // 2)
-    force = recording.force[start : start + _MOST_SAMPLES]
-    position = recording.position[start : start + _MOST_SAMPLES]
+    most_samples = 60_000
+    start = max(0, (recording.samples - most_samples) // 2)
+    force = recording.force[start : start + most_samples]
+    position = recording.position[start : start + most_samples]
     at_limits = _at_limits(force)
     saturates = float(np.mean(at_limits))
     left_out = at_limits if 0 < saturates < _MOST_AT_LIMIT else None
@@ -215,7 +214,8 @@ def _at_limits(force: Floats) -> Bools:
     """Samples of a force that saturates where nobody can tell what was wanted; else none."""
     at = [force == limit for limit in (force.min(), force.max())]
     often = any(np.count_nonzero(side) > _FEWEST_AT_LIMIT for side in at)
-    saturates = often and len(np.unique(force)) > _FEWEST_LEVELS
+    fewest_levels = 100
+    saturates = often and len(np.unique(force)) > fewest_levels
     return np.asarray((at[0] | at[1]) & saturates)
 
 

@@ -22,8 +22,6 @@ _LAST = _SPANS[-1][1]
 # A force that is predicted to less than this (of its increments' power), or not at all, has
 # nothing new in it that chance made; nor has one whose news come in jumps, or foretell each other.
 _FAINTEST, _STRONGEST = 2.5e-3, 1.2
-_IN_JUMPS = 0.1
-_FORETOLD = 5e-3
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,8 @@ def news(of_force: Prediction, of_position: Prediction) -> News:
     News
     """
     force, position = (within_the_usual(e) for e in (of_force.own, of_position.full))
-    usual = 1 - _power(force) / max(_power(of_force.own), np.finfo(float).tiny) < _IN_JUMPS
+    in_jumps = 0.1
+    usual = 1 - _power(force) / max(_power(of_force.own), np.finfo(float).tiny) < in_jumps
     if not (usual and _FAINTEST < _power(of_force.own) < _STRONGEST and _is_white(force)):
         return News(0.0)
     force, position = force - force.mean(), position - position.mean()
@@ -76,7 +75,8 @@ def _is_white(signal: Floats) -> bool:
     centred = signal - signal.mean()
     power = centred @ centred + np.finfo(float).tiny
     own = [centred[lag:] @ centred[:-lag] / power for lag in range(1, _LAST)]
-    return float(np.sum(np.square(own))) < 2 * _LAST / len(signal) + _FORETOLD
+    foretold = 5e-3
+    return float(np.sum(np.square(own))) < 2 * _LAST / len(signal) + foretold
 
 
 def _z(products: Floats) -> float:

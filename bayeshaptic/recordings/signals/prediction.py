@@ -14,15 +14,12 @@ import numpy as np
 
 from bayeshaptic.types import Bools, Floats, Ints
 
-_LAGS_OF_ITSELF = 60
 # The other signal by differences over wider and wider spans: each coefficient more costs a share of
 # 1/samples of what can be seen.
 _SPANS = (1, 2, 3, 5, 8, 13, 21, 34, 55, 89)
 _BLOCKS = 40
-_STRETCHES = 10
 # Relative ridge, far below the floor, which keeps the normal equations of such signals solvable.
 _RIDGE = 1e-9
-_REWEIGHTINGS = 6
 _USUAL = 0.95
 _CUT = 2.0
 # What is new in a signal that is predicted to the last digit is rounding.
@@ -143,7 +140,8 @@ def predict(target: Floats, other: Floats, left_out: Bools | None = None) -> Pre
     wanted = _scaled(target[rows] - target[rows - 1])
     beside = np.stack([other[rows + lead] - other[rows - 1] for lead in _LEADS], axis=1)
     beside = (beside - beside.mean(axis=0)) / max(float(beside[:, -1].std()), _TINY)
-    half = np.arange(len(rows)) * _STRETCHES // len(rows) % 2 == 0
+    stretches = 10
+    half = np.arange(len(rows)) * stretches // len(rows) % 2 == 0
     errors, cut, new = (
         np.empty((2, len(rows))),
         np.empty(len(rows)),
@@ -166,7 +164,8 @@ def _regressors(
 ) -> tuple[np.ndarray, Floats, int]:
     """Rows to predict, the columns that may predict them, and how many are of the target itself."""
     samples = len(target)
-    lags = max(4, min(_LAGS_OF_ITSELF, samples // 40))
+    lags_of_itself = 60
+    lags = max(4, min(lags_of_itself, samples // 40))
     spans = [span for span in _SPANS if span <= max(2, samples // 40)]
     rows = np.arange(max(lags, spans[-1]) + 2, samples - _LEADS[-1])
     if left_out is not None:
@@ -193,7 +192,8 @@ def _scaled(signal: Floats) -> Floats:
 def _robust(columns: Floats, wanted: Floats) -> tuple[Floats, float]:
     """Coefficients, and the error beyond which an error counts no more."""
     weight = np.ones(len(wanted))
-    for _ in range(_REWEIGHTINGS):
+    reweightings = 6
+    for _ in range(reweightings):
         coefficients = _least_squares(columns, wanted, weight)
         size = np.abs(wanted - columns @ coefficients)
         cut = float(_CUT * np.quantile(size, _USUAL)) + np.finfo(float).eps

@@ -10,10 +10,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Complexes, Floats
 
 _LOW = 0.1  # of the sampling rate: above it a delay counts too much
-_FEWEST = 12  # lines that tell a slope
-_NEAR = 0.35  # of log frequency, for a slope
 _DELAY = 2.0  # periods, hold included
-_AGAINST = -0.3
 
 
 class RoughResponse(NamedTuple):
@@ -49,17 +46,20 @@ class RoughResponse(NamedTuple):
         clear = self.clear()
         low = clear.frequency_hz < _LOW * 1 / period_s
         frequency, response = clear.frequency_hz[low], clear.response[low]
-        if len(frequency) < _FEWEST:
+        fewest = 12  # lines that tell a slope
+        if len(frequency) < fewest:
             return False
         x, y = np.log(frequency), np.log(np.abs(response))
-        weight = np.exp(-0.5 * ((x - x[:, None]) / _NEAR) ** 2) / frequency
+        near = 0.35  # of log frequency, for a slope
+        weight = np.exp(-0.5 * ((x - x[:, None]) / near) ** 2) / frequency
         weight /= weight.sum(axis=1, keepdims=True)
         apart = x - (weight @ x)[:, None]
         slope = np.sum(weight * apart * y, axis=1) / np.sum(weight * apart**2, axis=1)
         delay = 2 * np.pi * frequency * _DELAY * period_s
         expected = 0.5 * np.pi * np.clip(slope, -2.0, 0.0) - delay
         agreement = np.average(np.cos(np.angle(response) - expected), weights=1 / frequency)
-        return bool(agreement < _AGAINST)
+        against = -0.3
+        return bool(agreement < against)
 
 
 def rough_response(recording: Recording) -> RoughResponse:

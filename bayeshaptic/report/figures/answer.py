@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_NARROWEST_DB = 1.0
 # Inches of a phone's screen, on which a figure of the page's width would be scrolled.
 _PHONE_IN = 3.75
 
@@ -73,9 +72,10 @@ def draw_on(axes: Axes, result: Result, narrow: bool = False) -> None:
         names, numbers = [f"{name}\n{number}" for name, number in both], []
     style.rows(axes, names, numbers)
     low, high = axes.get_xlim()
-    if high - low < _NARROWEST_DB:
+    narrowest_db = 1.0
+    if high - low < narrowest_db:
         centre = 0.5 * (low + high)
-        axes.set_xlim(centre - _NARROWEST_DB / 2, centre + _NARROWEST_DB / 2)
+        axes.set_xlim(centre - narrowest_db / 2, centre + narrowest_db / 2)
     axes.ticklabel_format(axis="x", useOffset=False)
 
 

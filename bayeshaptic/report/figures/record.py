@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from bayeshaptic.recordings.recording import Recording
 
 _BUCKETS = 400  # of the whole record, each drawn from its lowest to its highest sample
-_BINS = 60
 _SEGMENT = 4096
 _LINES = 400
 
@@ -86,6 +85,7 @@ def _spectrum(
 
 def _range(axes: Axes, values: NDArray[Any], colour: str) -> None:
     style.panel(axes, grid=False)
-    count, edges = np.histogram(values, _BINS)
+    bins = 60
+    count, edges = np.histogram(values, bins)
     axes.stairs(count, edges, orientation="horizontal", fill=True, color=colour, alpha=0.6)
     axes.set_xticks([])

@@ -38,7 +38,6 @@ SMALL = 7.0
 DPI = 140
 _LAYER = "layer-"
 MOST_SVG = 110_000  # characters: beyond, whichever is smaller, PNG or SVG, is in the page
-_BASE64 = 4 / 3  # characters a byte of a picture in a page
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
@@ -209,7 +208,8 @@ def drawn(figure: Figure, name: str) -> Drawn:
 
     pixels, text = draw_both(figure)
     picture, vector = png(pixels), for_a_page(text, name)
-    most = max(MOST_SVG, _BASE64 * len(picture))
+    base64 = 4 / 3  # characters a byte of a picture in a page
+    most = max(MOST_SVG, base64 * len(picture))
     return Drawn(picture, vector if len(vector) <= most else None, panels(figure))
 
 

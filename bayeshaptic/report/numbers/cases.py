@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from bayeshaptic.study.analysed import Analysed
     from bayeshaptic.study.analysis import StudyAnalysis
 
-_FEWEST = 20  # different draws, for an interval
-
 
 def is_free(label: str, group: str) -> bool:
     """Whether nobody holds the device in a case, recorded or predicted along a coordinate."""
@@ -24,7 +22,8 @@ def is_free(label: str, group: str) -> bool:
 
 def has_draws(case: Case) -> bool:
     """Whether a case has enough different draws for an interval, and not a few weighted ones."""
-    return len(np.unique(case.limit.samples)) >= _FEWEST
+    fewest = 20  # different draws, for an interval
+    return len(np.unique(case.limit.samples)) >= fewest
 
 
 def raw_limits(study: StudyAnalysis) -> dict[str, tuple[Any, ...]]:

@@ -20,8 +20,6 @@ from matplotlib.transforms import Bbox
 
 from bayeshaptic.types import Floats
 
-_CLOSE = 1e-10  # of an axis: a mark this far beyond its end is on it
-
 
 class Plain(Axes):
     """Axes with `_Few` marks."""
@@ -86,7 +84,8 @@ class _Few(Axis):
         labels = formatter.format_ticks(places.tolist())
         low, high = np.sort(self.get_transform().transform(np.array(self.get_view_interval())))
         at = self.get_transform().transform(places)
-        margin = _CLOSE * (high - low)
+        close = 1e-10  # of an axis: a mark this far beyond its end is on it
+        margin = close * (high - low)
         seen = (at >= low - margin) & (at <= high + margin)
         return _Marks(
             places[seen], [t for t, s in zip(labels, seen, strict=True) if s], self._pattern(major)

@@ -21,8 +21,6 @@ from matplotlib.transforms import Affine2D, Bbox, TransformedPath
 
 from bayeshaptic.types import Bytes
 
-_POINTS_PER_INCH = 72.0  # the unit of SVG
-
 
 def draw_both(figure: Figure) -> tuple[Bytes, str]:
     """Lay `figure` out and draw it.
@@ -64,14 +62,15 @@ class _Both(RendererBase):
         self._pixels = RendererAgg(*self._size, self.dpi)
         self._layer = self._pixels  # another one while parts are drawn that the SVG has as pixels
         self._text = io.StringIO()
+        points_per_inch = 72.0  # the unit of SVG
         self._vector = RendererSVG(
-            width * _POINTS_PER_INCH,
-            height * _POINTS_PER_INCH,
+            width * points_per_inch,
+            height * points_per_inch,
             self._text,
             image_dpi=int(self.dpi),
             metadata={"Date": None, "Creator": None},
         )
-        self._factor = _POINTS_PER_INCH / self.dpi
+        self._factor = points_per_inch / self.dpi
         self._to_points = Affine2D().scale(self._factor)
 
     def finish(self) -> tuple[Bytes, str]:

@@ -24,7 +24,6 @@ _TITLES = {
     "stretch": "stretch",
     "command": "command",
 }
-_VAGUE = 6.0  # times the usual error of a curve: such a point would only hide the others
 _BEFORE: dict[str, Any] = {
     "color": style.OTHER,
     "fmt": "s--",
@@ -121,8 +120,9 @@ def _panel(
     style.panel(axes, f"{_TITLES[over]}, {motion.unit}")
     axes.xaxis.set_major_locator(MaxNLocator(4, symmetric=True))  # numbers of a stretch are long
     axes.axhline(0, color=style.PRIOR, linewidth=0.7)
+    vague = 6.0  # times the usual error of a curve: such a point would only hide the others
     for curve, look in row:
-        clear = curve.sd <= _VAGUE * np.median(curve.sd)
+        clear = curve.sd <= vague * np.median(curve.sd)
         bars = axes.errorbar(
             curve.motion[clear] * motion.factor,
             curve.force[clear] * factor,

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
     from bayeshaptic.diagnosis.feedback.explain import ForceExplained
 
-_MOST_DOTS = 3000
-
 
 def draw(closed: Closed) -> Figure:
     """Residual force over velocity on the left, held-out error on the right."""
@@ -34,7 +32,8 @@ def _residual(axes: Axes, force: ForceExplained, force_unit: str, position_unit:
     mass, damping, constant = (first[term.name][0] for term in first.terms[:3])
     linear = mass * path.acceleration + damping * path.velocity + constant
     row = scale(max(step.held_out_rms for step in further.steps), force_unit)
-    every = max(len(path.velocity) // _MOST_DOTS, 1)
+    most_dots = 3000
+    every = max(len(path.velocity) // most_dots, 1)
     for left, colour, marker, label in (
         (first.force - linear, style.OTHER, "s", "mass, damper and constant force"),
         (first.force - first.explained, style.CYCLE[1], "^", "with the first term added"),

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
 
-_NARROWEST_DB = 1.0
-
 
 @dataclass(frozen=True)
 class Row:
@@ -85,9 +83,10 @@ def draw_on(axes: Axes, closed: Closed) -> None:
     numbers = [estimate(row.middle, row.low, row.high, unit) for row in shown]
     style.rows(axes, [row.label for row in shown], numbers)
     low, high = axes.get_xlim()
-    if high - low < _NARROWEST_DB:
+    narrowest_db = 1.0
+    if high - low < narrowest_db:
         centre = 0.5 * (low + high)
-        axes.set_xlim(centre - _NARROWEST_DB / 2, centre + _NARROWEST_DB / 2)
+        axes.set_xlim(centre - narrowest_db / 2, centre + narrowest_db / 2)
     axes.ticklabel_format(axis="x", useOffset=False)
 
 

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from bayeshaptic.diagnosis.closed import Closed
 
-_LEAST = 0.05
-
 
 def _first(closed: Closed) -> str:
     return "before" if closed.effects else "model as declared"
@@ -26,15 +24,16 @@ def draw(closed: Closed) -> Figure:
     figure = style.new_figure(0.9 + 0.2 * len(before))
     axes = style.panel(figure.subplots(), "statistic / threshold (beyond 1: more than noise gives)")
     axes.grid(False, axis="y")
-    excess = [max(test.excess, _LEAST) for test in (*before, *after.values())]
+    least = 0.05
+    excess = [max(test.excess, least) for test in (*before, *after.values())]
     high = max(2.0, 1.4 * max(excess))
     axes.axvspan(1.0, high, color="#f3e3da", linewidth=0, zorder=0)
     axes.axvline(1.0, color=style.DATA, linewidth=0.8)
     for place, test in enumerate(before):
-        old = max(test.excess, _LEAST)
+        old = max(test.excess, least)
         now = after.get(test.name)
         if now is not None:
-            new = max(now.excess, _LEAST)
+            new = max(now.excess, least)
             axes.plot([old, new], [place, place], color=style.PRIOR, linewidth=0.8, zorder=2)
             axes.plot([new], [place], "o", color=style.MODEL, markersize=5, zorder=4)
         axes.plot(
@@ -44,7 +43,7 @@ def draw(closed: Closed) -> Figure:
     if after:
         axes.plot([], [], "o", color=style.MODEL, label="after, with what was added")
     style.log_scale(axes.xaxis, (1, 2, 5))
-    axes.set_xlim(0.9 * _LEAST, high)
+    axes.set_xlim(0.9 * least, high)
     style.rows(axes, [question(test) for test in before])
     style.legend(axes, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)
     return figure

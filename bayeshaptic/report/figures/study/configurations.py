@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from bayeshaptic.study.analysis import StudyAnalysis
     from bayeshaptic.study.configuration_limits import ConfigurationLimits
 
-_FAR_DB = 8.0  # between free and held, to have a panel each
 _LOOKS = {False: (style.OTHER, "s", "--"), True: (style.MODEL, "o", "-")}
 
 
@@ -26,7 +25,8 @@ def draw(study: StudyAnalysis) -> Figure:
     """A band for each of free and held, in one panel, or in two where they are far apart."""
     assert study.limit is not None
     bands = [(one, band_of(one)) for one in study.configurations]
-    apart = len(bands) > 1 and _gap([band for _, band in bands]) > _FAR_DB
+    far_db = 8.0  # between free and held, to have a panel each
+    apart = len(bands) > 1 and _gap([band for _, band in bands]) > far_db
     figure = style.new_figure(3.6 if apart else 2.9)
     count = len(bands) if apart else 1
     panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]

@@ -26,11 +26,7 @@ LOOKS = {
     CONFIGURATION: (style.CYCLE[3], "^"),
 }
 _ORDER = (FREE, HELD, NEW_PERSON, CONFIGURATION)
-_MOST = 24
 _PREDICTED = "(predicted)"  # as labels of configurations that were not recorded have it
-_SEEN = 0.02  # probability to set the limit
-_ROW_IN = 0.2
-_FAR_DB = 6.0
 
 
 def draw(study: StudyAnalysis) -> Figure:
@@ -38,7 +34,8 @@ def draw(study: StudyAnalysis) -> Figure:
     assert study.limit is not None
     shares = {found.case: found.probability for found in study.limit.binding}
     cases = shown_cases(study)
-    figure = style.new_figure(0.75 + _ROW_IN * (len(cases) + 1))
+    row_in = 0.2
+    figure = style.new_figure(0.75 + row_in * (len(cases) + 1))
     spans = _spans(study, cases)
     panels = figure.subplots(1, len(spans), sharey=True, squeeze=False)[0]
     for axes, (low, high) in zip(panels, spans, strict=True):
@@ -67,8 +64,9 @@ def _spans(study: StudyAnalysis, cases: tuple[Case, ...]) -> list[tuple[float, f
     if not ends:
         return [(0.0, 1.0)]
     parts = [[ends[0][0], ends[0][1]]]
+    far_db = 6.0
     for low, high in ends[1:]:
-        if low - parts[-1][1] > _FAR_DB and len(parts) < 2:
+        if low - parts[-1][1] > far_db and len(parts) < 2:
             parts.append([low, high])
         parts[-1][1] = max(parts[-1][1], high)
     margins = [max(0.06 * (high - low), 0.1) for low, high in parts]
@@ -82,14 +80,16 @@ def shown_cases(study: StudyAnalysis) -> tuple[Case, ...]:
     """
     assert study.limit is not None
     shares = {found.case: found.probability for found in study.limit.binding}
+    seen = 0.02  # probability to set the limit
     kept = [
         case
         for case in study.cases
         if case.group != CONFIGURATION
-        or shares.get(case.label, 0.0) > _SEEN
+        or shares.get(case.label, 0.0) > seen
         or (is_free(case.label, case.group) and _PREDICTED not in case.label)
     ]
-    kept = sorted(kept, key=lambda case: -shares.get(case.label, 0.0))[:_MOST]
+    most = 24
+    kept = sorted(kept, key=lambda case: -shares.get(case.label, 0.0))[:most]
     return tuple(case for group in _ORDER for case in kept if case.group == group)
 
 

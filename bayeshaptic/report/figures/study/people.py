@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
     from bayeshaptic.study.analysis import StudyAnalysis
 
-_ROW_IN = 0.26
 _NARROWEST_DB = 0.2  # of the axis: a population that does not differ is not to look as if it did
 
 
 def draw(study: StudyAnalysis) -> Figure:
     """Histogram of a new person's limit by crossing, references beside it, and a row a user."""
     rows = max(len(study.users), 1)
-    figure = style.new_figure(3.1 + _ROW_IN * rows)
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 0.5 + _ROW_IN * rows))
+    row_in = 0.26
+    figure = style.new_figure(3.1 + row_in * rows)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 0.5 + row_in * rows))
     _histogram(top, study)
     _users(bottom, study)
     unit = pretty_unit(study.users[0].limit.unit)
