@@ -13,6 +13,8 @@ Ints = NDArray[np.int_]
 Bools = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 
+LogDensity = Callable[[Floats], Floats]
+"""Log density of points, shape (B, D), up to a constant; shape (B,)."""
 Progress = Callable[[float, str], None]
 """Called with the share of the work done, 0 to 1, and a word about it."""
 Tick = Callable[[str], None]

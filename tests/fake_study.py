@@ -13,7 +13,7 @@ from bayeshaptic.devices import load_device
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
-from bayeshaptic.recordings.known_limits import Reference
+from bayeshaptic.recordings.known_limits import KnownLimit
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON, Case, device_limit
 from bayeshaptic.stability.critical import critical_stiffness
@@ -152,7 +152,7 @@ def _configurations(held: bool, places: tuple[float, ...], device: str) -> Confi
 
 
 def _study(device: str, recordings: list[Analysed], references: bool) -> Study:
-    known = Reference("Díaz and Gil (2010), Table IV", True, tuple(10 ** (d / 20) for d in SIX_DB))
+    known = KnownLimit("Díaz and Gil (2010), Table IV", True, tuple(10 ** (d / 20) for d in SIX_DB))
     return Study(
         "study",
         Path("study.toml"),

@@ -16,7 +16,7 @@ from bayeshaptic.inference.fit import REACH_SDS, Fit, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
-from bayeshaptic.inference.sampling.ensembles import LogDensity, warmed_up
+from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
 from bayeshaptic.inference.sampling.run import Run, run_until_done
@@ -27,7 +27,7 @@ from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.progress import told
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
-from bayeshaptic.types import Floats, Progress
+from bayeshaptic.types import Floats, LogDensity, Progress
 from bayeshaptic.version import __version__
 
 DEFAULT_ESS = 2000

@@ -30,7 +30,7 @@ from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import entry, explained
 from bayeshaptic.garbage import look_rarely
 
-Job = Callable[[Any], Any]
+Work = Callable[[Any], Any]
 
 _DIED = "a worker process died twice (out of memory, or killed)"
 
@@ -57,10 +57,10 @@ class Outcome:
     refused: bool = False
 
 
-Executor = Callable[[Job, Sequence[Any]], Iterator[Outcome]]
+Executor = Callable[[Work, Sequence[Any]], Iterator[Outcome]]
 
 
-def serial(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+def serial(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
     """Run one job after the other in this process."""
     for item in items:
         yield _attempt(job, item)
@@ -79,7 +79,7 @@ def processes(workers: int) -> Executor:
     Executor
     """
 
-    def run(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+    def run(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
         waiting = deque(items)
         while waiting:
             # What ran when a worker died is done once more, each alone: one of them may be why.
@@ -92,7 +92,7 @@ def processes(workers: int) -> Executor:
 
 
 def _until_a_worker_dies(
-    job: Job, waiting: deque[Any], workers: int
+    job: Work, waiting: deque[Any], workers: int
 ) -> Generator[Outcome, None, list[Any]]:
     """Take jobs from `waiting` and yield outcomes; hand back what ran when a worker died."""
     others = set(multiprocessing.active_children())
@@ -140,7 +140,7 @@ def futures(pool: concurrent.futures.Executor) -> Executor:
     Executor
     """
 
-    def run(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+    def run(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
         running = {pool.submit(_attempt, job, item): item for item in items}
         try:
             while running:
@@ -190,7 +190,7 @@ def dask(address: str) -> Executor:
     return partial(_on_dask, address)
 
 
-def _on_dask(address: str, job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+def _on_dask(address: str, job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
     import distributed
 
     try:
@@ -212,7 +212,7 @@ def _on_dask(address: str, job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
                 yield Outcome(submitted[future], error=describe(problem))
 
 
-def _local_dask(job: Job, items: Sequence[Any]) -> Iterator[Outcome]:
+def _local_dask(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
     import dask.config
     import distributed
 
@@ -256,7 +256,7 @@ def _in_one_line(message: Warning | str, category: type[Warning], *_: Any, **__:
     print(f"bayeshaptic: warning: {warned(message, category)}", file=sys.stderr)
 
 
-def _attempt(job: Job, item: Any) -> Outcome:
+def _attempt(job: Work, item: Any) -> Outcome:
     try:
         return Outcome(item, result=job(item))
     except Exception as error:

@@ -12,7 +12,7 @@ REFERENCE_KEYS = ("label", "held", "critical_stiffness", "critical_stiffness_db"
 
 
 @dataclass(frozen=True)
-class Reference:
+class KnownLimit:
     """Critical stiffnesses that somebody else found; they take no part in any analysis.
 
     Attributes
@@ -30,7 +30,7 @@ class Reference:
     critical_stiffness: tuple[float, ...]
 
 
-def read_references(content: object, path: object) -> tuple[Reference, ...]:
+def read_references(content: object, path: object) -> tuple[KnownLimit, ...]:
     """The ``[[reference]]`` tables of a study.
 
     Raises
@@ -45,7 +45,7 @@ def read_references(content: object, path: object) -> tuple[Reference, ...]:
     )
 
 
-def _reference(content: object, where: str) -> Reference:
+def _reference(content: object, where: str) -> KnownLimit:
     table = Table(content, where, known=REFERENCE_KEYS)
     label = table.text("label")
     if label is None:
@@ -64,7 +64,7 @@ def _reference(content: object, where: str) -> Reference:
         values = tuple(10 ** (value / 20) for value in values)
     if not all(value > 0 for value in values):
         raise table.wrong(given[0], "stiffnesses above zero")
-    return Reference(label, held, values)
+    return KnownLimit(label, held, values)
 
 
 def _numbers(table: Table, key: str) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.join import join_recordings
-from bayeshaptic.recordings.known_limits import Reference
+from bayeshaptic.recordings.known_limits import KnownLimit
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.read import Columns, Span
 from bayeshaptic.recordings.recording import Recording
@@ -69,7 +69,7 @@ class Study(Shown):
         Prior probabilities of effects that hide, by their names.
     entries : tuple of StudyEntry
     notices : tuple of Notice
-    references : tuple of Reference
+    references : tuple of KnownLimit
         Limits known from elsewhere, to compare with.
     feedback : Feedback or None
         The controller that was in the loop while all of them were made.
@@ -83,7 +83,7 @@ class Study(Shown):
     prior: Mapping[str, Mapping[str, float | bool]] = field(default_factory=dict)
     effects: Mapping[str, float] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
-    references: tuple[Reference, ...] = ()
+    references: tuple[KnownLimit, ...] = ()
     feedback: Feedback | None = None
 
     def _lines(self) -> tuple[str, ...]:

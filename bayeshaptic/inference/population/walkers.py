@@ -10,15 +10,14 @@ International Journal of Nonlinear Sciences and Numerical Simulation 10, 2009).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, LogDensity
 
-LogDensity = Callable[[Floats], Floats]
 EVERY = 5  # steps that are kept: neighbours are nearly the same
 
 

@@ -11,9 +11,8 @@ import numpy as np
 from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.numerics.mixture import StudentMixture, fit_student_mixture, student
 from bayeshaptic.numerics.straightening import Straightening, nothing_to_straighten, straighten
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, LogDensity
 
-LogDensity = Callable[[Floats], Floats]
 Move = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
 """From walkers (W, P) to proposed ones, with log density of proposing the way back over there."""
 ENSEMBLES = 4

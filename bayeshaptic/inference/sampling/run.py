@@ -14,7 +14,6 @@ from bayeshaptic.inference.sampling.ensembles import (
     ENSEMBLES,
     WALKERS,
     Ensembles,
-    LogDensity,
     Proposal,
     refitted,
 )
@@ -22,7 +21,7 @@ from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.inference.stopping import Rule, Verdict
 from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.numerics.straightening import Straightening
-from bayeshaptic.types import Floats, Progress
+from bayeshaptic.types import Floats, LogDensity, Progress
 
 _FIRST_STEPS = 32
 _MIXED = 0.06  # effective draws a draw, an autocorrelation of 16 steps: below, a proposal is refit

@@ -22,11 +22,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index, delayed
 from bayeshaptic.models.response.filter import Filter
@@ -34,9 +32,7 @@ from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.sampled import fastest_pole, laurent, nodes_at
 from bayeshaptic.models.response.transfer import compliances
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate
-
-Floats = NDArray[Any]
-Complexes = NDArray[Any]
+from bayeshaptic.types import Bools, Complexes, Floats, Ints
 
 _ALIASES = 8  # on either side
 _MOST_ALONE = 3  # the nearest alias that a series begins with; those before are summed themselves
@@ -85,7 +81,7 @@ class Remainder:
 
         With a single link compiled.
         """
-        s = 1j * omega[:, None]
+        s: Complexes = np.multiply(1j, omega[:, None])
         if len(self.links) > 1:
             return self.at(s)
         from bayeshaptic.models.response.kernels.remainder import add_link
@@ -168,7 +164,7 @@ def aliases(
     return Aliases(inverse @ sums, top)
 
 
-def smooth_aliases(fastest: Floats, top: float) -> NDArray[np.bool_]:
+def smooth_aliases(fastest: Floats, top: float) -> Bools:
     """Where they are so up to the angle `top`, for mechanisms with |p T| <= `fastest`."""
     return fastest + top < _REACH
 
@@ -206,7 +202,7 @@ def _shared_alias_sums(
     return np.einsum("kb,klb->lb", turned, values.reshape(len(k), len(theta), values.shape[-1]))
 
 
-def _numbers(nearest: int, furthest: int) -> NDArray[np.int_]:
+def _numbers(nearest: int, furthest: int) -> Ints:
     """Of the aliases on both sides."""
     return np.r_[-furthest : 1 - nearest, nearest : furthest + 1]
 
@@ -215,7 +211,8 @@ def _numbers(nearest: int, furthest: int) -> NDArray[np.int_]:
 def _chebyshev_nodes() -> tuple[Floats, Floats]:
     """Nodes in [-1, 1], and the matrix from values there to coefficients."""
     x = chebyshev.chebpts1(_TERMS)
-    return x, np.linalg.inv(chebyshev.chebvander(x, _TERMS - 1))
+    matrix = np.asarray(np.linalg.inv(chebyshev.chebvander(x, _TERMS - 1)), float)
+    return x, matrix
 
 
 def sampled_remainder(
@@ -223,9 +220,10 @@ def sampled_remainder(
 ) -> Complexes:
     """Delta G at frequencies of shape (L,), with hold and delay; shape (B, L)."""
     nodes = nodes_at(frequency_hz, period_s)
-    theta = nodes.s.imag * period_s
+    omega = np.asarray(nodes.s.imag, float)
+    theta = omega * period_s
     s = nodes.s[:, None]
-    total = remainder.on_axis(nodes.s.imag) / s
+    total: Complexes = remainder.on_axis(omega) / s
     top = float(np.max(theta))
     fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
     few = len(theta) <= _TERMS

@@ -19,8 +19,8 @@ import numpy as np
 from bayeshaptic.numerics.polynomial import Polynomial, add, multiply
 
 GROUND = -1
-Pair = tuple[int, int]
-Edges = Mapping[Pair, Polynomial]
+Edge = tuple[int, int]
+Edges = Mapping[Edge, Polynomial]
 """Two nodes, the smaller first, to the dynamic stiffness between them."""
 P = TypeVar("P")
 
@@ -38,8 +38,8 @@ NUMBERS: Algebra[Any] = Algebra(np.ones((1, 1)), add, multiply)
 
 
 def with_edge(
-    edges: Mapping[Pair, P], first: int, second: int, stiffness: P, algebra: Algebra[P] = NUMBERS
-) -> Mapping[Pair, P]:
+    edges: Mapping[Edge, P], first: int, second: int, stiffness: P, algebra: Algebra[P] = NUMBERS
+) -> Mapping[Edge, P]:
     """`edges` and one more, beside what joins the two nodes already."""
     pair = (min(first, second), max(first, second))
     known = edges.get(pair)
@@ -47,11 +47,11 @@ def with_edge(
 
 
 def merged(
-    edges: Mapping[Pair, P], nodes: tuple[int, ...], algebra: Algebra[P] = NUMBERS
-) -> Mapping[Pair, P]:
+    edges: Mapping[Edge, P], nodes: tuple[int, ...], algebra: Algebra[P] = NUMBERS
+) -> Mapping[Edge, P]:
     """The network with some nodes made one, which goes by the name of the smallest of them."""
     keep = min(nodes)
-    out: Mapping[Pair, P] = {}
+    out: Mapping[Edge, P] = {}
     for (i, j), stiffness in edges.items():
         i, j = keep if i in nodes else i, keep if j in nodes else j
         if i != j:
@@ -59,7 +59,7 @@ def merged(
     return out
 
 
-def spanning_trees(edges: Mapping[Pair, P], algebra: Algebra[P] = NUMBERS) -> P:
+def spanning_trees(edges: Mapping[Edge, P], algebra: Algebra[P] = NUMBERS) -> P:
     """The sum over all spanning trees of the products of their edges.
 
     Node by node, that with the fewest neighbours first: the trees in which it has exactly certain

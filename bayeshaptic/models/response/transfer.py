@@ -17,7 +17,7 @@ from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.spanning import (
     GROUND,
     Algebra,
-    Pair,
+    Edge,
     merged,
     spanning_trees,
     with_edge,
@@ -49,7 +49,7 @@ class Record:
         The numbers of what is asked for.
     """
 
-    edges: Mapping[Pair, int]
+    edges: Mapping[Edge, int]
     steps: Ints
     lengths: Ints
     wanted: Ints
@@ -103,7 +103,7 @@ def compliances(
     return numerators, denominator
 
 
-def _parts(first: Pair, second: Pair) -> dict[Pair, float]:
+def _parts(first: Edge, second: Edge) -> dict[Edge, float]:
     """Which nodes are made one for a compliance, and with which factor; see `Mechanism.mutual`."""
     (i, j), (k, m) = first, second
     if (i, j) == (k, m):
@@ -112,7 +112,7 @@ def _parts(first: Pair, second: Pair) -> dict[Pair, float]:
     return {pair: sign for pair, sign in signs.items() if pair[0] != pair[1]}
 
 
-def _trees(mechanism: Mechanism, merges: tuple[Pair, ...]) -> list[Floats]:
+def _trees(mechanism: Mechanism, merges: tuple[Edge, ...]) -> list[Floats]:
     """The sum over the spanning trees with each pair of nodes made one, (B, degree + 1) each."""
     from bayeshaptic.models.response.kernels.transfer import run
 
@@ -132,14 +132,14 @@ def _trees(mechanism: Mechanism, merges: tuple[Pair, ...]) -> list[Floats]:
 
 
 @lru_cache(maxsize=256)
-def recorded(masses: int, links: tuple[Pair, ...], merges: tuple[Pair, ...]) -> Record:
+def recorded(masses: int, links: tuple[Edge, ...], merges: tuple[Edge, ...]) -> Record:
     """The record for an arrangement of masses and links, GROUND being one of the nodes."""
     ends = {(GROUND, mass): True for mass in range(masses)}
     for i, j in links:
         ends.setdefault((min(i, j), max(i, j)), False)
     recorder = _Recorder([1, *(_EDGE if heavy else 2 for heavy in ends.values())])
     algebra = Algebra(0, recorder.add, recorder.multiply)
-    edges: Mapping[Pair, int] = {}
+    edges: Mapping[Edge, int] = {}
     for number, (i, j) in enumerate(ends):
         edges = with_edge(edges, i, j, number + 1, algebra)
     wanted = [spanning_trees(merged(edges, pair, algebra), algebra) for pair in merges]
@@ -152,7 +152,7 @@ def recorded(masses: int, links: tuple[Pair, ...], merges: tuple[Pair, ...]) -> 
     )
 
 
-def _ends(pair: Mass) -> Pair:
+def _ends(pair: Mass) -> Edge:
     return _node(pair[0]), _node(pair[1])
 
 

@@ -15,7 +15,7 @@ BLOCKS = 10  # of the jackknife
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SegmentFit:
     """Of one set of segments: what the jackknife repeats."""
 
     frequency_hz: float
@@ -25,7 +25,7 @@ class Estimate:
     critical: float
 
 
-def estimate(spectra: PieceSpectra, order: int) -> Estimate:
+def estimate(spectra: PieceSpectra, order: int) -> SegmentFit:
     """U = D Y around the oscillation by least squares, D a polynomial; its value and crossing.
 
     The dynamic stiffness D = 1/G is smooth where G has a resonance.
@@ -42,7 +42,7 @@ def estimate(spectra: PieceSpectra, order: int) -> Estimate:
     here = stiffness[-1]
     root = _nearest_root(np.asarray(stiffness.imag, float))
     critical = -np.polyval(stiffness.real, root) if abs(root) < np.inf else np.nan
-    return Estimate(
+    return SegmentFit(
         centre,
         float(abs(here)),
         float(np.degrees(np.angle(-1 / here))),
@@ -58,13 +58,13 @@ def _nearest_root(coefficients: Floats) -> float:
     return float(real[np.argmin(np.abs(real))]) if len(real) else np.inf
 
 
-def jackknife(spectra: PieceSpectra, whole: Estimate) -> dict[str, float]:
+def jackknife(spectra: PieceSpectra, whole: SegmentFit) -> dict[str, float]:
     """Standard deviations: of the frequency in Hz, of the stiffnesses' logarithms."""
     count = len(spectra.force)
     blocks = np.array_split(np.arange(count), min(BLOCKS, count))
     without = [estimate(spectra.only(np.setdiff1d(np.arange(count), block)), 2) for block in blocks]
 
-    def spread(read: Callable[[Estimate], Any]) -> float:
+    def spread(read: Callable[[SegmentFit], Any]) -> float:
         values = np.array([read(estimate) for estimate in without], float)
         scatter = ((values - values.mean()) ** 2).sum()
         return float(np.sqrt((len(blocks) - 1) / len(blocks) * scatter))

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.stability.responses.grid import LOWEST
 from bayeshaptic.stability.responses.response import Response
-from bayeshaptic.types import Complexes, Floats
-
-Rows = NDArray[np.int_]
+from bayeshaptic.types import Complexes, Floats, Ints
 
 
 class EvaluableSystem(Protocol):
@@ -24,7 +22,7 @@ class EvaluableSystem(Protocol):
     @property
     def delay_s(self) -> Floats: ...
 
-    def rows(self, index: Rows) -> Self: ...
+    def rows(self, index: Ints) -> Self: ...
 
     def sampled_response(self, frequency_hz: Floats, period_s: float) -> Complexes: ...
 
@@ -56,7 +54,7 @@ class EvaluatedResponse:
     def features(self) -> Complexes:
         return np.zeros((self.system.batch, 0), complex)
 
-    def at(self, rows: Rows, theta: Floats) -> Complexes:
+    def at(self, rows: Ints, theta: Floats) -> Complexes:
         if len(rows) > 1 and np.all(theta == theta[0]):
             return self._evaluate(rows, theta[0])
         out = np.empty(theta.shape, complex)
@@ -66,7 +64,7 @@ class EvaluatedResponse:
             out[mine] = response.reshape(len(mine), -1)
         return out
 
-    def _evaluate(self, rows: Rows, theta: Floats) -> Complexes:
+    def _evaluate(self, rows: Ints, theta: Floats) -> Complexes:
         frequency = theta / (2 * np.pi * self.period_s)
         system = self.system.rows(rows)
         if self.exact:

@@ -7,10 +7,8 @@ It is that of the rational part, from its poles, and what the links add: see
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.models.response.remainder import (
     Aliases,
@@ -23,10 +21,7 @@ from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.stability.responses.evaluated import ends, held_at_rest
 from bayeshaptic.stability.responses.grid import search_grid
 from bayeshaptic.stability.responses.response import PoleResponse, pole_response
-
-Floats = NDArray[Any]
-Complexes = NDArray[Any]
-Rows = NDArray[np.int_]
+from bayeshaptic.types import Bools, Complexes, Floats, Ints
 
 _BEYOND = np.geomspace(np.pi, 100 * np.pi, 60)  # angles above the grid's last one
 
@@ -51,7 +46,7 @@ class LinkedResponse:
     rational: PoleResponse
     remainder: Remainder
     aliases: Aliases
-    rough: NDArray[np.bool_]
+    rough: Bools
     delay: Floats
     period_s: float
     log_points: int = 250
@@ -60,12 +55,12 @@ class LinkedResponse:
     def features(self) -> Complexes:
         return self.rational.features
 
-    def at(self, rows: Rows, theta: Floats) -> Complexes:
+    def at(self, rows: Ints, theta: Floats) -> Complexes:
         return self.rational.at(rows, theta) + self._added(rows, theta.T).T
 
-    def _added(self, rows: Rows, theta: Floats) -> Complexes:
+    def _added(self, rows: Ints, theta: Floats) -> Complexes:
         """What the links add at angles of shape (k, M)."""
-        s = 1j * theta / self.period_s
+        s: Complexes = np.divide(1j * theta, self.period_s)
         part = self.remainder.rows(rows)
         late = np.exp(-1j * theta * self.delay[rows])
         if not self.rational.exact:
@@ -81,7 +76,7 @@ class LinkedResponse:
     def at_ends(self) -> tuple[Floats, Floats]:
         return ends(self, self.rational.exact)
 
-    def stable_at_rest(self) -> NDArray[np.bool_]:
+    def stable_at_rest(self) -> Bools:
         """As for the rational part, and no pole to the right of the imaginary axis by the links.
 
         Their number is how often the return difference 1 + lambda h_ee goes round the origin.

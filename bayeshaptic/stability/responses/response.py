@@ -24,9 +24,7 @@ from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.models.response.transfer import transfer
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.numerics.polynomial import Polynomial
-from bayeshaptic.types import Complexes, Floats
-
-Rows = NDArray[np.int_]
+from bayeshaptic.types import Complexes, Floats, Ints
 
 
 class Response(Protocol):
@@ -51,7 +49,7 @@ class Response(Protocol):
     @property
     def log_points(self) -> int: ...
 
-    def at(self, rows: Rows, theta: Floats) -> Complexes:
+    def at(self, rows: Ints, theta: Floats) -> Complexes:
         """Values of rows (M,) at angles (M, k), shape (M, k)."""
 
     def at_ends(self) -> tuple[Floats, Floats]:
@@ -95,10 +93,10 @@ class PoleResponse:
     def features(self) -> Complexes:
         return self.poles
 
-    def at(self, rows: Rows, theta: Floats) -> Complexes:
+    def at(self, rows: Ints, theta: Floats) -> Complexes:
         return self.terms(rows, theta).sum(axis=0)
 
-    def terms(self, rows: Rows, theta: Floats) -> Complexes:
+    def terms(self, rows: Ints, theta: Floats) -> Complexes:
         """The contribution of each pole, shape (n, M, k)."""
         half = np.exp(0.5j * theta)
         back = np.conj(half) ** 2
