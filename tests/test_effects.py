@@ -10,7 +10,7 @@ from effect_cases import CASES, Case, base_fit, recorded
 
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.inference.least_squares import least_squares, refine_anew
 from bayeshaptic.inference.saved.archive import model_from_dict, model_to_dict
 from bayeshaptic.inference.screening import promising_starts
 from bayeshaptic.rig.truth import sampled_loop
@@ -70,7 +70,9 @@ def fit_with_effect(case: Case, bases: np.ndarray, keep: int) -> Fit:
     etfe, before, effect = recorded(case), base_fit(case), case.effect
     own = effect.starting_values(before.model, etfe)
     starts = promising_starts(before.model, effect, before.windows, bases, own, keep)
-    return least_squares(before.model.with_effect(effect), etfe, start=starts)
+    model = before.model.with_effect(effect)
+    first = refine_anew(model, etfe, before.windows, starts)
+    return least_squares(model, etfe, start=first.theta)
 
 
 @every_case

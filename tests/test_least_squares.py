@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_bench import LHIFAM_FREE, Device
 
-from bayeshaptic.inference.least_squares import _other_valleys, _valleys, least_squares
+from bayeshaptic.inference.least_squares import _other_valleys, least_squares
 from bayeshaptic.models import LogNormal, free, grasped, rigid
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
 from bayeshaptic.numerics.truncated_normal import moments_above
@@ -205,30 +205,6 @@ def test_moments_of_two_truncated_normals():
     draws = draws[np.all(draws > 0, axis=1)]
     assert found == pytest.approx(draws.mean(axis=0), abs=5 * draws.std() / np.sqrt(2000))
     assert spread == pytest.approx(np.cov(draws.T), rel=0.2)
-
-
-def test_every_stratum_of_starts_has_its_chance():
-    """Many starts in a shallow valley cost less than the few from which the deep one is reached."""
-
-    def residuals(phi):
-        wide = np.sqrt(1 + (phi[:, 0] / 8) ** 2)
-        narrow = 1 - 1 / (1 + (20 * (phi[:, 0] - 3)) ** 2)
-        return np.stack([wide * narrow, 0.05 * phi[:, 1]], axis=1)
-
-    many = np.stack([np.linspace(-0.2, 0.2, 60), np.zeros(60)], axis=1)
-    few = np.array([[3.04, 30.0]])
-    phi = np.concatenate([many, few])
-    low, high = np.full(2, -50.0), np.full(2, 50.0)
-    strata = np.array([0] * 60 + [1])
-
-    def converged(strata):
-        ended, _ = _valleys(residuals, phi, low, high, strata)
-        return minimise(residuals, ended, low, high, steps=100, tolerance=1e-6)
-
-    _, sifted = converged(None)
-    found, cost = converged(strata)
-    assert cost.min() < 1e-6 < sifted.min()
-    assert found[np.argmin(cost), 0] == pytest.approx(3.0, abs=1e-3)
 
 
 def test_valleys_where_several_starts_end_are_kept_beside_the_best():

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.inference.fit import (
+    MISFIT,
     Fit,
     search_box,
     summarise,
@@ -117,16 +117,16 @@ class Optimum:
         How many of those refined to the end found the same optimum.
     elsewhere : ndarray, shape (V, P)
         The best points of the other valleys in which several ended, that with most of them first.
+    reduced_chi_square : float
     """
 
     theta: Floats
     agreeing: int
     elsewhere: Floats
+    reduced_chi_square: float
 
 
-def refine(
-    model: Model, windows: Windows, start: Floats, strata: NDArray[np.int_] | None = None
-) -> Optimum:
+def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
     """The best fit to `windows` from many starting vectors, shape (S, P).
 
     Of the optima found, that with the highest posterior density: masses may swap their parts in
@@ -143,12 +143,28 @@ def refine(
     def penalty(phi: Floats) -> Floats:
         return -model.log_prior(here.natural(phi)) - here.log_jacobian(phi)
 
-    phi, cost = _valleys(residuals, phi, low, high, strata)
+    phi, cost = _valleys(residuals, phi, low, high)
     elsewhere = here.natural(_other_valleys(phi, cost))
     phi = phi[np.argsort(cost + penalty(phi))[:_REFINED]]
     phi, cost = minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
     best = np.argmin(cost + penalty(phi))
-    return Optimum(here.natural(phi)[best], int(np.sum(cost < cost[best] + 0.5)), elsewhere)
+    agreeing = int(np.sum(cost < cost[best] + 0.5))
+    left = float(cost[best] / windows.target.size)
+    return Optimum(here.natural(phi)[best], agreeing, elsewhere, left)
+
+
+def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Optimum:
+    """`refine`, and from starting points of the model's own where what is left is not noise.
+
+    A fit without an effect may be bent so far that no value of the effect beside it leads on.  Of a
+    second mode on the motor of a held LHIfAM without a device file none of ten fits did; starting
+    points that no fit has bent led there in nine of ten.  Both in one set crowd each other out.
+    """
+    found = refine(model, windows, start)
+    if found.reduced_chi_square <= MISFIT:
+        return found
+    other = refine(model, windows, starting_points(model, etfe, np.random.default_rng(0)))
+    return min(found, other, key=lambda one: one.reduced_chi_square)
 
 
 def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
@@ -160,22 +176,12 @@ def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
 
 
 def _valleys(
-    residuals: Callable[[Floats], Floats],
-    phi: Floats,
-    low: Floats,
-    high: Floats,
-    strata: NDArray[np.int_] | None,
+    residuals: Callable[[Floats], Floats], phi: Floats, low: Floats, high: Floats
 ) -> tuple[Floats, Floats]:
     """Sift the starting points and lead the better ones into their valleys."""
     with np.errstate(all="ignore"):
         cost = np.einsum("bn,bn->b", *(2 * [residuals(phi)]))
     order = np.argsort(np.where(np.isfinite(cost), cost, np.inf))
-    if strata is not None:
-        # Far from the optimum the cost says little: each stratum has its chance of a few steps.
-        _, first = np.unique(strata[order], return_index=True)
-        phi = phi[order[np.sort(first)]]
-        phi, cost = minimise(residuals, phi, low, high, steps=5, tolerance=1e-2)
-        order = np.argsort(cost)
     phi = phi[order[:_KEPT_STARTS]]
     return minimise(residuals, phi, low, high, _STEPS_TO_A_VALLEY, tolerance=1e-2)
 

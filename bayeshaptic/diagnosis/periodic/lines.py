@@ -34,7 +34,7 @@ from bayeshaptic.diagnosis.trials.linear import sieve
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.inference.least_squares import least_squares, refine
+from bayeshaptic.inference.least_squares import least_squares, refine_anew
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
@@ -158,7 +158,7 @@ class LineTrials:
     ) -> Trial:
         part = state.part
         model = part.model.with_effect(effect)
-        theta = refine(model, rest, starts).theta
+        theta = refine_anew(model, self.etfe, rest, starts).theta
         tried = self._balance(model, part.forces, theta, part.strength)
         names = tuple(p.name for p in effect.parameters)
         accepted = Accepted(

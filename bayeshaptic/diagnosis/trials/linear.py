@@ -26,7 +26,7 @@ from bayeshaptic.diagnosis.state import (
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.fit import search_box, weighted_residuals
-from bayeshaptic.inference.least_squares import least_squares, refine
+from bayeshaptic.inference.least_squares import Optimum, least_squares, refine, refine_anew
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.screening import promising_starts, starting_bases
 from bayeshaptic.models import Model
@@ -86,7 +86,9 @@ def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[
     affords = [meter.affords(one.title) for one in linear_candidates(state.model, state.etfe)]
     if not all(affords):
         return []  # not even sieved
-    theta, windows = _fit_part(state.model, state.etfe, state.fit.windows, state.fit.theta[None])
+    whole, start = state.fit.windows, state.fit.theta[None]
+    first = refine(state.model, whole.part(share(whole, FIT)), start)
+    theta, windows = _around(state.model, state.etfe, first)
     base = log_likelihoods(state.model, windows, theta)
     bases = starting_bases(state.model, state.fit.theta, state.fit.elsewhere)
     found = sieve(state.model, state.etfe, windows.part(share(windows, FIT)), bases)
@@ -140,7 +142,8 @@ def _try(state: State, windows: Windows, one: Sieved, base: Floats, followed: bo
     effect, model = one.effect, state.model.with_effect(one.effect)
     theta = one.starts[0]
     if followed:
-        theta, windows = _fit_part(model, state.etfe, windows, one.starts)
+        first = refine_anew(model, state.etfe, windows.part(share(windows, FIT)), one.starts)
+        theta, windows = _around(model, state.etfe, first)
     gain_fit, gain_choose = (log_likelihoods(model, windows, theta) - base).tolist()
     accepted = Accepted(
         effect.name,
@@ -158,8 +161,7 @@ def _try(state: State, windows: Windows, one: Sieved, base: Floats, followed: bo
     return Trial(accepted, changed, gain_fit, gain_choose if followed else 0.0, size)
 
 
-def _fit_part(model: Model, etfe: Etfe, windows: Windows, starts: Floats) -> tuple[Floats, Windows]:
-    """Fit the windows to fit by, twice: the second time compressed around the first fit."""
-    theta = refine(model, windows.part(share(windows, FIT)), starts).theta
-    windows = compress(etfe, partial(model.response, theta))
-    return fit_part(model, windows, theta), windows
+def _around(model: Model, etfe: Etfe, first: Optimum) -> tuple[Floats, Windows]:
+    """The fit to the windows to fit by once more, compressed around the first one."""
+    windows = compress(etfe, partial(model.response, first.theta))
+    return fit_part(model, windows, first.theta), windows
