@@ -154,6 +154,15 @@ def _check(name: str, value: Any, annotation: str, names: Names) -> None:
             _check_bounds(name, value)
         return
     hints = [hint for part in parts if (hint := _hint(part))]
+    for part in parts:  # one of a mapping's values, where it is a mapping
+        if part.startswith("Mapping[") and isinstance(value, Mapping):
+            within = _split(part[len("Mapping[") : -1], ", ")[1]
+            name, value = next(
+                (f"{name}[{shown(key)}]", one)
+                for key, one in value.items()
+                if not _any(one, within, names)
+            )
+            hints = [_plain_word(within)]
     raise InputError(f"{name} is {shown(value)}; give {' or '.join(dict.fromkeys(hints))}")
 
 
@@ -247,6 +256,9 @@ _SAID = {
     "ArrayLike": "numbers",
     "Floats": "an array of numbers",
     "Progress": "a function of the share done and a word",
+    "Columns": "a text or mapping, as in 'time=t,force=u[N],position=q[mm]'",
+    "Span": "two numbers, of which one may be None",
+    "Executor": "one of bayeshaptic.jobs.executors",
 }
 
 

@@ -112,6 +112,10 @@ WARNED = {
         changed(position=np.round(held().position / 3.14e-6)),
         "units",
     ),
+    "forces are whole numbers, from -[0-9]+ to .* N: are they counts": (
+        changed(force=np.round(100 * held().force), position=100 * held().position),
+        "units",
+    ),
     "hardly answers to the force": (changed(force=held().force[::-1]), "coherence"),
     "recorded one sample early": (
         changed(force=held().force[:-1], position=held().position[1:]),

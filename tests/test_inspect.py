@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from test_readers import WRITERS, mapping_of
 
 from bayeshaptic import cli
+from bayeshaptic.commands.inspect import lines
 from bayeshaptic.recordings import read_recording, read_study
 from bayeshaptic.recordings.overview import overview
 
@@ -76,15 +78,36 @@ def test_a_study_is_written_with_what_a_person_says(
     rng = np.random.default_rng(1)
     table = np.column_stack([1e-3 * np.arange(99), rng.normal(size=(99, 2)).cumsum(axis=0)])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,iq,enc", comments="")
-    answers = iter(["", "nothing", "iq*2.1[N]", "enc*1e-6[m]"])
+    answers = iter(["", "nothing", "iq[m]", "iq*2.1[Nm]", "iq", "enc*1e-6[rad]"])
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     monkeypatch.setattr("builtins.input", lambda _: next(answers))
     study = tmp_path / "s.toml"
     assert cli.main(["inspect", str(tmp_path / "a.csv"), "--write", str(study)]) == 0
-    assert 'columns = "time=t,force=iq*2.1[N],position=enc*1e-6[m]"' in study.read_text()
-    assert "no column 'nothing'" in capsys.readouterr().out
-    assert read_study(study).read_all()[0].force_unit == "N"
+    assert 'columns = "time=t,force=iq*2.1[Nm],position=enc*1e-6[rad]"' in study.read_text()
+    out = capsys.readouterr().out
+    for reply in ("no column 'nothing'", "'m' is no unit of force", "has a role already"):
+        assert reply in out
+    assert read_study(study).read_all()[0].kind == "rotational"  # as the units say
+    study.unlink()
+    monkeypatch.setattr("builtins.input", nobody)
+    assert cli.main(["inspect", str(tmp_path / "a.csv"), "--write", str(study)]) == 2
+    assert "nothing was written" in capsys.readouterr().err and not study.exists()
+
+
+def nobody(_: str) -> str:
+    raise EOFError
+
+
+def test_the_line_survives_a_shell_and_stamps_may_jitter(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    stamps = 1e-3 * (np.arange(N) + 0.2 * rng.normal(size=N))
+    path = tmp_path / "a.npz"
+    np.savez(path, **{"time": stamps, '"Root"/"$u"': FORCE, '"Root"/"theta"': POSITION})
+    found = overview(path)
+    assert found.roles["time"] == "time"
+    words = shlex.split(lines(found)[-1])
+    assert words == ["--columns", found.mapping]
 
 
 @pytest.mark.parametrize("name", ["dspace.mat", "dspace73.mat"])

@@ -7,7 +7,9 @@ import io
 import math
 import os
 import re
+import struct
 import zipfile
+import zlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -29,6 +31,7 @@ from bayeshaptic.recordings import (
 from bayeshaptic.recordings import readers as registry
 from bayeshaptic.recordings.columns import parse_columns
 from bayeshaptic.recordings.readers import apart
+from bayeshaptic.recordings.readers.matlab_sizes import refuse_sizes
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -228,6 +231,42 @@ def test_damaged_and_empty_files(tmp_path: Path, name: str) -> None:
             read_recording(tmp_path / name, mapping_of(name))
 
 
+def element(kind: int, content: bytes, claims: int | None = None) -> bytes:
+    """A data element of a MAT file, version 5, as long as it is or as it `claims`."""
+    size = len(content) if claims is None else claims
+    return struct.pack("<II", kind, size) + content + bytes(-len(content) % 8)
+
+
+def matrix(kind: int, rows: int, content: bytes = b"") -> bytes:
+    head = element(6, struct.pack("<II", kind, 0)) + element(5, struct.pack("<ii", rows, 1))
+    return element(14, head + element(1, b"") + content)
+
+
+CLAIMS = {
+    "claims 2147483647 numbers": matrix(4, 2**31 - 1, element(4, b"")),  # a text
+    "claims 320000000 bytes where at most 0": matrix(1, 40_000_000),  # a cell
+    "claims 4294967280 bytes where at most 8": matrix(6, 1, element(9, bytes(8), 2**32 - 16)),
+}
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_sizes_are_looked_at_before_memory_is_taken(
+    tmp_path: Path, claim: str, packed: bool
+) -> None:
+    """Claims of a MAT file at any depth: here of what is in a cell."""
+    content = matrix(1, 1, CLAIMS[claim])
+    if packed:
+        content = element(15, zlib.compress(content))
+    path = tmp_path / "a.mat"
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 256) + b"IM"
+    path.write_bytes(head + content)
+    with pytest.raises(InputError, match=claim):
+        refuse_sizes(path)
+    with pytest.raises(InputError, match=claim):
+        read_recording(path, MAPPING)
+
+
 def test_default_headers(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     for header, units in {
@@ -285,6 +324,16 @@ def test_columns_without_a_header(tmp_path: Path) -> None:
     assert recording.period_s == 1e-3
     assert recording.force.tolist() == [3.0, -5.0, 20.0]
     np.testing.assert_allclose(recording.position, [2e-3, 3e-3, 4e-3])
+
+
+def test_a_force_that_is_called_volts(tmp_path: Path) -> None:
+    write_csv(tmp_path / "a.csv", "t,u_V,q")
+    mapping = "time=t,force=u_V{},position=q"
+    notices = read_recording(tmp_path / "a.csv", mapping.format("")).notices
+    assert [n.level for n in notices if "'u_V', says volts" in n.text] == ["warning"]
+    for term in ("*0.3[N]", "*0.3", "[N]"):
+        notices = read_recording(tmp_path / "a.csv", mapping.format(term)).notices
+        assert not any(n.level == "warning" for n in notices)
 
 
 WRONG_CSV = {

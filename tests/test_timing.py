@@ -66,6 +66,7 @@ WRONG = {
     "the time in row 4 is nan": replaced(3, np.nan),
     "not even: they vary by 58 %": np.cumsum(1e-3 * RNG.uniform(1e-3, 2, size=N)),
     "they vary by 20 %": np.cumsum(1e-3 + 2e-4 * np.clip(RNG.normal(size=N), -4, 4)),
+    "they vary by 28 %": EVEN + 2e-4 * RNG.normal(size=N),  # some stamps run back
     "not even": np.concatenate([EVEN, EVEN[-1] + 2 * EVEN[1:]]),
     "2 time stamps; a period needs at least 3": EVEN[:2],
 }

@@ -84,8 +84,8 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: bh.Options(prior={"m1": (0.1, 0.2)}), "prior is of type dict; give a mapping"),
-        (lambda: bh.free(prior={"m1": (0.1, 0.2)}), "a mapping of names to a Prior"),
+        (lambda: bh.Options(prior={"m1": (0.1, 0.2)}), "prior['m1'] is (0.1, 0.2); give a Prior"),
+        (lambda: bh.free(prior={"m1": (0.1, 0.2)}), "give a Prior (see bayeshaptic.LogNormal)"),
         (lambda: bh.Options(prior=[1]), "prior is"),
         (lambda: bh.Normal(np.nan, 1), "mean is nan; give a number"),
         (lambda: bh.Normal("0", 1), "mean is '0'; give a number"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,14 +68,15 @@ def lines(found: Overview) -> list[str]:
 
     roles = {name: role for role, name in found.roles.items()}
     shown = found.columns[:_MOST_COLUMNS]
-    width = max((len(printable(one.name)) for one in shown), default=4)
-    table = [f"{'name':{width}}  samples         low to high       resolution"]
+    width = max(len("name"), *(len(printable(one.name)) for one in shown))
+    table = [f"{'name':{width}}  samples  {'low to high':^24}  resolution"]
     for one in shown:
         step = f"{one.resolution:.4g}" if one.resolution else "-"
         rate = f"  every {one.period:.6g}" if one.period else ""
         picture = "" if one.period else f"  {_sparkline(found.arrays[one.name])}"
         role = f"  {roles[one.name]}?" if one.name in roles else ""
         name, span = printable(one.name), f"{one.low:10.4g} to {one.high:<10.4g}"
+        span = f"{'-':^24}" if one.low != one.low else span
         table.append(f"{name:{width}}  {one.samples:7d}  {span}  {step:>10}{rate}{picture}{role}")
     if len(found.columns) > len(shown):
         table.append(f"and {len(found.columns) - len(shown)} more")
@@ -85,25 +87,36 @@ def lines(found: Overview) -> list[str]:
     if found.mapping is None:
         table.append("no force and position were recognised; name them with --columns")
     else:
-        table.append(f'--columns "{printable(found.mapping)}"')
+        table.append(f"--columns {_quoted(printable(found.mapping))}")
     return table
+
+
+def _quoted(text: str) -> str:
+    """For a shell: in double quotes, which all know, or in single ones where they stand in it."""
+    return shlex.quote(text) if set(text) & set('"$`\\!') else f'"{text}"'
 
 
 def asked(found: Overview) -> str:
     """The mapping as somebody at the terminal wants it: a line each, empty for the guess."""
-    from bayeshaptic.recordings.columns import parse_columns, pick
+    from bayeshaptic.recordings.columns import parse_columns
+    from bayeshaptic.recordings.overview import unit_of
 
     guesses = dict(part.split("=", 1) for part in (found.mapping or "").split(",") if part)
     chosen = {}
     print("Which columns are these? NAME, NAME*FACTOR or NAME*FACTOR[UNIT]; empty for the guess.")
     for role in ("time", "force", "position"):
         while True:
-            answer = input(f"  {role} [{printable(guesses.get(role, '-'))}]: ").strip()
-            term = answer or guesses.get(role, "")
+            term = _answer(f"  {role} [{printable(guesses.get(role, '-'))}]: ")
+            term = term or guesses.get(role, "")
             if not term and role == "time":
                 break  # the period is given instead
             try:
-                pick(found.arrays, role, parse_columns({role: term}), found.path)
+                unit_of(found, role, term)
+                name, *others = (
+                    parse_columns({role: each})[role].names[-1] for each in (term, *chosen.values())
+                )
+                if name in others:
+                    raise InputError("this column has a role already")
             except InputError as error:
                 print(f"  {printable(str(error))}")
                 continue
@@ -112,15 +125,29 @@ def asked(found: Overview) -> str:
     return ",".join(f"{role}={term}" for role, term in chosen.items())
 
 
+def _answer(question: str) -> str:
+    try:
+        return input(question).strip()
+    except EOFError:
+        raise InputError("no answer; nothing was written") from None
+
+
 def study_text(found: Overview, path: Path, mapping: str | None) -> str:
     """A study with this one recording, its columns as in `mapping`."""
+    from bayeshaptic.recordings.overview import unit_of
+
+    terms = dict(part.split("=", 1) for part in (mapping or "").split(",") if part)
+    units = {unit_of(found, role, term) for role, term in terms.items() if role != "time"}
+    kind, other = "translational", "rotational"
+    if units & {"Nm", "rad"}:
+        kind, other = other, kind
     columns = mapping or "time=...,force=...,position=..."
     file = os.path.relpath(found.path.resolve(), path.resolve().parent).replace(os.sep, "/")
     return f"""\
 # A study: one device and all its recordings. See docs/file-formats.md.
 [device]
 name = "my device"
-kind = "translational"          # or "rotational"
+kind = {f'"{kind}"':24} # or "{other}"
 # delay_s = 200e-6              # loop delay beyond the hold
 # encoder_resolution = 3.14e-6  # one count, in m or rad
 # A guess: check the names, and write factors and units, as in position=enc*3.14e-6[m].

@@ -67,7 +67,9 @@ def measurement_of(measurement: Any, model: Any, options: Options) -> Recording 
         Where it is none, or cannot be read, or the model is none.
     """
     if isinstance(model, Recording | Etfe):
-        raise InputError("the measurement comes first: close_loop(recording, model).")
+        raise InputError(
+            "the measurement comes first, then the model: close_loop(recording, model)."
+        )
     instance("model", model, (str, Model), "its name, as in 'auto' or 'free', or a Model")
     if isinstance(measurement, str | Path):
         device = device_of(options, model)

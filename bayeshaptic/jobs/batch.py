@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import math
+import multiprocessing
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -143,6 +144,12 @@ def run_batch(
     InputError
         Where there is nothing to do, or no place to write.
     """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        # A worker that this very call is starting: it must end, and nobody catches anything there.
+        raise SystemExit(
+            "bayeshaptic: error: run_batch starts processes, which read this script anew: put the "
+            "call under if __name__ == '__main__':"
+        )
     folder = Path(out_dir).absolute()
     refuse_file(folder)
     settings = settings or Settings()

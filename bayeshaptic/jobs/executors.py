@@ -29,9 +29,16 @@ from typing import Any
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import entry, explained
 from bayeshaptic.garbage import look_rarely
+from bayeshaptic.threads import THREADS
 
 Work = Callable[[Any], Any]
 
+# Dask asks for memory to be handed back at once (MALLOC_TRIM_THRESHOLD_), which makes every larger
+# array a system call, and reports cost two thirds more; it also keeps statistics that nobody reads.
+_CHEAPER = {
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(THREADS, 1),
+    "distributed.worker.profile.enabled": False,
+}
 _DIED = "a worker process died twice (out of memory, or killed)"
 
 
@@ -217,9 +224,8 @@ def _local_dask(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
     import distributed
 
     others = set(multiprocessing.active_children())
-    # Nobody looks at its statistics of where time goes, which cost some.
     with (
-        dask.config.set({"distributed.worker.profile.enabled": False}),
+        dask.config.set(_CHEAPER),
         distributed.LocalCluster(
             n_workers=usable_cores(),
             threads_per_worker=1,

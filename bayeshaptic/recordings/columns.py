@@ -210,7 +210,8 @@ def pick(
             return None
         raise InputError(
             f"{path}: no column for the {role} ({' or '.join(DEFAULT_HEADERS[role])}); "
-            f"the file has {listing(arrays)}; name what to use, as in --columns {_EXAMPLE}"
+            f"the file has {listing(arrays)}; name what to use, as in --columns {_EXAMPLE} "
+            f"(bayeshaptic inspect FILE suggests it)"
             + (", or give the sampling period with --period-s" if role == "time" else "")
         )
     column = mapping[role]

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.recordings.columns import DEFAULT_HEADERS, name_and_unit
+from bayeshaptic.recordings.columns import DEFAULT_HEADERS, name_and_unit, parse_columns, pick
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.units import base_unit
 
 # Words that names of such signals have, in the order in which they are believed.
 _WORDS = {
@@ -25,9 +26,14 @@ _WORDS = {
     "force": r"force|torque|kraft|moment|current|strom|^u$|tau|^f$|^i$|iq|cmd|command|volt|^vir",
     "position": r"pos|angle|winkel|weg|theta|^q|^y$|^x$|enc|phi|displ",
 }
+# What they are measured in, by such words.
+_UNITS = {
+    "force": {"Nm": r"torque|moment", "A": r"current|strom|^i$|iq", "N": r"force|kraft|^f$"},
+    "position": {"rad": r"angle|winkel|theta|phi", "m": r"pos|weg|displ|^x$"},
+}
 # Behind these a signal is not what was commanded, or not a position.
 _OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$"
-_EVEN = 0.25  # of the period: time stamps that vary by more are none
+_EVEN = 0.25  # of the period: what varies by more is time only by its name
 _MOST_ROWS = 500_000  # that are looked at
 
 
@@ -110,7 +116,8 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
         return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
     steps = np.diff(signal)
     step = float(np.median(steps))
-    is_time = step > 0 and np.mean(np.abs(steps - step) < _EVEN * step) > 0.99
+    advances = (steps > 0) if _says(name, "time") else np.abs(steps - step) < _EVEN * step
+    is_time = step > 0 and np.mean(advances) > 0.99
     spread = float(np.std(signal))
     return ColumnFacts(
         name,
@@ -129,7 +136,7 @@ def _roles(facts: list[ColumnFacts]) -> dict[str, str]:
     roles: dict[str, str] = {}
     clocks = [one for one in facts if one.period is not None]
     if clocks:
-        roles["time"] = min(clocks, key=lambda one: not _called(one, "time")).name
+        roles["time"] = min(clocks, key=lambda one: not _says(one.name, "time")).name
     length = next((one.samples for one in facts if one.name == roles.get("time")), None)
     signals = [
         one
@@ -144,16 +151,16 @@ def _roles(facts: list[ColumnFacts]) -> dict[str, str]:
         other = "position" if role == "force" else "force"
         # By the name: of several the roughest, which is nearest to where the force acts. Without
         # one the roughest is the force, and the smoothest the position.
-        if named := [one for one in free if _called(one, role)]:
+        if named := [one for one in free if _says(one.name, role)]:
             roles[role] = max(named, key=lambda one: one.roughness).name
-        elif unnamed := [one for one in free if not _called(one, other)]:
+        elif unnamed := [one for one in free if not _says(one.name, other)]:
             roles[role] = min(unnamed, key=lambda one: sign * one.roughness).name
     return roles
 
 
-def _called(column: ColumnFacts, role: str) -> bool:
-    """Whether the name says so: its last part, or an earlier one where that says nothing."""
-    for part in reversed(re.split(r"[/.]", name_and_unit(column.name)[0])):
+def _says(name: str, role: str) -> bool:
+    """Whether a name tells the role: its last part, or an earlier one where that says nothing."""
+    for part in reversed(re.split(r"[/.]", name_and_unit(name)[0])):
         says = {each for each, words in _WORDS.items() if re.search(words, part, re.I)}
         if says:
             return role in says
@@ -184,4 +191,25 @@ def doubts(column: ColumnFacts, role: str) -> str:
     if role == "force" and whole:
         return "whole numbers: converter counts? multiply by the force of one, as in *0.01[N]"
     units = "[N], [Nm] or [A]" if role == "force" else "[m], [mm], [rad] or [deg]"
-    return f"unit not known: write it after the name, {units}"
+    guess = _unit_by_name(column.name, role)
+    return f"unit not known{guess and f', perhaps {guess}'}: write it after the name, {units}"
+
+
+def _unit_by_name(name: str, role: str) -> str:
+    """The unit of what the name speaks of, empty where it does not say."""
+    for unit, words in _UNITS[role].items():
+        if re.search(words, re.split(r"[/.]", name)[-1], re.I):
+            return f"[{unit}]"
+    return ""
+
+
+def unit_of(found: Overview, role: str, term: str) -> str | None:
+    """The base unit of what a term of ``--columns`` names; None where nothing says it.
+
+    Raises
+    ------
+    InputError
+        Where the file has no such column of numbers, or the unit is none of that role.
+    """
+    _, unit = pick(found.arrays, role, parse_columns({role: term}), found.path) or ([], None)
+    return None if unit is None else base_unit(role, unit)[0]

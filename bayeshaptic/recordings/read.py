@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from bayeshaptic.recordings.columns import (
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.timing import sampling_period
-from bayeshaptic.recordings.units import base_unit, choose_units
+from bayeshaptic.recordings.units import base_unit, choose_units, says_volts
 
 Columns = str | Mapping[str, str] | None
 Span = tuple[float | None, float | None]
@@ -218,7 +218,7 @@ def recorded(
         units[role], factor = (None, 1.0) if unit is None else base_unit(role, unit)
         signals[role] = values * factor if factor != 1.0 else values
     signals = cut.apply(signals, period_s, path)
-    return recording_from_arrays(
+    recording = recording_from_arrays(
         signals["force"],
         signals["position"],
         period_s=period_s,
@@ -230,6 +230,20 @@ def recorded(
         encoder_resolution=encoder_resolution,
         source=path,
     )
+    if units["force"] is None and "force" in mapping and _in_volts(mapping["force"]):
+        text = (
+            f"The name of the force, '{mapping['force'].text}', says volts, and it is taken to be "
+            f"in {recording.force_unit}: stiffness and masses are then wrong by the force of one "
+            f"volt, C. Write force=NAME*C[{recording.force_unit}] in --columns."
+        )
+        notices = (*recording.notices, Notice("warning", "units", text))
+        recording = replace(recording, notices=notices)
+    return recording
+
+
+def _in_volts(force: Column) -> bool:
+    """Whether the name says so, and no factor makes a force of it."""
+    return force.factors[-1] == 1.0 and says_volts(force.names[-1])
 
 
 def recording_name(path: Path) -> str:

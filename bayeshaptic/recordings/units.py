@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import FORCE_UNITS, POSITION_UNITS
@@ -35,6 +36,7 @@ _FOREIGN = """
     V mV kV Hz kHz rpm K C degC % counts count cnt inc incr ticks tick lsb kg g kgf gf lb lbf oz in
     inch ft min h rev turns m/s mm/s rad/s deg/s m/s^2 m/s2 rad/s^2 rad/s2
 """
+_VOLTS = re.compile(r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$")
 _BY_ROLE = {"time": _TIME, "force": _FORCE, "position": _POSITION}
 
 
@@ -66,6 +68,11 @@ def is_unit(text: str) -> bool:
     """Whether a piece of a file is the name of a unit, of these roles or of something else."""
     plain = _plain(text)
     return plain in _FOREIGN.split() or any(plain in known for known in _BY_ROLE.values())
+
+
+def says_volts(name: str) -> bool:
+    """Whether a column's name says that it is in volts: ``u_V``, ``volts``, ``DAC 0``."""
+    return _VOLTS.search(name) is not None
 
 
 def _plain(unit: str) -> str:

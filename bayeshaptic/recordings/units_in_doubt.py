@@ -7,12 +7,14 @@ import numpy as np
 from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
+from bayeshaptic.types import Floats
 
 # Mass of a device as its motor feels it: the lightest, a usual and the heaviest one.
 _MASSES = {
     ("N", "m"): (3e-3, 0.5, 500.0, "kg"),
     ("Nm", "rad"): (1e-7, 1e-3, 10.0, "kg m^2"),
 }
+_LEVELS = 20  # of a force, which may be whole newtons
 
 
 def mixed_units(recording: Recording) -> list[Notice]:
@@ -28,16 +30,31 @@ def mixed_units(recording: Recording) -> list[Notice]:
 
 
 def whole_numbers(recording: Recording) -> list[Notice]:
-    """Counts of an encoder, or thousandths: no device moves by whole metres or radians."""
-    if not np.array_equal(recording.position, np.round(recording.position)):
-        return []
+    """Counts of an encoder or a converter: no device moves by whole metres or radians.
+
+    A force of few levels may be whole: a relay's, a step's.
+    """
+    notices = []
+    if _is_whole(recording.force) and len(np.unique(recording.force)) > _LEVELS:
+        text = (
+            f"The forces are whole numbers, from {recording.force.min():g} to "
+            f"{recording.force.max():g} {recording.force_unit}: are they counts of a converter? "
+            f"Write force=NAME*C[{recording.force_unit}] with the force C of one count."
+        )
+        notices.append(Notice("warning", "units", text))
+    if not _is_whole(recording.position):
+        return notices
     unit = recording.position_unit
     text = (
         f"The positions are whole numbers, from {recording.position.min():g} to "
         f"{recording.position.max():g} {unit}: are they counts of the encoder? Write "
         f"position=NAME*C with one count C in {unit}, or name their unit, as in position=NAME[mm]."
     )
-    return [Notice("warning", "units", text)]
+    return [*notices, Notice("warning", "units", text)]
+
+
+def _is_whole(signal: Floats) -> bool:
+    return np.array_equal(signal, np.round(signal))
 
 
 def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.readers.hdf5 import read_hdf5
+from bayeshaptic.recordings.readers.matlab_sizes import refuse_sizes
 from bayeshaptic.recordings.readers.reader import Arrays, Reader
 from bayeshaptic.recordings.readers.tree import named_vectors
 
@@ -39,10 +40,13 @@ def read_matlab(path: Path) -> Arrays:
             start = file.read(520)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
+    is_hdf5 = _HDF5_SIGNATURE in (start[:8], start[512:520])
+    if not is_hdf5:
+        refuse_sizes(path)
     objects = _objects(path) if _has_objects(path) else {}
     if objects:
         return named_vectors(objects, _expand)
-    if _HDF5_SIGNATURE in (start[:8], start[512:520]):
+    if is_hdf5:
         found = read_hdf5(path, separator=".")
     else:
         found = named_vectors(_variables(path), _expand)

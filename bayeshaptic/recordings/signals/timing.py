@@ -13,6 +13,9 @@ from bayeshaptic.errors import InputError, Notice
 # at 10 % the error at a tenth of the Nyquist frequency is 3 % of the signal, more than any device
 # can be known to.
 MOST_JITTER = 0.1
+_USUAL = (
+    0.6745  # the median distance from the mean, of normal numbers with a standard deviation of one
+)
 # Seconds; a later stamp is damage, even in nanoseconds since 1970, and its square is no number.
 _LATEST = 1e100
 # From here on the stamps' jitter is worth a warning.
@@ -95,6 +98,12 @@ def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
     if slope > 0 and scatter <= 0.75 * _rounding(time_s):
         return Timing(slope, 0.0)
     steps = np.diff(time_s)
+    period = float(np.median(steps))
+    # The usual step, before the few that are odd: where that varies, nothing is missing.
+    usual = float(np.median(np.abs(steps - period))) / _USUAL
+    if period > 0 and usual > MOST_JITTER * period:
+        # Gaps are in the standard deviation, too.
+        raise InputError(_uneven(where, steps, min(usual, float(np.std(steps))) / period))
     back = np.flatnonzero(steps <= 0)
     if len(back):
         raise InputError(
@@ -103,16 +112,19 @@ def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
             "cut the recording there, or give the period with --period-s if only the stamps are "
             "wrong"
         )
-    period = float(np.median(steps))
     _refuse_gaps(time_s, period, where)
     jitter = float(np.std(steps)) / period
     if jitter > MOST_JITTER:
-        raise InputError(
-            f"{where}: time steps are not even: they vary by {100 * jitter:.0f} % (standard "
-            f"deviation), from {steps.min():.6g} s to {steps.max():.6g} s; resample to an even "
-            "period, or give the period with --period-s if only the stamps are wrong"
-        )
+        raise InputError(_uneven(where, steps, jitter))
     return Timing(slope, jitter)
+
+
+def _uneven(where: str, steps: NDArray[np.float64], jitter: float) -> str:
+    return (
+        f"{where}: time steps are not even: they vary by {100 * jitter:.0f} % (standard "
+        f"deviation), from {steps.min():.6g} s to {steps.max():.6g} s; resample to an even "
+        "period, or give the period with --period-s if only the stamps are wrong"
+    )
 
 
 def _clock(time_s: NDArray[np.float64]) -> tuple[float, float]:
@@ -142,9 +154,7 @@ def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None
     steps = np.diff(time_s)
     pairs = np.append(time_s[2:] - time_s[:-2], np.inf)
     gaps = np.flatnonzero((steps > 1.5 * period) & (pairs > 2.5 * period))
-    # Where the usual step varies, or many are long, it is uneven sampling and no gap.
-    if np.median(np.abs(steps - period)) > 0.67 * MOST_JITTER * period:
-        return
+    # Where many are long it is uneven sampling and no gap.
     if 0 < len(gaps) <= max(3, len(steps) // 100):
         first = gaps[0]
         edges = np.concatenate([[0], gaps + 1, [len(time_s)]])
