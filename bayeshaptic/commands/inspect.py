@@ -102,7 +102,7 @@ def asked(found: Overview) -> str:
     from bayeshaptic.recordings.overview import unit_of
 
     guesses = dict(part.split("=", 1) for part in (found.mapping or "").split(",") if part)
-    chosen = {}
+    chosen: dict[str, str] = {}
     print("Which columns are these? NAME, NAME*FACTOR or NAME*FACTOR[UNIT]; empty for the guess.")
     for role in ("time", "force", "position"):
         while True:
