@@ -49,6 +49,8 @@ class FakeAnalysis(SimpleNamespace):
     effect_names = ()
     analysis = measured = property(lambda self: self)
     declared = property(lambda self: self.limit)
+    stated = property(lambda self: self.posterior)
+    widened = None
 
 
 class FakeClosed(SimpleNamespace):

@@ -44,7 +44,7 @@ def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def page_of(folder: Path) -> str:
     page = (folder / "report.html").read_text(encoding="utf-8")
-    page = re.sub(r"<(style|script).*?</\1>", "", page, flags=re.DOTALL)
+    page = re.sub(r"<(style|script).*?</\1>|</?code>", "", page, flags=re.DOTALL)
     return " ".join(unescape(re.sub(r"<[^>]+>", " ", page)).split())
 
 

@@ -129,17 +129,20 @@ def test_the_worst_case_decides_and_is_named() -> None:
     number = float(re.search(r"at most ([\d.]+) N m/rad", head.sentence)[1])  # type: ignore[index]
     # Rounded down, by less than one part in a hundred.
     assert 0.99 * safe < number <= safe
-    assert "these 3 people, a person not yet seen and every configuration" in head.sentence
+    assert (
+        "whether nobody, one of these 3 people or a person not yet seen holds it, in every conf"
+        in head.sentence
+    )
     assert head.details[0].startswith("What sets the limit: nobody holds it (100 %).")
     # There the fake device has a third less damping.
-    assert "Most often it is this case: configuration 1, nobody holds it (" in head.details[0]
+    assert "The case that does so most often: configuration 1, nobody holds it." in head.details[0]
     assert head.status == "caution"  # a recording failed
 
 
 def test_people_who_hardly_move_the_limit_are_said_to() -> None:
     words = " ".join(people(study("alike")))
     assert "People hardly move the critical stiffness of this device" in words
-    assert "cannot be told apart" in words
+    assert "cannot tell these people apart" in words
     moved = " ".join(people(study("whole")))
     assert "hardly" not in moved and "People move the critical stiffness" in moved
 
@@ -147,9 +150,19 @@ def test_people_who_hardly_move_the_limit_are_said_to() -> None:
 @pytest.mark.parametrize(
     ("shape", "parts"),
     [
-        ("nobody", ["Nobody holds the device", "One configuration only"]),
-        ("one user", ["One user only", "No recording without a user", "One configuration only"]),
-        ("people alone", ["No recording without a user", "One configuration only"]),
+        ("nobody", ["Nobody holds the device", "There is one configuration only"]),
+        (
+            "one user",
+            [
+                "There is one user only",
+                "There is no recording without a user",
+                "There is one configuration only",
+            ],
+        ),
+        (
+            "people alone",
+            ["There is no recording without a user", "There is one configuration only"],
+        ),
         ("whole", []),
     ],
 )

@@ -65,6 +65,8 @@ class Analysis(Shown):
         What could hide, where the limit allows for it.
     in_loop : InLoop or None
         The motion that posterior and limit come from, where feedback biases the response.
+    widened : Posterior or None
+        The posterior with the error of a force that was taken off; None where none was.
     """
 
     recording: Recording | None
@@ -82,6 +84,12 @@ class Analysis(Shown):
     lever_m: float | None = None
     in_loop: InLoop | None = None
     hidden: Hidden | None = None
+    widened: Posterior | None = None
+
+    @property
+    def stated(self) -> Posterior:
+        """The posterior whose intervals are told; `posterior` takes every fitted force as exact."""
+        return self.posterior if self.widened is None else self.widened
 
     @property
     def declared(self) -> CriticalStiffness:

@@ -22,6 +22,7 @@ from bayeshaptic.diagnosis.feedback.explain import (
 )
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
+from bayeshaptic.diagnosis.law_error import with_law_error
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
@@ -92,7 +93,7 @@ class Closed(Shown):
     @property
     def diagnosis(self) -> dict[str, Any]:
         """In the form of ``summary.json``."""
-        return self.traced.table(self.analysis.posterior.summary())
+        return self.traced.table(self.analysis.stated.summary())
 
     def _lines(self) -> tuple[str, ...]:
         recording = self.base.recording
@@ -174,7 +175,8 @@ def close_loop(
     )
     notices = analysis.notices + traced.notices
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
-    analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds)
+    wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
+    analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)
     closed = Closed(base, analysis, traced, _error(base), _error(analysis), force)
     return with_average(closed, prior, chosen) if chosen.hidden and not biased else closed
 

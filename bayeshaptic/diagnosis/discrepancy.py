@@ -84,15 +84,19 @@ def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
 
     What tests still see of it, as a share of what they saw, times how far it moved the limit.
     """
+    limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
+    moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
+    farthest = 2.3  # log stiffness: a factor of ten
+    return share_left(traced, family) * min(moved, farthest)
+
+
+def share_left(traced: Traced, family: str) -> float:
+    """What tests of a class still see after an effect of it was taken off, over what they saw."""
     before, after = (
         max((test.statistic for test in tests if test.family == family), default=0.0)
         for tests in (traced.before, traced.after)
     )
-    left = min(after / before, 1.0) if before > 0 else 1.0
-    limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
-    moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
-    farthest = 2.3  # log stiffness: a factor of ten
-    return left * min(moved, farthest)
+    return min(after / before, 1.0) if before > 0 else 1.0
 
 
 def _downwards(fit: Fit, traced: Traced, family: str) -> float:

@@ -76,9 +76,9 @@ class LimitKnown:
         risky = self._risks(limit, chains)
         done = rhat < RHAT_LIMIT and min(share, worth) >= 1
         facts = (
-            f"every reported quantile of the critical stiffness is known to {error:.1%} of its "
-            f"90 % interval, R-hat between the independent ensembles is at most {rhat:.4f} (of the "
-            "critical stiffness and of what the data know)"
+            f"every reported quantile of the critical stiffness is known to {100 * error:.1f} % of "
+            "its 90 % interval, R-hat between the independent ensembles is at most "
+            f"{rhat:.4f} (of the critical stiffness and of what the data know)"
         )
         return self._verdict(found, done and risky >= 1, min(share, worth, risky), facts)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from bayeshaptic.files import write_whole
 from bayeshaptic.quantities import quantity
-from bayeshaptic.report.page.frame import frame, template
+from bayeshaptic.report.page.frame import finished, frame, template
 from bayeshaptic.report.page.lights import BAD, DOUBT, GOOD, SIGNS
 
 COLUMNS = {
@@ -55,7 +55,7 @@ def row_of(name: str, folder: Path, status: str | None, error: str | None) -> di
         "device": recording["device"],
         "user": recording["user"],
         "configuration": recording["configuration"],
-        "safe": limit["safe"].get("0.01"),
+        "safe": None if status == "untrusted" else limit["safe"].get("0.01"),
         **{name: limit[name] for name in ("q05", "q50", "q95", "unit")},
         "frequency_hz": limit["frequency_hz"]["q50"],
         "verdict": (summary["diagnosis"] or {}).get("verdict"),
@@ -87,7 +87,7 @@ def write_index(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         numbers=_NUMBERS,
         rows=[_shown(row, folder) for row in rows],
     )
-    write_whole(folder / "index.html", page)
+    write_whole(folder / "index.html", finished(page))
 
 
 def _table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:

@@ -100,9 +100,9 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
         )
     if any(effect.family == "nonlinear" for effect in closed.effects):
         found.append(
-            "A law of a force is never quite right: the limit is widened either way by what the "
-            "tests still see of it, as a share of what they saw before, times how far the force "
-            "moved the limit."
+            "A law of a force is never quite right: limit and parameters are widened either way "
+            "by what the tests still see of it, as a share of what they saw before, times how far "
+            "the force moved them."
         )
     fall = sum(effect.limit_log_fall for effect in closed.effects)
     if fall > 0:

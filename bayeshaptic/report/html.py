@@ -18,9 +18,9 @@ from bayeshaptic.report.loop import words as loop_words
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.page import answer, methods
-from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, with_contents
+from bayeshaptic.report.page.frame import LABELS, embedded, finished, frame, template
 from bayeshaptic.report.page.lights import lights
-from bayeshaptic.report.page.next_step import next_step
+from bayeshaptic.report.page.next_step import next_steps
 from bayeshaptic.report.page.reproduce import asked, reproduce
 
 if TYPE_CHECKING:
@@ -75,8 +75,9 @@ def render(
         label=LABELS[head.status],
         lights=lights(result),
         answer=answer,
-        next_step=next_step(head, result),
+        next_steps=next_steps(head, result),
         doubtful=words.doubtful(result),
+        widened=words.widened(result),
         no_limit=unstated(analysis),
         untrusted=doubtful_parameters(result),
         notices=unique(analysis.notices),
@@ -95,7 +96,7 @@ def render(
         files=FILES,
         sections=sections,
     )
-    return with_contents(page, _CONTENTS)
+    return finished(page, _CONTENTS)
 
 
 def title(analysis: Analysis) -> str:

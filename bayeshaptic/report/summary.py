@@ -165,7 +165,7 @@ def _least_squares(analysis: Analysis) -> dict[str, Any]:
 
 
 def _posterior(result: Result) -> dict[str, Any]:
-    posterior, doubtful = result.analysis.posterior, doubtful_parameters(result)
+    posterior, doubtful = result.analysis.stated, doubtful_parameters(result)
     return {
         "parameters": {
             name: {**found, "trusted": name not in doubtful}

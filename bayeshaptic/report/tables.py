@@ -38,7 +38,7 @@ _OUTCOMES = {
 def parameters(result: Result) -> tuple[ParameterRow, ...]:
     """Least squares beside the posterior, a row a parameter."""
     analysis, doubtful = result.analysis, doubtful_parameters(result)
-    fit, posterior, model = analysis.fit, analysis.posterior, analysis.model
+    fit, posterior, model = analysis.fit, analysis.stated, analysis.model
     rows = []
     for i, (name, found) in enumerate(posterior.summary().items()):
         row = scale((found["q50"], found["q95"]), found["unit"])
@@ -83,8 +83,9 @@ def limit(analysis: Analysis) -> Rows:
     rows = [("critical stiffness", *_scaled(stiffness.quantile(levels), stiffness.unit))]
     rows.append((f"in dB re 1 {stiffness.unit}", *(_db(stiffness.quantile(p)) for p in levels)))
     if analysis.hidden is not None:
-        exact = analysis.declared
-        rows.append(("if the model is exact", *_scaled(exact.quantile(levels), exact.unit)))
+        exact = _scaled(analysis.declared.quantile(levels), stiffness.unit)
+        if exact != rows[0][1:]:
+            rows.append(("if the model is exact", *exact))
     if tip is not None:
         rows.append(("at the tip", *_scaled(tip.quantile(levels), tip.unit)))
         rows.append((f"at the tip in dB re 1 {tip.unit}", *(_db(tip.quantile(p)) for p in levels)))
@@ -171,8 +172,8 @@ def measured(analysis: Analysis) -> Rows:
     rows.append(("Sampling period", f"{quantity(etfe.period_s, 's')} ({rate})"))
     rows.append(("Units", f"force in {unit}, position in {etfe.position_unit}"))
     rows.append(("Frequencies used", f"{interval(*etfe.band_hz, 'Hz')}, {etfe.lines:,} lines"))
-    error = 100 * float(np.median(etfe.relative_sd))
-    rows.append(("Error of the response", f"{error:.2g} % of its magnitude (median sd)"))
+    error = percent(float(np.median(etfe.relative_sd)))
+    rows.append(("Error of the response", f"{error} of its magnitude (median sd)"))
     if analysis.device is not None:
         rows.insert(1, ("Device file", analysis.device.name))
     elif recording is not None and recording.device:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 _DELAY = "delay_s"
+_WORTH = 1.1  # times the posterior's width, from which an interval was widened
 _WIDER = 3.0  # times the model's interval, from which it is worth a word why
 
 
@@ -184,6 +185,21 @@ def doubtful(result: Result) -> str:
     return (
         f"The intervals of {', '.join(found)} are not to be trusted ({reasons}): they may miss the "
         "true value by many times their width. That of the limit is widened for it."
+    )
+
+
+def widened(result: Result) -> str:
+    """Which intervals the error of a force makes wider; empty where it does not."""
+    analysis = result.analysis
+    if analysis.widened is None:
+        return ""
+    ratio = analysis.widened.draws.std(axis=0) / analysis.posterior.draws.std(axis=0)
+    names = [n for n, more in zip(analysis.model.names, ratio, strict=True) if more > _WORTH]
+    if not names:
+        return ""
+    return (
+        f"The intervals of {', '.join(names)} are wider than the posterior's, as that of the limit "
+        "is: the force that was taken off is known with an error, and its law is never quite right."
     )
 
 

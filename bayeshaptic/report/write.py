@@ -11,6 +11,7 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
+from bayeshaptic.report.guidance.section import FIGURES as ADVICE
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.hidden.section import hidden_section
@@ -18,6 +19,7 @@ from bayeshaptic.report.html import render
 from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.page.section import Section
 from bayeshaptic.report.summary import summary_json
+from bayeshaptic.report.walls.section import FIGURES as WALLS
 from bayeshaptic.report.walls.section import (
     case_of,
     friction_of,
@@ -29,7 +31,8 @@ from bayeshaptic.threads import single_threaded
 
 # Whoever waits for a report looks for its summary: it arrives when the rest is there.
 _LAST = "summary.json"
-_MAY_BE_MISSING = tuple(f"{p.name}.png" for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES))
+_PICTURES = (p.name for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES))
+_MAY_BE_MISSING = tuple(f"{name}.png" for name in (*_PICTURES, *WALLS, *ADVICE, "hidden"))
 
 
 @at_the_door
@@ -72,7 +75,7 @@ def _write_all(result: Result, folder: Path, origin: Mapping[str, Any] | None) -
     for part in (pictures, *(section.pictures for section in sections)):
         for name, drawn in part.items():
             (folder / f"{name}.png").write_bytes(drawn.png)
-    analysis.posterior.save(folder / "posterior.nc")
+    analysis.stated.save(folder / "posterior.nc")
     page = render(result, pictures, [section.html for section in sections], origin)
     (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
     (folder / _LAST).write_text(summary_json(result, origin), encoding="utf-8", newline="\n")
@@ -85,12 +88,9 @@ def _sections(result: Result, folder: Path) -> tuple[Section, ...]:
     case = case_of(result)
     table = table_of([case])
     name = None if analysis.device is None else analysis.device.name
-    reason = unstated(analysis)
-    replace(table, reason=reason).write(folder, name, head.status, head.stiffness)
-    if reason is not None:
+    replace(table, reason=unstated(analysis)).write(folder, name, head.status, head.stiffness)
+    if head.status == "untrusted":  # walls and designs of a limit that nobody is to use
         return ()
-    walls = limits_section(
-        table, friction_of(result), resolution_of(analysis), head.status == "untrusted"
-    )
+    walls = limits_section(table, friction_of(result), resolution_of(analysis))
     others = hidden_section(analysis), guidance_section(case, analysis)
     return (walls, *(one for one in others if one is not None))

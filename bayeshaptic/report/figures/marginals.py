@@ -54,7 +54,7 @@ def draw_on(axes: Axes, result: Result, name: str) -> None:
 def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
     model, fit = analysis.model, analysis.fit
     name = model.names[index]
-    draws = analysis.posterior.draws[:, index]
+    draws = analysis.stated.draws[:, index]
     row = scale(float(np.median(draws)), model.unit(name))
     low, high = _range(draws, float(fit.theta[index]), model.prior(name).support)
     density, edges = np.histogram(draws, BINS, (low, high), density=True)
@@ -77,7 +77,7 @@ def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     _ticks(axes)
-    if analysis.posterior.prior_dominated.get(name):
+    if analysis.stated.prior_dominated.get(name):
         axes.set_xlabel("the prior decides this one", fontsize=style.SMALL, style="italic")
 
 

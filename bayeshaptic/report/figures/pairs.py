@@ -46,7 +46,7 @@ def strongest(matrix: NDArray[Any], count: int = SHOWN) -> list[int]:
 def draw(result: Result) -> Figure:
     """Scatter and contours below the diagonal; all correlations as a map in the empty corner."""
     analysis = result.analysis
-    draws = _some(analysis.posterior.draws)
+    draws = _some(analysis.stated.draws)
     matrix = correlation(draws)
     chosen = strongest(matrix)
     size = len(chosen) - 1
@@ -90,7 +90,7 @@ def _triangle(figure: Figure, size: int) -> dict[tuple[int, int], Axes]:
 
 def draw_on(axes: Axes, result: Result, x: str, y: str) -> None:
     """Two parameters on axes that are there."""
-    model, draws = result.analysis.model, result.analysis.posterior.draws
+    model, draws = result.analysis.model, result.analysis.stated.draws
     chosen = _some(draws)[:, [model.names.index(n) for n in (x, y)]]
     rows = [
         scale(float(middle), model.unit(name))

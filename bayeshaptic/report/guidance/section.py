@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.stability.cases import Case
 
+FIGURES = ("guidance_shares", "guidance_sweeps")
+
 
 def guidance_section(case: Case, analysis: Analysis | None = None) -> Section | None:
     """HTML and pictures of the guidance for one case.

@@ -55,7 +55,12 @@ def words(guidance: Guidance, experiments: Sequence[Experiment]) -> Words:
 def experiment_rows(
     shares: VarianceShares, experiments: Sequence[Experiment]
 ) -> tuple[tuple[str, str, str], ...]:
-    """Further recordings: what, by how much narrower, and what the limit would be known to."""
+    """Further recordings: what, by how much narrower, and what the limit would be known to.
+
+    None where no recording would narrow it: see the sentence.
+    """
+    if not any(_narrowed(shares, one) <= _HARDLY for one in experiments):
+        return ()
     return tuple(
         (
             one.title,
@@ -81,8 +86,13 @@ def _lead(shares: VarianceShares) -> str:
         parts.append(f"effects and what is unexplained ({percent(round(shares.beyond, 2))})")
     spread = f"± {pure(_DB * shares.log_sd, 2)} dB (one standard deviation)"
     if not parts:
-        return f"The critical stiffness is known to {spread}; no parameter stands out in that."
-    return f"The uncertainty of K_CR, {spread}, comes from {_listed(parts)}."
+        return f"The critical stiffness is known to {spread}. No parameter stands out in that."
+    return f"The critical stiffness is known to {spread}. That comes from {_listed(parts)}."
+
+
+def _all_of(share: float) -> str:
+    """A share of something, in words where it is all of it."""
+    return "all of" if round(share, 2) >= 1 else f"{percent(round(share, 2))} of"
 
 
 def _name(share: Share) -> str:
@@ -95,14 +105,14 @@ def _name(share: Share) -> str:
 def _overlap(shares: VarianceShares) -> str:
     text = (
         "A share is the part of the variance that would go if this parameter were known. "
-        "Parameters whose ranks correlate beyond 0.7 are taken together, because the data fix a "
-        "combination of them and none by itself."
+        "Parameters that the data cannot tell apart (rank correlation beyond 0.7) are taken "
+        "together."
     )
     together = shares.together
     if together > _OVERLAP:
         return (
-            f"{text} The shares add up to {percent(together)}: what is told of one parameter is "
-            "told of others that correlate with it less than that, too."
+            f"{text} The shares add up to {percent(together)}, because parameters that correlate "
+            "less than that share some of it, too."
         )
     return text
 
@@ -122,8 +132,8 @@ def _raise(found: Sequence[Elasticities]) -> str:
         if parts:
             sentences.append(
                 f"Where the {_lower(one.crossing.label)} sets the limit (probability "
-                f"{percent(one.crossing.probability)}), 1 % more of a parameter changes it by: "
-                f"{', '.join(parts)}."
+                f"{percent(one.crossing.probability)}), 1 % more of a parameter changes the limit "
+                f"by: {', '.join(parts)}."
             )
     return " ".join(sentences)
 
@@ -171,8 +181,8 @@ def _next(shares: VarianceShares, experiments: Sequence[Experiment]) -> str:
     if _narrowed(shares, best) > _HARDLY:
         return (
             "No further recording of this kind would narrow K_CR by much: "
-            f"{percent(round(shares.beyond, 2))} of its variance is of effects and what is "
-            "unexplained, which more of the same data do not change."
+            f"{_all_of(shares.beyond)} its variance comes from effects and what is unexplained, "
+            "and more of the same data do not change that."
         )
     text = (
         f"Of the further recordings below, each as long as this one, {best.title} would narrow "
@@ -180,8 +190,8 @@ def _next(shares: VarianceShares, experiments: Sequence[Experiment]) -> str:
     )
     if spread < _KNOWN_DB:
         text += (
-            " But the limit is known better already than a wall needs: what the model lacks "
-            "matters more than what more data would say."
+            " But the limit is already known better than a wall needs: look for what the model "
+            "lacks rather than for more data."
         )
     return text
 

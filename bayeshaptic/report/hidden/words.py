@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayeshaptic.quantities import percent, quantity
+from bayeshaptic.quantities import percent, quantity, spread_of
 from bayeshaptic.report.numbers.hidden import FEW, db, interval_of, reach, size, strength
 
 if TYPE_CHECKING:
@@ -29,11 +29,16 @@ _RULED_OUT = {
 def lead(analysis: Analysis, hidden: Hidden) -> str:
     """What the section says first: the two limits, and what stands between them."""
     declared, limit = (interval_of(one) for one in (hidden.declared, analysis.limit))
+    allowed = (
+        "Allowing for that leaves the interval as it is, to the digits shown."
+        if declared == limit
+        else f"With that allowed for, the critical stiffness is {limit}."
+    )
     return (
         f"If the model is exact, the critical stiffness is {declared}. No device is exactly its "
-        "model: what the tests of this recording cannot see may still move the limit. With that "
-        f"allowed for, the critical stiffness is {limit}. All of this page is of that "
-        f"distribution. The model is exact with a probability of {percent(hidden.nothing)}."
+        f"model: what the tests of this recording cannot see may still move the limit. {allowed} "
+        "All of this page is of the limit with that allowed for. The model is exact with a "
+        f"probability of {percent(hidden.nothing)}."
     )
 
 
@@ -76,12 +81,16 @@ def sensitivity(analysis: Analysis, hidden: Hidden) -> Rows:
     """Points of K_CR for halved, given and doubled prior probabilities, and without."""
     unit, levels = analysis.limit.unit, [0.01, 0.05, 0.5, 0.95]
     cases = [("none: the model is exact", hidden.declared.quantile(levels))]
+    low, high = analysis.limit.quantile([0.05, 0.95])
+    spread = (
+        spread_of(low, high) / 10
+    )  # one digit more than an interval has: rows are to be compared
     for factor, found in sorted(
         {1.0: analysis.limit.quantile(levels), **hidden.sensitivity}.items()
     ):
         name = {0.5: "halved", 1.0: "as given", 2.0: "doubled"}.get(factor, f"times {factor:g}")
         cases.append((name, found))
     return tuple(
-        (name, *(quantity(float(value), unit, digits=5) for value in found))
+        (name, *(quantity(float(value), unit, spread, digits=4) for value in found))
         for name, found in cases
     )

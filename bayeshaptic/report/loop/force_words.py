@@ -113,10 +113,17 @@ def motion(found: InLoop, recording: Recording) -> str:
     if not found.halves:
         return text
     return (
-        f"{text} With the values of the other half of the recording the power of the error is "
-        f"{pure(found.held_out, 3)} times that with its own, and "
+        f"{text} Each half of the recording was then simulated with the values of the other. "
+        f"The power of its error is {_times(found.held_out)}, and "
         f"{pure(100 * found.covered, 2)} % of the samples lie in the 90 % band."
     )
+
+
+def _times(ratio: float) -> str:
+    """How large an error is with the other half's values."""
+    if abs(ratio - 1) < 0.005:
+        return "the same as with its own"
+    return f"{pure(ratio, 3)} times that with its own"
 
 
 def halves(found: InLoop, analysis: Analysis) -> Rows:

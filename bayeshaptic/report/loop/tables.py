@@ -116,8 +116,8 @@ def errors(closed: Closed) -> Rows:
     stated, unit = stated_errors(closed), closed.analysis.limit.unit
     before, after = stated["before"], stated["after"]
 
-    def row(title: str, key: str, suffix: str) -> tuple[str, ...]:
-        return (title, *(_number(e[key], suffix) for e in (before, after)))
+    def row(title: str, key: str, suffix: str, places: int | None = None) -> tuple[str, ...]:
+        return (title, *(_number(e[key], suffix, places) for e in (before, after)))
 
     def limits(e: Mapping[str, Any]) -> str:
         q = e["critical_stiffness"]
@@ -131,7 +131,7 @@ def errors(closed: Closed) -> Rows:
         row("gain, model minus measurement (rms)", "gain_db_rms", " dB"),
         row("phase, model minus measurement (rms)", "phase_deg_rms", "\N{DEGREE SIGN}"),
         ("critical stiffness, median (90 %)", limits(before), limits(after)),
-        row("median, model minus the measurement's own", "critical_stiffness_db", " dB"),
+        row("median, model minus the measurement's own", "critical_stiffness_db", " dB", 2),
     )
 
 
@@ -146,8 +146,8 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
             spread = f"{row.number(value['q05'], sd)} to {row.number(value['q95'], sd)}"
             rows.append(
                 ParameterRow(
-                    name,
                     parameter_words(name),
+                    effect.title,
                     row.unit,
                     _DASH,
                     row.with_error(value["mean"], sd),
@@ -155,7 +155,7 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
                     _DASH,
                     _DASH,
                     _DASH,
-                    f"{effect.title}: estimated beside the posterior",
+                    "estimated beside the posterior",
                 )
             )
     return tuple(rows)
@@ -197,5 +197,10 @@ def _score(value: float) -> str:
     return text.replace("-", "\N{MINUS SIGN}")
 
 
-def _number(value: float | None, suffix: str) -> str:
-    return _DASH if value is None or not math.isfinite(value) else quantity(value, "") + suffix
+def _number(value: float | None, suffix: str, places: int | None = None) -> str:
+    """Three digits, or so many decimal places, with what stands behind them."""
+    if value is None or not math.isfinite(value):
+        return _DASH
+    if places is None:
+        return quantity(value, "") + suffix
+    return f"{round(value, places) + 0.0:.{places}f}".replace("-", "\N{MINUS SIGN}") + suffix

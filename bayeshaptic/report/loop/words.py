@@ -167,7 +167,7 @@ def _count(effect: Accepted) -> int:
 
 def _numbers(closed: Closed, effect: Accepted) -> str:
     """The effect's parameters in brackets; of a drift the one that changed most."""
-    posterior = closed.analysis.posterior.summary()
+    posterior = closed.analysis.stated.summary()
     model = closed.analysis.model
     shown = [
         f"{model.parameter(name).title} {plus_minus(found['mean'], found['sd'], found['unit'])}"

@@ -21,7 +21,10 @@ def in_short(analysis: Analysis) -> str:
     if hidden is None:
         return ""
     first = next(iter(hidden.effects), None)
-    text = f"is allowed for: without it the limit would be {interval_of(hidden.declared)}"
+    declared = interval_of(hidden.declared)
+    text = "is allowed for, and leaves the interval as it is"
+    if declared != interval_of(analysis.limit):
+        text = f"is allowed for: without it the limit would be {declared}"
     if first is None or reach(first) < FEW:
         return text
     shift = min(first.shift_db[0], 0.0) if first.shift_db[0] < 0 else first.shift_db[2]
@@ -58,4 +61,4 @@ def amount(strength: float, unit: str) -> str:
 
 def db(shift: float) -> str:
     """With its sign."""
-    return f"{shift:+.3f}".replace("-", "\N{MINUS SIGN}")
+    return f"{round(shift, 3) + 0.0:+.3f}".replace("-", "\N{MINUS SIGN}").replace("+0.000", "0.000")

@@ -23,7 +23,16 @@ if TYPE_CHECKING:
     from bayeshaptic.report.figures.style import Drawn
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|dB|[kMm\N{MICRO SIGN}]?(?:N|Hz|s|m|g|A))(?:\W|$))")
+_UNIT = r"(?:%|dB|kg|[kMmn\N{MICRO SIGN}]?(?:N|Hz|s|m|g|A))(?:\W|$)"
+# Between a number and its unit, and in a unit of several parts as in "8.50 mN m s/rad".
+_BEFORE_UNIT = re.compile(
+    rf"(?<=\d) (?={_UNIT})|(?<=N) (?=m\b)|(?<=N) (?=s\b)|(?<=N m) (?=s\b)|(?<=g) (?=m²)"
+)
+_TEXT = re.compile(
+    r"(<(?:style|script|svg|pre|code|title)\b.*?</(?:style|script|svg|pre|code|title)>|<[^>]*>)",
+    re.DOTALL,
+)
+_OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*[a-z](?: LOW,HIGH| [A-Z]\b)?")
 LABELS = {
     "safe": "Recommendation",
     "caution": "Recommendation, with caution",
@@ -62,8 +71,19 @@ def frame() -> dict[str, Any]:
         "written": written(),
         "faq": entry,
         "plain": without_links,
-        "unbroken": unbroken,
     }
+
+
+def finished(page: str, contents: Sequence[tuple[str, str]] = ()) -> str:
+    """The page with links to its sections, and no line broken where none should be."""
+    return with_contents(_typeset(page), contents) if contents else _typeset(page)
+
+
+def _typeset(page: str) -> str:
+    """Numbers stay with their units, and options of the command line are one word."""
+    parts = _TEXT.split(page)
+    parts[::2] = [_OPTION.sub(r"<code>\g<0></code>", unbroken(text)) for text in parts[::2]]
+    return "".join(parts)
 
 
 def with_contents(page: str, contents: Sequence[tuple[str, str]]) -> str:

@@ -82,7 +82,7 @@ def _fit(result: Result) -> Light:
         return Light("Fit", BAD, "not noise", "notices")
     if misfit_is_faint(analysis):
         return Light("Fit", DOUBT, "slightly above noise", "leftover")
-    left = "no larger than noise" if is_unexplained(result) else "noise is left"
+    left = "no larger than noise" if is_unexplained(result) else "only noise is left"
     return Light("Fit", GOOD, left, "leftover")
 
 

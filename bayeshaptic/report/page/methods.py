@@ -18,7 +18,7 @@ _BIBTEX = {
   author = {D{\\'i}az, I{\\~n}aki and Gil, Jorge Juan},
   title = {Influence of Vibration Modes and Human Operator on the Stability of Haptic Rendering},
   journal = {IEEE Transactions on Robotics},
-  volume = {26}, number = {1}, year = {2010}
+  volume = {26}, number = {1}, pages = {160--165}, year = {2010}
 }""",
     "emcee": """@article{emcee,
   author = {Foreman-Mackey, Daniel and Hogg, David W. and Lang, Dustin and Goodman, Jonathan},

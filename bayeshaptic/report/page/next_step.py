@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
@@ -12,44 +13,72 @@ if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline
 
 
-def next_step(head: Headline, result: Result) -> str:
-    """A sentence or two; empty where a stiffness is recommended."""
+@dataclass(frozen=True)
+class Step:
+    """Something to do.
+
+    Attributes
+    ----------
+    text : str
+        A sentence, or two.
+    command : str
+        As it is typed; NEW.csv is the recording still to be made.
+    """
+
+    text: str
+    command: str
+
+
+def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
+    """What to do, the best first; empty where a stiffness is recommended."""
     if head.status != "untrusted":
-        return ""
+        return ()
     analysis, command = result.analysis, _command(result)
     if has_feedback(analysis.notices):
-        again = (
-            "Record again with a force that does not depend on the motion (white noise or a "
-            f"multisine), and report on that recording: {command}"
+        again = Step(
+            "Record again with a force that does not depend on the motion: white noise, or a "
+            "multisine. Then report on that recording:",
+            f"bayeshaptic report NEW.csv{_device(result)}",
         )
         if analysis.in_loop is None or analysis.in_loop.doubts:
-            return again
-        return (
-            f"{again}. Where the device is known to be one rigid mass, say so, and this recording "
-            f"will do: {command} --model rigid"
+            return (again,)
+        rigid = (
+            "Or, where the device is known to be one rigid mass, say so. This recording will do:"
         )
+        return again, Step(rigid, f"{command} --model rigid")
     if not analysis.posterior.converged:
         return (
-            "Let the sampler begin elsewhere, and tell it what is known of the device "
-            f"(--device, --delay-s): {command} --seed {analysis.posterior.seed + 1}"
+            Step(
+                "Let the sampler begin elsewhere, and tell it what is known of the device "
+                "(--device, --delay-s):",
+                f"{command} --seed {analysis.posterior.seed + 1}",
+            ),
         )
     if result.closed is None:
-        return f"Let the loop look for what the model lacks: {command}, without --no-loop."
+        return (Step("Let the loop look for what the model lacks (leave out --no-loop):", command),)
     if is_unexplained(result):
         return (
-            "Record at half and at twice the force, and with nobody holding the device: what "
-            "changes tells which part of it the model lacks. Then compare the reports: "
-            "bayeshaptic batch *.csv"
+            Step(
+                "Record at half and at twice the force, and with nobody holding the device. What "
+                "changes tells which part of it the model lacks. Compare the reports:",
+                "bayeshaptic batch FOLDER -o reports",
+            ),
         )
     return (
-        "Try another base model (--model free, --model grasped) or another band (--band LOW,HIGH) "
-        f"and see whether the misfit goes: {command} --model free"
+        Step(
+            "Try another base model (--model free, --model grasped) or another band (--band "
+            "LOW,HIGH), and see whether the misfit goes:",
+            f"{command} --model free",
+        ),
     )
 
 
 def _command(result: Result) -> str:
-    analysis = result.measured
-    recording = analysis.recording
+    recording = result.measured.recording
     source = "RECORDING" if recording is None or recording.source is None else recording.source.name
-    device = "" if analysis.device is None else f" --device {analysis.device.name}"
-    return f"bayeshaptic report {source}{device}"
+    return f"bayeshaptic report {source}{_device(result)}"
+
+
+def _device(result: Result) -> str:
+    device = result.measured.device
+    return "" if device is None else f" --device {device.name}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from bayeshaptic.quantities import percent, quantity
 from bayeshaptic.report.headline import Headline, headline, rounded_down
 from bayeshaptic.report.numbers.cases import is_free
-from bayeshaptic.report.study.words import Z90, listed, missing
+from bayeshaptic.report.study.words import Z90, missing
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:
@@ -60,8 +60,8 @@ def _recommended(study: StudyAnalysis, risk: float, safe: float) -> Headline:
     sd = (high - low) / Z90
     stiffness, shown = rounded_down(safe, study.limit.unit, sd)
     sentence = (
-        f"Render walls of at most {shown}: over {_scope(study)}, the risk that the loop is "
-        f"unstable is {percent(risk)}."
+        f"Render walls of at most {shown}: the risk that the loop is unstable there is "
+        f"{percent(risk)}, {_scope(study)}."
     )
     details = [what_binds(study)]
     lever = study.device.lever_m
@@ -91,16 +91,16 @@ def _scope(study: StudyAnalysis) -> str:
     """Whom and what the limit covers."""
     groups = {case.group for case in study.cases}
     count = len({one.entry.user for one in study.recordings if one.result} - {None})
-    found = []
+    holders = []
     if any(is_free(case.label, case.group) for case in study.cases):
-        found.append("nobody holding it")
+        holders.append("nobody")
     if HELD in groups:
-        found.append("its one user" if count == 1 else f"these {count} people")
+        holders.append("its one user" if count == 1 else f"one of these {count} people")
     if NEW_PERSON in groups:
-        found.append("a person not yet seen")
-    if CONFIGURATION in groups:
-        found.append("every configuration")
-    return listed(found)
+        holders.append("a person not yet seen")
+    last = f"{', '.join(holders[:-1])} or {holders[-1]}" if len(holders) > 1 else holders[0]
+    text = f"whether {last} holds it" if len(holders) > 1 else f"with {last} holding it"
+    return f"{text}, in every configuration" if CONFIGURATION in groups else text
 
 
 def what_binds(study: StudyAnalysis) -> str:
@@ -116,8 +116,8 @@ def what_binds(study: StudyAnalysis) -> str:
         return "Nothing limits it."
     text = f"What sets the limit: {', or '.join(likely)}."
     first = study.limit.binding[0]
-    if first.probability < order[0][1] or first.case != order[0][0]:
-        text += f" Most often it is this case: {first.case} ({percent(first.probability)})."
+    if first.case != order[0][0]:
+        text += f" The case that does so most often: {first.case}."
     return text
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from bayeshaptic.errors import unique
 from bayeshaptic.provenance import versions
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
-from bayeshaptic.report.page.frame import LABELS, embedded, frame, template, with_contents
+from bayeshaptic.report.page.frame import LABELS, embedded, finished, frame, template
 from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
 from bayeshaptic.report.study.headline import study_headline
@@ -78,7 +78,7 @@ def render_study(
         assumptions=assumptions(study),
         versions=tuple(versions().items()),
     )
-    return with_contents(page, _CONTENTS)
+    return finished(page, _CONTENTS)
 
 
 def _people_caption(study: StudyAnalysis) -> str:

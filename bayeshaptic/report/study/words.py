@@ -33,20 +33,17 @@ def hands(study: StudyAnalysis) -> str:
         return ""
     alone, in_hand = (_median_db(cases) for cases in (free, held))
     step = in_hand - alone
+    both = f"the median limit is {alone:.1f} dB without one and {in_hand:.1f} dB held"
+    if max(len(free), len(held)) > 1:
+        both += ", each in its worst case"
     if abs(step) < _AS_BAD_DB:
-        return (
-            f"A hand makes little difference: the median limit is {alone:.1f} dB without one and "
-            f"{in_hand:.1f} dB held."
-        )
+        return f"A hand makes little difference: {both}."
     if step > 0:
         return (
-            f"A hand helps: the median limit is {alone:.1f} dB without one and {in_hand:.1f} dB "
-            f"held. A wall that is to be safe when the user lets go must be {step:.1f} dB softer."
+            f"A hand helps: {both}. A wall that is to be safe when the user lets go must be "
+            f"{step:.1f} dB softer."
         )
-    return (
-        f"A hand makes it worse: the median limit is {alone:.1f} dB without one and "
-        f"{in_hand:.1f} dB held."
-    )
+    return f"A hand makes it worse: {both}."
 
 
 def people(study: StudyAnalysis) -> tuple[str, ...]:
@@ -62,7 +59,7 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
         first = (
             "People hardly move the critical stiffness of this device: for a person not yet seen"
             f"{where} it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does "
-            "not matter for the limit, and more people would not narrow it."
+            "not matter for the limit. More people would not narrow it."
         )
     else:
         size = "a little, " if spread < _LITTLE_DB else ""
@@ -94,9 +91,8 @@ def _elsewhere(study: StudyAnalysis) -> str:
         low, middle, high = (decibel(case.limit.quantile(p)) for p in (0.05, 0.5, 0.95))
         parts.append(f"{middle:.1f} dB ({low:.1f} to {high:.1f}) in configuration {_place(case)}")
     return (
-        f"Most people were recorded in configuration {_place(first)}: wherever a new person's "
-        f"limit is one number, it is the limit there. Elsewhere it is {listed(parts)}; the limit "
-        "of the device counts all of them."
+        f"Most people were recorded in configuration {_place(first)}, and this is the limit there. "
+        f"Elsewhere it is {listed(parts)}. The limit of the device counts all of them."
     )
 
 
@@ -112,8 +108,7 @@ def _between(study: StudyAnalysis) -> str:
     )
     blur = float(np.median([spread_db(case) for case in seen]))
     same = (
-        " That is no more than what one recording leaves open, so that these people cannot be "
-        "told apart by it."
+        " That is no more than one recording leaves open: it cannot tell these people apart."
         if high - low < 2 * blur
         else ""
     )
@@ -143,7 +138,7 @@ def hidden(study: StudyAnalysis) -> str:
     shared = [one for one in study.hidden if one.together is not None]
     text = (
         "Every limit on this page allows for effects that no recording shows. What belongs to the "
-        "device has one size in all of its recordings, and they rule out together what one cannot"
+        "device has one size in all of its recordings. Together they rule out what one cannot"
     )
     if not shared:
         return f"{text}; here every recording stands by itself."
@@ -164,19 +159,18 @@ def missing(study: StudyAnalysis) -> tuple[str, ...]:
     found = []
     if not users:
         found.append(
-            "Nobody holds the device in any recording: how people change the limit, for better or "
+            "Nobody holds the device in any recording. How people change the limit, for better or "
             "worse, is unknown."
         )
     elif len(users) == 1:
-        found.append(
-            "One user only: how much people differ is the prior's guess, not this study's finding."
-        )
+        found.append("There is one user only: how much people differ is the prior's guess.")
     if entries and all(entry.user is not None for entry in entries):
         found.append(
-            "No recording without a user: when the user lets go the limit may be far lower."
+            "There is no recording without a user: when the user lets go, the limit may be far "
+            "lower."
         )
     if len(places) < 2:
-        found.append("One configuration only: in others the limit may be different.")
+        found.append("There is one configuration only: in others the limit may be different.")
     return tuple(found)
 
 
@@ -207,7 +201,7 @@ def configurations(study: StudyAnalysis) -> tuple[str, ...]:
             text += f" (between {low:.1f} and {high:.1f} dB over all of them)"
         sure = float(one.worst_probability.max())
         found.append(
-            f"{text}; the lowest is most probably near {pure(one.worst_coordinate)} "
-            f"({percent(sure)} among those looked at)."
+            f"{text}. The lowest is most probably near {pure(one.worst_coordinate)} (probability "
+            f"{percent(sure)})."
         )
     return tuple(found)

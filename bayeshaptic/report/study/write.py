@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
+from bayeshaptic.report.guidance.section import FIGURES as ADVICE
 from bayeshaptic.report.guidance.section import guidance_section
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.page import render_study
 from bayeshaptic.report.study.population_json import population_json
+from bayeshaptic.report.walls.section import FIGURES as WALLS
 from bayeshaptic.report.walls.section import limits_section, table_of
 
 if TYPE_CHECKING:
@@ -28,7 +30,7 @@ _MAY_BE_MISSING = (
     "limits.json",
     "limits.csv",
     "index.html",
-    *(f"{picture.name}.png" for picture in STUDY_PICTURES),
+    *(f"{name}.png" for name in (*(p.name for p in STUDY_PICTURES), *WALLS, *ADVICE)),
 )
 
 
@@ -89,9 +91,9 @@ def _sections(study: StudyAnalysis, folder: Path) -> list[Section]:
     head = study_headline(study)
     table = table_of(study.cases, limit=study.limit)
     table.write(folder, study.device.name, head.status, head.stiffness)
-    walls = limits_section(
-        table, resolution=study.device.encoder_resolution, untrusted=head.status == "untrusted"
-    )
+    if head.status == "untrusted":  # walls and designs of a limit that nobody is to use
+        return []
+    walls = limits_section(table, resolution=study.device.encoder_resolution)
     first = study.limit.binding[0].case
     case = next(case for case in study.cases if case.label == first)
     advice = guidance_section(case, _analysis_of(case, study))

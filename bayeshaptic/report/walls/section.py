@@ -20,6 +20,7 @@ from bayeshaptic.stability.walls.limit_table import LimitTable, limit_table
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
+FIGURES = ("limits_curve", "limits_kb")
 DRAWS = 2400
 _SLOW_DRAWS = 2000  # of a model without a finite set of poles
 _FRICTION = "friction_force"
@@ -30,7 +31,6 @@ def limits_section(
     table: LimitTable,
     friction: float | None = None,
     resolution: float | None = None,
-    untrusted: bool = False,
 ) -> Section:
     """HTML and pictures: P(stable | K), P(stable | K, B), Z-width, rules.
 
@@ -40,8 +40,6 @@ def limits_section(
         Of one case or several.
     friction, resolution : float, optional
         Coulomb friction and one encoder count, for Abbott and Okamura's rule.
-    untrusted : bool
-        Whether the page says at its top that no limit can be relied on.
     """
     rules = rules_of(table.cases, friction, resolution)
     figures = {
@@ -54,7 +52,6 @@ def limits_section(
         words=words(table, rules),
         widths=width_rows(table),
         rules=rule_rows(table, rules),
-        untrusted=untrusted,
     )
 
 

@@ -1,0 +1,58 @@
+"""Parameters after a force was taken off: wider by what its law leaves open.
+
+The posterior takes the fitted force as exact.  It is not: its strength has an error, and its law is
+an approximation.  Both act as a little more, or less, of the force would: they move the parameters
+along the way that they went when it was taken off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis.discrepancy import share_left
+from bayeshaptic.diagnosis.state import Accepted
+from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.posterior import Posterior
+
+
+def with_law_error(
+    posterior: Posterior, base: Fit, fit: Fit, traced: Traced, seed: int = 0
+) -> Posterior | None:
+    """The posterior with the errors of the accepted laws; None where no force was taken off.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Given the fitted forces.
+    base, fit : Fit
+        Of the model as declared, and with what was found.
+    traced : Traced
+    seed : int
+    """
+    laws = [effect for effect in traced.state.accepted if effect.family == "nonlinear"]
+    if not laws:
+        return None
+    rng = np.random.default_rng([seed, 13])
+    shape = posterior.chains.shape[:-1]
+    sd = np.sqrt(sum(_relative_sd(law) ** 2 for law in laws))
+    left = share_left(traced, "nonlinear")
+    share = sd * rng.standard_normal(shape) + left * rng.uniform(-1.0, 1.0, shape)
+    known = dict(zip(base.model.names, base.theta, strict=True))
+    moved = np.array(
+        [
+            value - known.get(name, value)
+            for name, value in zip(fit.model.names, fit.theta, strict=True)
+        ]
+    )
+    lowest = np.array([posterior.model.prior(name).support[0] for name in posterior.names])
+    chains = np.maximum(posterior.chains + share[..., None] * moved, lowest)
+    return replace(posterior, chains=chains)
+
+
+def _relative_sd(law: Accepted) -> float:
+    """Of the strength of a force, which is the first of its numbers."""
+    strength = next(iter(law.estimates.values()))
+    return strength.sd / abs(strength.mean) if strength.mean else 0.0
