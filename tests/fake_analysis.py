@@ -50,7 +50,7 @@ class FakeAnalysis(SimpleNamespace):
     analysis = measured = property(lambda self: self)
     declared = property(lambda self: self.limit)
     stated = property(lambda self: self.posterior)
-    widened = None
+    widened, sampled = None, True
 
 
 class FakeClosed(SimpleNamespace):

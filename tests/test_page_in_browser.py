@@ -95,7 +95,7 @@ def test_a_figure_tells_its_values_and_switches(page: Any) -> None:
         assert figure.locator("svg .before").first.evaluate("e => e.style.display") == ""
         assert figure.locator("svg .after").first.evaluate("e => e.style.display") == "none"
     if "study" not in page.title():
-        assert plots.count() >= 3
+        assert plots.count() >= (3 if page.locator("#walls").count() else 1)
 
 
 def test_a_table_sorts(page: Any) -> None:

@@ -145,10 +145,10 @@ def test_tables_hold_what_the_loop_holds() -> None:
 
 def test_numbers_beside_the_posterior_stand_in_the_parameter_table() -> None:
     (row,) = estimates(fake_closed())
-    assert (row.name, row.unit, row.posterior) == ("friction_force", "N", "0.593 ± 0.020")
+    assert (row.name, row.unit, row.posterior) == ("friction force", "N", "0.593 ± 0.020")
     assert "beside the posterior" in row.remarks
     drift = estimates(fake_closed(family="time-varying"))
-    assert [row.name for row in drift] == ["kh_last_over_first", "bh_last_over_first"]
+    assert [row.name for row in drift] == ["kh", "bh"]
     assert estimates(fake_closed(family="linear")) == ()
 
 

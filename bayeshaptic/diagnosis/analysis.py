@@ -16,19 +16,22 @@ from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
 from bayeshaptic.errors import Notice
+from bayeshaptic.inference.around_fit import draws_around
 from bayeshaptic.inference.choose import Choice
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model
 from bayeshaptic.quantities import quantity
+from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown
-from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
 from bayeshaptic.threads import single_threaded
 
+NO_WITNESS = "feedback biases it"
 # Evaluations of the likelihood that one posterior may take.
 _MOST_EVALUATIONS = 400_000
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
@@ -65,6 +68,9 @@ class Analysis(Shown):
         What could hide, where the limit allows for it.
     in_loop : InLoop or None
         The motion that posterior and limit come from, where feedback biases the response.
+    sampled : bool
+        False where feedback makes the response worthless: `posterior` is then normal draws around
+        the fit, for a picture, and no limit is stated.
     widened : Posterior or None
         The posterior with the error of a force that was taken off; None where none was.
     """
@@ -84,6 +90,7 @@ class Analysis(Shown):
     lever_m: float | None = None
     in_loop: InLoop | None = None
     hidden: Hidden | None = None
+    sampled: bool = True
     widened: Posterior | None = None
 
     @property
@@ -155,6 +162,8 @@ def analyse(
     """
     chosen = options_from(options, changes)
     begun = begin(measurement_of(measurement, model, chosen), model, chosen)
+    if is_certain(begun.notices):
+        return without_sampling(begun, chosen)
     done = finish(begun, begun.etfe, begun.fit, chosen)
     return replace(done, notices=done.notices + _residual_notice(begun))
 
@@ -214,6 +223,34 @@ def finish(
         seconds=clock.seconds,
         noise_scale=scale,
         lever_m=begun.lever_m,
+    )
+
+
+def without_sampling(begun: Begun, options: Options) -> Analysis:
+    """What is told of a response that feedback biases: a fit to look at, and no limit.
+
+    Parameters
+    ----------
+    begun : Begun
+    options : Options
+    """
+    options.report(0.9, "writing the report")
+    posterior = draws_around(begun.fit, options.seed)
+    limit = critical_stiffness(posterior)
+    return Analysis(
+        recording=begun.etfe.recording,
+        etfe=begun.etfe,
+        device=begun.device,
+        model=begun.fit.model,
+        choice=begun.choice,
+        fit=begun.fit,
+        posterior=posterior,
+        limit=limit,
+        etfe_limit=EtfeCriticalStiffness(None, None, None, None, limit.unit, NO_WITNESS),
+        notices=begun.notices,
+        seconds=begun.seconds,
+        lever_m=begun.lever_m,
+        sampled=False,
     )
 
 

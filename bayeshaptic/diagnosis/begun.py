@@ -103,24 +103,32 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Begun:
-    """A measurement with a base model fitted to it: what an analysis, or the loop, begins with.
-
-    Attributes are those of `Analysis`.
-    """
+class Opened:
+    """A measurement that was checked, with its response; attributes are those of `Analysis`."""
 
     etfe: Etfe
     device: Device | None
-    fit: Fit
-    choice: Choice | None
     notices: tuple[Notice, ...]
     seconds: dict[str, float]
     lever_m: float | None
 
 
-@single_threaded
+@dataclass(frozen=True)
+class Begun(Opened):
+    """With a base model fitted to it: what an analysis, or the loop, begins with."""
+
+    fit: Fit
+    choice: Choice | None
+
+
 def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -> Begun:
     """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
+    return fitted(opened(measurement, model, options), model, options)
+
+
+@single_threaded
+def opened(measurement: Recording | Etfe, model: str | Model, options: Options) -> Opened:
+    """Check the measurement, and estimate its response."""
     model = base_model(model, options)
     clock = Clock()
     device = device_of(options, model)
@@ -137,13 +145,20 @@ def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -
             etfe = _response(measurement, options.band_hz, has_feedback(notices))
     else:
         etfe = measurement
-    with clock.stage("least squares"):
-        options.report(0.06, "fitting")
-        fit, choice = _fit(etfe, model, device, options)
     lever_m = options.lever_m
     if lever_m is None and device is not None:
         lever_m = device.lever_m
-    return Begun(etfe, device, fit, choice, notices + etfe.notices, clock.seconds, lever_m)
+    return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m)
+
+
+@single_threaded
+def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
+    """Fit the base model to what was opened."""
+    clock = Clock(dict(found.seconds))
+    with clock.stage("least squares"):
+        options.report(0.06, "fitting")
+        fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
+    return Begun(**{**vars(found), "seconds": clock.seconds}, fit=fit, choice=choice)
 
 
 def _response(recording: Recording, band_hz: tuple[float, float] | None, biased: bool) -> Etfe:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.analysis import Analysis, finish
+from bayeshaptic.diagnosis.analysis import Analysis, finish, without_sampling
 from bayeshaptic.diagnosis.base_model import traced_from_best_base
-from bayeshaptic.diagnosis.begun import base_model, begin, measurement_of
+from bayeshaptic.diagnosis.begun import Begun, Opened, base_model, fitted, measurement_of, opened
 from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
@@ -135,25 +135,17 @@ def close_loop(
     """
     chosen = options_from(options, changes)
     prior = HiddenPrior.from_table(chosen.effects)
-    begun = begin(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
+    found = opened(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
+    force = explain_force(found.etfe.recording) if has_feedback(found.notices) else None
+    if force is not None and (followed := _in_loop(found, force, model, chosen)) is not None:
+        return followed
+    begun = fitted(found, model, chosen.within(0.0, 0.5))
+    if force is not None or is_certain(begun.notices):
+        return _refused(begun, force, chosen)
     began = time.perf_counter()
-    force = explain_force(begun.etfe.recording) if has_feedback(begun.notices) else None
-    biased = is_certain(begun.notices)  # whatever is traced in the response may be the controller
-    if force is not None:
-        traced = trace_force(begun.etfe, begun.fit, force)
-    elif biased:
-        traced = left_alone(begun.etfe, begun.fit)
-    else:
-        begun, traced = traced_from_best_base(begun, chosen.within(0.05, 0.4))
+    begun, traced = traced_from_best_base(begun, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
-    if force is not None:
-        asked = base_model(model, chosen)
-        one_mass = (asked.name if isinstance(asked, Model) else asked) == "rigid"
-        found = analyse_in_loop(begun, one_mass, chosen.within(0.3, 0.95))
-        if found is not None:
-            error = _limit_alone(found)
-            return Closed(found, found, in_the_loop(traced, found), error, error, force)
-    changed = force is None and bool(traced.state.accepted)
+    changed = bool(traced.state.accepted)
     state = traced.state
     base = finish(
         begun,
@@ -177,8 +169,33 @@ def close_loop(
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)
-    closed = Closed(base, analysis, traced, _error(base), _error(analysis), force)
-    return with_average(closed, prior, chosen) if chosen.hidden and not biased else closed
+    closed = Closed(base, analysis, traced, _error(base), _error(analysis))
+    return with_average(closed, prior, chosen) if chosen.hidden else closed
+
+
+def _in_loop(
+    found: Opened, force: ForceExplained, model: str | Model, options: Options
+) -> Closed | None:
+    """By the motion in its loop; None where it cannot be followed."""
+    asked = base_model(model, options)
+    one_mass = (asked.name if isinstance(asked, Model) else asked) == "rigid"
+    analysis = analyse_in_loop(found, one_mass, options.within(0.3, 0.95))
+    if analysis is None:
+        return None
+    traced = in_the_loop(trace_force(analysis.etfe, analysis.fit, force), analysis)
+    error = _limit_alone(analysis)
+    return Closed(analysis, analysis, traced, error, error, force)
+
+
+def _refused(begun: Begun, force: ForceExplained | None, options: Options) -> Closed:
+    """Where feedback biases the response, and no motion can be followed: nothing is sampled.
+
+    Nothing is traced in the response either: whatever is found may be the controller.
+    """
+    analysis = without_sampling(begun, options)
+    traced = left_alone(begun.etfe, begun.fit, force)
+    error = _error(analysis)
+    return Closed(analysis, analysis, traced, error, error, force)
 
 
 def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from bayeshaptic.diagnosis.analysis import Analysis
-from bayeshaptic.diagnosis.begun import Begun
+from bayeshaptic.diagnosis.analysis import NO_WITNESS, Analysis
+from bayeshaptic.diagnosis.begun import Opened
 from bayeshaptic.diagnosis.feedback.in_loop import contradictions, follow_in_loop, open_questions
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
@@ -22,15 +22,14 @@ _BIASED = (
     "for comparison only. The parameters and the limit are not read from it: they come from the "
     "motion of one mass with friction, simulated in the same loop beside the measured one."
 )
-_NO_WITNESS = "feedback biases it"
 
 
-def analyse_in_loop(begun: Begun, one_mass: bool, options: Options) -> Analysis | None:
+def analyse_in_loop(begun: Opened, one_mass: bool, options: Options) -> Analysis | None:
     """The analysis by the motion in the loop; None where no such motion can be found.
 
     Parameters
     ----------
-    begun : Begun
+    begun : Opened
     one_mass : bool
         Whether the device was declared to be one: otherwise no limit is recommended.
     options : Options
@@ -68,7 +67,7 @@ def analyse_in_loop(begun: Begun, one_mass: bool, options: Options) -> Analysis 
         fit=fit,
         posterior=posterior,
         limit=limit,
-        etfe_limit=EtfeCriticalStiffness(None, None, None, None, limit.unit, _NO_WITNESS),
+        etfe_limit=EtfeCriticalStiffness(None, None, None, None, limit.unit, NO_WITNESS),
         notices=told + limit.notices,
         seconds={**begun.seconds, "motion in the loop": time.perf_counter() - began},
         lever_m=begun.lever_m,

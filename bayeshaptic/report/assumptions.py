@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, ...]:
     """The assumptions in sentences, the data's first."""
-    etfe, posterior = analysis.etfe, analysis.posterior
-    ensembles, steps, walkers, _ = posterior.chains.shape
+    etfe = analysis.etfe
     unit = pretty_unit(etfe.force_unit)
     return (
         "The device, its configuration and the way it is held are those of the recording: another "
@@ -33,6 +32,16 @@ def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, 
         _model(analysis, closed),
         *_widening(closed),
         *_noise(analysis),
+        *_sampling(analysis),
+    )
+
+
+def _sampling(analysis: Analysis) -> tuple[str, ...]:
+    if not analysis.sampled:
+        return ()
+    posterior = analysis.posterior
+    ensembles, steps, walkers, _ = posterior.chains.shape
+    return (
         "Priors as in the table below. Intervals are 90 % and equal-tailed: from the 5 % to the "
         f"95 % quantile. {ensembles} ensembles of {walkers} walkers, {steps} steps, seed "
         f"{posterior.seed}.",

@@ -89,13 +89,13 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"what the model leaves over is {misfit_factor(analysis)} times the noise, and no "
             "effect that was tried explains it"
         )
-    if verdict != "unexplained" and misfit_is_clear(analysis):
+    if verdict != "unexplained" and analysis.sampled and misfit_is_clear(analysis):
         found.append(
             "the model does not explain the data (what it leaves over is "
             f"{misfit_factor(analysis)} times the noise, reduced chi-square "
             f"{pure(analysis.fit.reduced_chi_square)})"
         )
-    if verdict is None and residual_is_noticed(analysis):
+    if verdict is None and analysis.sampled and residual_is_noticed(analysis):
         found.append(
             "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
         )
@@ -107,7 +107,7 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"the force {how} computed from the motion (feedback), which biases the response that "
             "everything here is read from"
         )
-    if (far := unstated(analysis)) is not None:
+    if analysis.sampled and (far := unstated(analysis)) is not None:
         found.append(far)
     if not analysis.posterior.converged:
         found.append("the sampler has not converged, so the interval may be too narrow")

@@ -93,7 +93,7 @@ def render(
         bibtex=methods.bibtex(result),
         reproduce=reproduce(result, origin),
         asked=asked(origin),
-        files=FILES,
+        files=[one for one in FILES if analysis.sampled or one[0] != "posterior.nc"],
         sections=sections,
     )
     return finished(page, _CONTENTS)

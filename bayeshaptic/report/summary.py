@@ -164,7 +164,9 @@ def _least_squares(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _posterior(result: Result) -> dict[str, Any]:
+def _posterior(result: Result) -> dict[str, Any] | None:
+    if not result.analysis.sampled:
+        return None
     posterior, doubtful = result.analysis.stated, doubtful_parameters(result)
     return {
         "parameters": {

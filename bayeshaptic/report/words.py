@@ -29,6 +29,11 @@ def misfit(analysis: Analysis, loop: bool = False) -> str:
             "Feedback biases the measured response, and the model was not fitted to it but to the "
             "motion: where the two differ here, the response is wrong, or more than one mass moves."
         )
+    if not analysis.sampled:
+        return (
+            "Feedback biases the measured response. What a model leaves over of it says nothing of "
+            "the device."
+        )
     fit = analysis.fit
     order = np.argsort(fit.frequency_hz)
     bands = third_octaves(fit.frequency_hz[order], fit.residual[order])
@@ -69,6 +74,8 @@ def misfit(analysis: Analysis, loop: bool = False) -> str:
 def convergence(analysis: Analysis) -> str:
     """The sampler's own sentence, and its size."""
     posterior = analysis.posterior
+    if not analysis.sampled:
+        return "It was not run: no limit would be stated from what it says."
     ensembles, steps, walkers, _ = posterior.chains.shape
     message = posterior.message[:1].upper() + posterior.message[1:].rstrip(".")
     return (
@@ -80,6 +87,8 @@ def convergence(analysis: Analysis) -> str:
 def checked(analysis: Analysis) -> str:
     """What the spectral radius said about the limits."""
     limit = analysis.limit
+    if not analysis.sampled:
+        return ""
     if not limit.checked:
         return "No draw's limit was checked by the poles of the closed loop."
     return (

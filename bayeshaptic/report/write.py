@@ -31,8 +31,11 @@ from bayeshaptic.threads import single_threaded
 
 # Whoever waits for a report looks for its summary: it arrives when the rest is there.
 _LAST = "summary.json"
-_PICTURES = (p.name for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES))
-_MAY_BE_MISSING = tuple(f"{name}.png" for name in (*_PICTURES, *WALLS, *ADVICE, "hidden"))
+_PICTURES = tuple(p.name for p in (*PICTURES, *LOOP_PICTURES, *FORCE_PICTURES))
+_MAY_BE_MISSING = (
+    "posterior.nc",
+    *(f"{name}.png" for name in (*_PICTURES, *WALLS, *ADVICE, "hidden")),
+)
 
 
 @at_the_door
@@ -75,7 +78,8 @@ def _write_all(result: Result, folder: Path, origin: Mapping[str, Any] | None) -
     for part in (pictures, *(section.pictures for section in sections)):
         for name, drawn in part.items():
             (folder / f"{name}.png").write_bytes(drawn.png)
-    analysis.stated.save(folder / "posterior.nc")
+    if analysis.sampled:
+        analysis.stated.save(folder / "posterior.nc")
     page = render(result, pictures, [section.html for section in sections], origin)
     (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
     (folder / _LAST).write_text(summary_json(result, origin), encoding="utf-8", newline="\n")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bayeshaptic.diagnosis.acceptance import verdict_of
-from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics, inverse_dynamics
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
-from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.effects.library import effects
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import Fit
@@ -56,18 +55,15 @@ def explain_force(recording: Recording | None) -> ForceExplained | None:
 
 
 def trace_force(etfe: Etfe, fit: Fit, force: ForceExplained) -> Traced:
-    """What the loop found in the force; the residual of the biased response stays as it is."""
-    tests = residual_tests(fit, etfe)
+    """What the loop found in the force; the residual of the biased response is not looked at."""
     state = State(etfe, fit, _friction(force))
-    verdict, residual_class = verdict_of(state.accepted, tests)
-    return Traced(verdict, residual_class, state, tests, tests)
+    return Traced(*verdict_of(state.accepted, ()), state, (), ())
 
 
-def left_alone(etfe: Etfe, fit: Fit) -> Traced:
-    """The biased response of a device that does not move as one mass: nothing is traced in it."""
-    tests = residual_tests(fit, etfe)
-    state = State(etfe, fit, ())
-    return Traced(*verdict_of((), tests), state, tests, tests)
+def left_alone(etfe: Etfe, fit: Fit, force: ForceExplained | None) -> Traced:
+    """The biased response of a device whose motion cannot be followed: nothing is traced in it."""
+    state = State(etfe, fit, () if force is None else _friction(force))
+    return Traced(UNEXPLAINED, None, state, (), ())
 
 
 def _friction(force: ForceExplained) -> tuple[Accepted, ...]:

@@ -90,7 +90,7 @@ def in_loop_fit(model: Model, etfe: Etfe, motion: MotionFit, held_out: float) ->
     support = np.array([model.prior(name).support for name in model.names])
     theta = np.clip(theta, support[:, 0], support[:, 1])
     windows = compress(etfe, partial(model.response, theta))
-    low = (motion.values[kept] < motion.inside[kept]) & (theta <= 0)
+    low = (motion.values[kept] < motion.inside[kept]) & (theta <= support[:, 0])
     outcome = {n: AT_BOUND if b else CONVERGED for n, b in zip(model.names, low, strict=True)}
     return InLoopFit(
         model,

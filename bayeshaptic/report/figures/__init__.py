@@ -50,6 +50,10 @@ def _has_limit(result: Result) -> bool:
     return unstated(result.analysis) is None
 
 
+def _is_sampled(result: Result) -> bool:
+    return result.analysis.sampled
+
+
 PICTURES = (
     Picture(
         "answer",
@@ -76,16 +80,36 @@ PICTURES = (
         "Force and position over time, their spectra, and how often each value occurs",
         shown=record.is_shown,
     ),
-    Picture("residuals", residuals.draw, "Residual over frequency in units of the noise"),
+    Picture(
+        "residuals",
+        residuals.draw,
+        "Residual over frequency in units of the noise",
+        shown=_is_sampled,
+    ),
     Picture(
         "crossings",
         crossings.draw,
         "Stiffness and phase over frequency, with every crossing",
         shown=_has_limit,
     ),
-    Picture("marginals", marginals.draw, "Posterior, prior and least squares of each parameter"),
-    Picture("pairs", pairs.draw, "Pairs of the most strongly correlated parameters"),
-    Picture("sampler", sampler.draw, "Trace, ranks, effective draws and R-hat of the sampler"),
+    Picture(
+        "marginals",
+        marginals.draw,
+        "Posterior, prior and least squares of each parameter",
+        shown=_is_sampled,
+    ),
+    Picture(
+        "pairs",
+        pairs.draw,
+        "Pairs of the most strongly correlated parameters",
+        shown=_is_sampled,
+    ),
+    Picture(
+        "sampler",
+        sampler.draw,
+        "Trace, ranks, effective draws and R-hat of the sampler",
+        shown=_is_sampled,
+    ),
 )
 
 
@@ -124,6 +148,8 @@ FORCE_PICTURES = (
 def draw_pictures(result: Result) -> dict[str, Drawn]:
     """Every figure of an analysis, or of a closed loop, by name."""
     chosen, closed = list(PICTURES), result.closed
-    if closed is not None:
-        chosen += LOOP_PICTURES if closed.force is None else FORCE_PICTURES
+    if closed is not None and closed.force is not None:
+        chosen += FORCE_PICTURES
+    elif closed is not None and result.analysis.sampled:
+        chosen += LOOP_PICTURES
     return {p.name: drawn(p.draw(result), p.name) for p in chosen if p.shown(result)}

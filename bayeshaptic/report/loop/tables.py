@@ -141,13 +141,13 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
     for effect, known in zip(closed.effects, closed.diagnosis["effects"], strict=True):
         for name in shown_estimates(effect):
             value = known["parameters"][name]
-            row = scale(value["mean"], value["unit"])
+            row, said = scale(value["mean"], value["unit"]), parameter_words(name)
             sd = value["sd"]
             spread = f"{row.number(value['q05'], sd)} to {row.number(value['q95'], sd)}"
             rows.append(
                 ParameterRow(
-                    parameter_words(name),
-                    effect.title,
+                    said.partition(",")[0],
+                    said if "," in said else effect.title,
                     row.unit,
                     _DASH,
                     row.with_error(value["mean"], sd),

@@ -22,6 +22,8 @@ def unstated(analysis: Analysis) -> str | None:
     The median is compared with the measured dynamic stiffness, 1/|G|: beyond a thousand times its
     range it is what the prior and the model's form make of a parameter that the data do not see.
     """
+    if not analysis.sampled:
+        return "feedback biases the response that it would be read from"
     limit = analysis.limit.quantile(0.5)
     size = np.abs(analysis.etfe.value)
     stiffness = 1 / size[size > 0]
@@ -29,7 +31,10 @@ def unstated(analysis: Analysis) -> str | None:
         return None  # "never stable" and "always" are answers
     if stiffness.min() / _FARTHEST < limit < stiffness.max() * _FARTHEST:
         return None
-    return "the model's limit lies decades from any stiffness that was measured"
+    return (
+        "the model's limit lies decades from any stiffness that was measured, and is what the "
+        "prior and the model's form make of a parameter that this recording does not see"
+    )
 
 
 def errors(closed: Closed) -> dict[str, dict[str, Any]]:

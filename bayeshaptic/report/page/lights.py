@@ -72,6 +72,8 @@ def _recording(analysis: Analysis) -> Light:
 
 def _fit(result: Result) -> Light:
     analysis = result.analysis
+    if not analysis.sampled:
+        return Light("Fit", DOUBT, "for comparison only", "leftover")
     if analysis.in_loop is not None:
         if analysis.in_loop.doubts:
             return Light("Fit", BAD, "halves disagree", "force")
@@ -90,6 +92,8 @@ def _loop(result: Result) -> Light:
     closed = result.closed
     if closed is None:
         return Light("Loop", DOUBT, "left open", "assumptions")
+    if closed.force is None and not closed.analysis.sampled:
+        return Light("Loop", DOUBT, "nothing was tried", "notices")
     section = "force" if closed.force is not None else "lacked"
     state, word = _SEEN[closed.verdict]
     if state == GOOD and misfit_is_clear(closed.analysis):
@@ -98,6 +102,8 @@ def _loop(result: Result) -> Light:
 
 
 def _sampler(analysis: Analysis) -> Light:
+    if not analysis.sampled:
+        return Light("Sampler", DOUBT, "not run", "sampler")
     if not analysis.posterior.converged:
         return Light("Sampler", BAD, "not converged", "sampler")
     if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):

@@ -58,6 +58,8 @@ def methods(result: Result) -> str:
     analysis = result.analysis
     if analysis.in_loop is not None:
         return " ".join((_in_loop(analysis), _sampled(analysis), _limit()))
+    if not analysis.sampled:
+        return " ".join((*_measured(analysis.etfe), _model(analysis), _sampled(analysis)))
     return " ".join(
         (*_measured(analysis.etfe), _model(analysis), _sampled(analysis), *_loop(result), _limit())
     )
@@ -108,6 +110,11 @@ def _model(analysis: Analysis) -> str:
 
 
 def _sampled(analysis: Analysis) -> str:
+    if not analysis.sampled:
+        return (
+            "The force was computed from the motion, which biases that response. Nothing more was "
+            "made of it."
+        )
     posterior = analysis.posterior
     ensembles, steps, walkers, _ = posterior.chains.shape
     least = min(posterior.ess_bulk.min(), posterior.ess_tail.min())
