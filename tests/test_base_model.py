@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bayeshaptic as bh
 from bayeshaptic.diagnosis import base_model
 from bayeshaptic.diagnosis.base_model import traced_from_best_base
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
-from bayeshaptic.inference.choose import Choice, ScoredFit
+from bayeshaptic.inference import choose
+from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
+from bayeshaptic.models.hand import from_a_hand
 
 SIZES = {"rigid": 2, "free": 6, "grasped": 11}
 
@@ -20,7 +23,7 @@ SIZES = {"rigid": 2, "free": 6, "grasped": 11}
 def fit(name: str, chi_square: float, further: int = 0) -> Any:
     """A fit of 300 windows whose residual has this mean square."""
     return SimpleNamespace(
-        model=SimpleNamespace(name=name, size=SIZES[name] + further),
+        model=SimpleNamespace(name=name, size=SIZES[name] + further, held=name == "grasped"),
         residual=np.full(300, np.sqrt(chi_square)),
         reduced_chi_square=chi_square,
     )
@@ -34,19 +37,29 @@ def traced(name: str, verdict: str, chi_square: float, *sizes: int) -> Any:
 
 
 def chosen_of(
-    monkeypatch: pytest.MonkeyPatch, chosen: str, misfits: dict[str, float], loops: dict[str, Any]
+    monkeypatch: pytest.MonkeyPatch,
+    chosen: str,
+    misfits: dict[str, float],
+    loops: dict[str, Any],
+    from_a_hand: float = 0.0,
 ) -> tuple[str, list[str]]:
     """The base model in the end, and those that the loop was closed on."""
     seen = []
+
+    def deviance(of: Any, noise: float) -> tuple[float, float]:
+        far = from_a_hand * of.model.held
+        return 2 * np.sum(of.residual**2) / noise + far, far
 
     def trace(etfe: Any, fitted: Any, *_: Any) -> Any:
         seen.append(fitted.model.name)
         return loops[fitted.model.name]
 
     monkeypatch.setattr(base_model, "trace", trace)
+    monkeypatch.setattr(choose, "deviance", deviance)
     monkeypatch.setattr(base_model, "replace", lambda old, **new: _changed(old, new))
     fits = {name: fit(name, value) for name, value in misfits.items()}
-    choice = Choice(fits[chosen], "", {name: ScoredFit(f, 0.0) for name, f in fits.items()})
+    scored = {name: ScoredFit(f, 0.0, deviance(f, 1.0)[1]) for name, f in fits.items()}
+    choice = Choice(fits[chosen], "", scored)
     begun: Any = SimpleNamespace(etfe=None, fit=fits[chosen], choice=choice)
     return traced_from_best_base(begun, Options())[0].fit.model.name, seen
 
@@ -90,3 +103,55 @@ def test_the_loop_is_closed_once_where_nothing_else_is_in_question(
 ) -> None:
     found = {chosen: traced(chosen, *own)}
     assert chosen_of(monkeypatch, chosen, misfits, found) == (chosen, [chosen])
+
+
+def test_a_hand_that_is_like_none_is_compared_with_what_nobody_holds(monkeypatch) -> None:
+    """It fits, but with a mass of tons: a free device with one effect more explains it, too."""
+    found = {
+        "grasped": traced("grasped", EXPLAINED, 1.0, 3),
+        "free": traced("free", EXPLAINED, 1, 1),
+    }
+    misfits = {"free": 90.0, "grasped": 1.0}
+    assert chosen_of(monkeypatch, "grasped", misfits, found, 4.0) == ("grasped", ["grasped"])
+    assert chosen_of(monkeypatch, "grasped", misfits, found, 60.0) == ("free", ["grasped", "free"])
+
+
+def test_hands_are_near_what_hands_are_like() -> None:
+    """Draws of a hand are some five squared standard deviations away, a spring to the frame far."""
+    rng = np.random.default_rng(5)
+    mass = 0.3 * np.exp(2.0 * rng.normal(size=4000))
+    arm = 2 * np.pi * 3.0 * np.exp(0.8 * rng.normal(size=4000))
+    grip = 2 * np.pi * 25.0 * np.exp(0.9 * rng.normal(size=4000))
+    hand = {
+        "mh": mass,
+        "kh": mass * arm**2,
+        "bh": 2 * 0.7 * np.exp(1.1 * rng.normal(size=4000)) * mass * arm,
+        "ks": mass * grip**2,
+        "bs": 2 * 0.1 * np.exp(1.5 * rng.normal(size=4000)) * mass * grip,
+    }
+    far = np.sum(from_a_hand(hand, 0.3) ** 2, axis=1)
+    assert far.mean() == pytest.approx(5.0, abs=5 * np.sqrt(10 / 4000))
+    frame = {"mh": 300.0, "kh": 1e4, "bh": 3.0, "ks": 12.0, "bs": 1e-3}
+    assert np.sum(from_a_hand({k: np.array([v]) for k, v in frame.items()}, 0.3) ** 2) > 60
+
+
+def test_a_third_mass_is_no_hand(tmp_path) -> None:
+    """Three masses in a row that rub on the ground, nobody named: not taken for a held device."""
+    model = bh.chain(2, delay_s=2e-4, period_s=1e-3)
+    values = {"m1": 0.1, "b1": 0.3, "bc": 0.3, "kc": 3e3, "m2": 0.2, "b2": 0.0}
+    values |= {"m3": 0.1, "c3": 0.3, "k3": 2e3, "b3": 0.5}
+    theta = np.array([values[name] for name in model.names])
+    frequency = np.geomspace(1.0, 200.0, 300)
+    rng = np.random.default_rng(3)
+    noise = 0.01 * rng.normal(size=(2, 300)) / np.sqrt(2)
+    response = model.response(theta, frequency) * (1 + noise[0] + 1j * noise[1])
+    gain, phase = 20 * np.log10(np.abs(response)), np.angle(response, deg=True)
+    rows = np.stack([frequency, gain, phase, 0.01 * np.abs(response)], axis=1)
+    path = tmp_path / "table.csv"
+    np.savetxt(path, rows, delimiter=",", header="frequency_hz,gain_db,phase_deg,sd", comments="")
+    table = bh.read_frf(path, period_s=1e-3, kind="translational")
+    choice = choose.choose_model(table, delay_s=2e-4)
+    assert choice.fit.model.name == "chain-2"
+    grasped = choice.candidates["grasped"]
+    assert grasped.fit.reduced_chi_square < 1.2
+    assert grasped.score > choice.candidates["chain-2"].score + UNDECIDED

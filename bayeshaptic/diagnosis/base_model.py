@@ -2,7 +2,8 @@
 
 A mode or a spring that the right base model lacks can make a wrong one fit better: a second mode
 looks like a hand, a hand like a spring and a base that gives.  So where the base model that was
-chosen misfits, the loop is closed on the others, too, and they are compared with their effects.
+chosen misfits, or its hand is like none, the loop is closed on the others, too, and they are
+compared with their effects.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
 from bayeshaptic.inference.fit import MISFIT
 
+_LIKE_NO_HAND = 20.5  # chi-square of five numbers: one hand in a thousand
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
 
 
@@ -55,14 +57,22 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
 
 
 def _rivals(begun: Begun) -> tuple[str, ...]:
-    """The base models that could be instead: none where the chosen one fits, or was asked for.
+    """The base models that could be instead: none where the chosen one was asked for, or fits.
 
-    A rigid device with a mode is a free one.
+    A hand that is like none is no better than a misfit.  A rigid device with a mode is a free one,
+    and a free one with a mode a chain: of those that nobody holds the best is enough.
     """
-    if begun.choice is None or begun.fit.reduced_chi_square < MISFIT:
+    choice = begun.choice
+    if choice is None:
         return ()
-    chosen = begun.fit.model.name
-    return tuple(name for name in begun.choice.candidates if name not in (chosen, "rigid"))
+    chosen = choice.candidates[begun.fit.model.name]
+    if begun.fit.reduced_chi_square < MISFIT and chosen.from_a_hand < _LIKE_NO_HAND:
+        return ()
+    others = {name: one for name, one in choice.candidates.items() if name != "rigid"}
+    if begun.fit.model.name == "rigid":
+        return tuple(name for name in others if name != "chain-2")
+    there = [name for name, one in others.items() if one.held != chosen.held]
+    return tuple(sorted(there, key=lambda name: others[name].score)[:1])
 
 
 def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:

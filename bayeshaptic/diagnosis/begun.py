@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.models.structures import chain
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.join import unbroken
@@ -25,6 +26,7 @@ from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.sufficiency import refuse_too_little
+from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded
 
 _WIDEST = 0.4  # of the sampling rate: a band's upper end
@@ -185,7 +187,29 @@ def _fit(
         return least_squares(model.with_prior(prior), etfe, seed=seed), None
     delay = options.delay_s, options.delay_sd_s
     if model == "auto":
-        choice = choose_model(etfe, device, *delay, prior, options.held, seed)
+        choice = _lower_where_undecided(
+            choose_model(etfe, device, *delay, prior, options.held, seed)
+        )
         return choice.fit, choice
     built = build_model(model, device, *delay, etfe.period_s, prior)
     return least_squares(built, etfe, seed=seed), None
+
+
+def _lower_where_undecided(choice: Choice) -> Choice:
+    """The choice; where it is open whether somebody holds the device, that with the lower limit."""
+    if not choice.undecided:
+        return choice
+    names = (choice.fit.model.name, *choice.undecided)
+    fits = {name: choice.candidates[name].fit for name in names}
+    limits = {
+        name: float(critical_stiffness(fit.model, fit.theta).value) for name, fit in fits.items()
+    }
+    lowest = min(names, key=lambda name: limits[name])
+    said = ", ".join(
+        f"{name} {quantity(limits[name], fits[name].model.stiffness_unit)}" for name in names
+    )
+    text = (
+        f" Whether somebody holds it, this recording does not tell ({' and '.join(names)} explain "
+        f"it alike): the one with the lower limit is taken, {lowest} ({said}). Say it with --held."
+    )
+    return replace(choice, fit=fits[lowest], reason=choice.reason + text)

@@ -1,4 +1,9 @@
-"""Choosing between rigid, free and grasped, and saying why."""
+"""Choosing between rigid, free, a chain of three masses and grasped, and saying why.
+
+A third mass looks like a hand: what tells them apart is that an arm holds the hand to the ground,
+and what hands are like.  So a chain is among the candidates, and the hand of a grasped device
+counts by how far it is from any, as five more residuals.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +14,25 @@ import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
-from bayeshaptic.inference.fit import MISFIT, Fit
+from bayeshaptic.inference.fit import MISFIT, Fit, search_box, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Prior, build_model
-from bayeshaptic.models.structures import STRUCTURES
+from bayeshaptic.models.hand import from_a_hand
+from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown
 from bayeshaptic.threads import single_threaded
+from bayeshaptic.types import Floats
 
 _MATERIAL = 2.0  # a richer model that misfits too must cut the squared residual by this factor
+# Information criteria nearer than this, odds of twenty to one, leave open which model it is.
+UNDECIDED = 6.0
+_NOBODY = ("rigid", "free", "chain-2")
+_STEPS, _SETTLED = 40, 1e-3  # of the least sum of misfit and distance from a hand
 _WORDS = {
     "rigid": "one rigid mass",
     "free": "two masses and a transmission, held by nobody",
+    "chain-2": "three masses in a row, held by nobody",
     "grasped": "a device held by a user",
 }
 
@@ -35,10 +47,20 @@ class ScoredFit:
     score : float
         Bayesian information criterion, with the residual of the best candidate as the noise where
         that exceeds the noise (a quasi-likelihood); smaller is better.
+    from_a_hand : float
+        Squared distance of its hand from what hands are like, in standard deviations, where both
+        this and the misfit are least: a chi-square of five numbers, and in the score; zero where
+        there is no hand.
     """
 
     fit: Fit
     score: float
+    from_a_hand: float = 0.0
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody holds it."""
+        return self.fit.model.held
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,6 +79,16 @@ class Choice(Shown):
     reason: str
     candidates: Mapping[str, ScoredFit]
 
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """Candidates as good as the chosen one that differ from it in whether somebody holds it."""
+        chosen = self.candidates[self.fit.model.name]
+        return tuple(
+            name
+            for name, other in self.candidates.items()
+            if other.held != chosen.held and abs(other.score - chosen.score) < UNDECIDED
+        )
+
     def _lines(self) -> tuple[str, ...]:
         others = ", ".join(name for name in self.candidates if name != self.fit.model.name)
         return f"Chosen model: {self.fit.model.name}", self.reason, f"compared with: {others}"
@@ -73,7 +105,7 @@ def choose_model(
     held: bool | None = None,
     seed: int = 0,
 ) -> Choice:
-    """Fit the rigid, the free and the grasped model and choose by an information criterion.
+    """Fit the rigid, the free, the chain and the grasped model; choose by an information criterion.
 
     Parameters
     ----------
@@ -91,7 +123,7 @@ def choose_model(
     -------
     Choice
     """
-    names = {None: list(STRUCTURES), True: ["grasped"], False: ["rigid", "free"]}[held]
+    names = {None: (*_NOBODY, "grasped"), True: ("grasped",), False: _NOBODY[:2]}[held]
     fits = {}
     for name in names:
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
@@ -99,7 +131,8 @@ def choose_model(
         fits[name] = least_squares(model.with_prior(own), etfe, seed=seed)
     noise = max(1.0, min(fit.reduced_chi_square for fit in fits.values()))
     candidates = {
-        name: ScoredFit(fit, information_criterion(fit, noise)) for name, fit in fits.items()
+        name: ScoredFit(fit, information_criterion(fit, noise), deviance(fit, noise)[1])
+        for name, fit in fits.items()
     }
     best = _best(candidates, noise)
     return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
@@ -133,8 +166,43 @@ def information_criterion(fit: Fit, noise: float, further: int = 0) -> float:
         Parameters beside those of the fit's model.
     """
     numbers = 2 * len(fit.residual)
-    deviance = 2 * float(np.sum(np.abs(fit.residual) ** 2)) / noise
-    return deviance + (fit.model.size + further) * float(np.log(numbers))
+    return deviance(fit, noise)[0] + (fit.model.size + further) * float(np.log(numbers))
+
+
+def deviance(fit: Fit, noise: float) -> tuple[float, float]:
+    """Squared residual of a fit, and how far its hand is from what hands are like.
+
+    A hand counts as five more residuals, and both are those of the least sum.
+
+    Parameters
+    ----------
+    fit : Fit
+    noise : float
+        Factor on the noise variance.
+
+    Returns
+    -------
+    whole : float
+        Twice the fall of the log likelihood; of what is known of hands, too.
+    from_a_hand : float
+        The hand's part of it, a chi-square of five numbers; zero where nobody holds the device.
+    """
+    if not fit.model.held:
+        return 2 * float(np.sum(np.abs(fit.residual) ** 2)) / noise, 0.0
+    here, low, high = search_box(fit.model)
+    misfit = weighted_residuals(fit.likelihood, here)
+    mass = float(fit.model.prior("mh").quantile(0.5))
+
+    def hand(phi: Floats) -> Floats:
+        values = dict(zip(fit.model.names, here.natural(phi).T, strict=True))
+        return from_a_hand(values, mass)
+
+    def both(phi: Floats) -> Floats:
+        return np.concatenate([misfit(phi) / np.sqrt(noise), hand(phi)], axis=1)
+
+    start = here.coordinate(fit.theta[None])
+    phi, half = minimise(both, start, low, high, _STEPS, _SETTLED)
+    return 2 * float(half[0]), float(np.sum(hand(phi) ** 2))
 
 
 def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: bool | None) -> str:

@@ -76,8 +76,8 @@ def chain(
     Parameters
     ----------
     modes : int
-        0 is `rigid`, 1 is `free`; N has N + 1 masses: beside those of `free` m3, c3, k3 and so on,
-        the mass and what joins it to the one before.
+        0 is `rigid`, 1 is `free`; N has N + 1 masses: beside those of `free` m3, c3, k3, b3 and so
+        on, the mass, what joins it to the one before, and its damper to the ground.
     device, delay_s, delay_sd_s, period_s, prior
         See `grasped`.  A device file gives the parameters of two masses at most; the priors of a
         longer chain come from the data at the first fit.

@@ -98,4 +98,6 @@ def _named(
     named |= {"kc": springs[0], "bc": dampers[0]}
     for n, (spring, damper) in enumerate(zip(springs[1:], dampers[1:], strict=True), start=3):
         named |= {f"k{n}": spring, f"c{n}": damper}
-    return named
+    # The new mass rubs on the ground as much as the others do on average.
+    ground = [values[f"b{n}"] for n in range(1, len(masses))]
+    return named | {f"b{len(masses)}": sum(ground) / len(ground)}

@@ -72,6 +72,11 @@ class Model(Shown):
         return self.structure.name
 
     @property
+    def held(self) -> bool:
+        """Whether somebody holds the device."""
+        return self.structure.held
+
+    @property
     def names(self) -> tuple[str, ...]:
         return tuple(parameter.name for parameter in self.parameters)
 

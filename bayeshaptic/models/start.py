@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.models.build import DAMPER_FLOOR, DAMPER_RISE, delay_prior
+from bayeshaptic.models.hand import KILOGRAMS, hand_priors
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.prior import LogNormal, NearZero, Prior, draw
 from bayeshaptic.models.structures import GROUND_DAMPERS, HAND
@@ -73,31 +74,13 @@ def informed(model: Model, etfe: Etfe) -> Model:
     found = scales(etfe)
     missing = {p.name: p.dimension for p in model.parameters if p.prior is None}
     kilograms = (model.force_unit, model.position_unit) == ("N", "m")
-    hand_kg = 0.3  # middle of what a hand, or a finger, brings along
-    hand = _hand_priors(hand_kg if kilograms else found.mass)
+    hand = hand_priors(KILOGRAMS if kilograms else found.mass)
     return model.with_prior(
         {
             name: hand[name] if name in HAND else _weak_prior(name, kind, found, etfe.period_s)
             for name, kind in missing.items()
         }
     )
-
-
-def _hand_priors(mass: float) -> dict[str, Prior]:
-    """What hands are like: from grams to kilograms, on an arm and behind a grip.
-
-    An arm holds it at some 3 Hz (a standard deviation is a factor 2.2: hardly above 15 Hz), with a
-    damping ratio of some 0.7; a grip at some 25 Hz (factor 2.5) with a ratio of some 0.1.  The
-    springs and dampers spread as far as the mass and these together.
-    """
-    arm, grip = 2 * np.pi * 3.0, 2 * np.pi * 25.0
-    return {
-        "mh": LogNormal(mass, 2.0),
-        "kh": LogNormal(mass * arm**2, float(np.hypot(2.0, 2 * 0.8))),
-        "bh": LogNormal(2 * 0.7 * mass * arm, float(np.hypot(2.0, 1.1))),
-        "ks": LogNormal(mass * grip**2, float(np.hypot(2.0, 2 * 0.9))),
-        "bs": LogNormal(2 * 0.1 * mass * grip, float(np.hypot(2.0, 1.5))),
-    }
 
 
 def _weak_prior(name: str, dimension: str, found: Scales, period_s: float) -> Prior:

@@ -38,9 +38,11 @@ for _number in range(3, MOST_MODES + 2):
         f"m{_number}": ("mass", f"mass number {_number} of the chain"),
         f"c{_number}": ("damping", f"damper between masses {_number - 1} and {_number}"),
         f"k{_number}": ("stiffness", f"spring between masses {_number - 1} and {_number}"),
+        f"b{_number}": ("damping", f"damper from mass number {_number} to the ground"),
     }
 HAND = ("bs", "ks", "mh", "bh", "kh")
-GROUND_DAMPERS = ("b", "b1", "b2")  # hardly seen by the data, and zero in the paper's tables
+# Hardly seen by the data, and zero in the paper's tables.
+GROUND_DAMPERS = ("b", *(f"b{number}" for number in range(1, MOST_MODES + 2)))
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,11 @@ class Structure:
     names: tuple[str, ...]
     build: Callable[[Values], Mechanism]
     title: str
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody holds the device."""
+        return set(HAND) <= set(self.names)
 
 
 def _rigid(v: Values) -> Mechanism:
@@ -103,12 +110,13 @@ def chain(modes: int) -> Structure:
     if modes < 2:
         return (RIGID, FREE)[modes]
     further = tuple(range(3, modes + 2))
-    names = tuple(f"{part}{number}" for number in further for part in "mck")
+    names = tuple(f"{part}{number}" for number in further for part in "mckb")
 
     def build(v: Values) -> Mechanism:
         mechanism = _free(v)
         for n in further:
             mechanism = mechanism.with_mass(v[f"m{n}"], n - 2, v[f"c{n}"], v[f"k{n}"])
+            mechanism = mechanism.with_link(Link(n - 1, None, v[f"b{n}"], np.zeros_like(v["m1"])))
         return mechanism
 
     title = f"{modes + 1} masses in a row, nobody holds it"

@@ -114,7 +114,7 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
     force = recording.force - recording.force.mean()
     system = fit.model.system(fit.theta)
     x, v = linear_motion(system, force, recording.period_s)
-    if fit.model.name == "grasped":
+    if fit.model.held:
         rest = recording.position - recording.position.mean() - x
         rate = 1 / recording.period_s
         hand_hz = 20.0  # below it a hand moves the device, and the encoder sees it well

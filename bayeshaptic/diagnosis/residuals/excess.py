@@ -36,7 +36,7 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     windows = RandomSpectra.windows(spectra, fit.response)  # as measured, nothing discounted
     centre = windows.frequency_hz[:, 1]
     hand_hz, free_hz = 45.0, 20.0  # below it a hand, or a draught, moves the device
-    driven = centre > (hand_hz if fit.model.name == "grasped" else free_hz)
+    driven = centre > (hand_hz if fit.model.held else free_hz)
     if floor is None or driven.sum() < _TOGETHER:
         return ()
     together = np.ones(_TOGETHER)

@@ -71,7 +71,7 @@ class ForceBench:
     def __init__(self, state: State, recording: Recording) -> None:
         self.state = state
         self.model = state.model
-        self.held = self.model.name == "grasped"
+        self.held = self.model.held
         self.recording = recording
         self.force = recording.force - recording.force.mean()
         self._transform = line_transform(state.etfe, recording)

@@ -38,7 +38,7 @@ def remainder(closed: Closed) -> tuple[str, ...]:
         f"suspicion. {_tried(closed)}"
     )
     advice = [MEASURE_NEXT[family] for family in families if family in MEASURE_NEXT]
-    if "linear" in families and closed.model.name == "grasped":
+    if "linear" in families and closed.model.held:
         advice.append("Record it with nobody holding it, too: then the hand is not in question.")
     return first, _widened(closed), f"What to measure next: {' '.join(advice)}"
 

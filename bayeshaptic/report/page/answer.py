@@ -95,7 +95,7 @@ def _holder(analysis: Analysis) -> str:
     user = None if recording is None else recording.user
     place = None if recording is None else recording.configuration
     where = "" if place is None else f", configuration {place}"
-    if analysis.model.name == "grasped":
+    if analysis.model.held:
         return f"{f'the grip of {user}' if user else 'the grip'} in this recording{where}"
     if user:
         return f"the device as {user} held it in this recording{where}"

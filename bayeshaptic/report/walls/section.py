@@ -74,7 +74,7 @@ def table_of(
 def case_of(result: Result) -> Case:
     """An analysis, or what closing the loop returns, as a case by itself."""
     analysis = result.analysis
-    held = analysis.model.name == "grasped"
+    held = analysis.model.held
     user = None if analysis.recording is None else analysis.recording.user
     label = f"held by {user}" if user else "held" if held else "nobody holds it"
     chains = np.swapaxes(analysis.posterior.chains, 1, 2)  # the order of the limit's samples

@@ -47,7 +47,7 @@ def words(table: LimitTable, rules: Rules) -> Words:
         _curve_caption(table),
         _kb_caption(table, rules),
         _area(table).unit,
-        ", the hand included" if any(case.model.name == "grasped" for case in table.cases) else "",
+        ", the hand included" if any(case.model.held for case in table.cases) else "",
         _rules(rules),
     )
 
