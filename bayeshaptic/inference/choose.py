@@ -129,6 +129,8 @@ def choose_model(
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
         own = {key: value for key, value in (prior or {}).items() if key in model.names}
         fits[name] = least_squares(model.with_prior(own), etfe, seed=seed)
+    if held is None and fits["chain-2"].misfits:
+        fits["chain-2"] = _from_the_hand(fits["chain-2"], fits["grasped"], etfe)
     noise = max(1.0, min(fit.reduced_chi_square for fit in fits.values()))
     candidates = {
         name: ScoredFit(fit, information_criterion(fit, noise), deviance(fit, noise)[1])
@@ -136,6 +138,15 @@ def choose_model(
     }
     best = _best(candidates, noise)
     return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
+
+
+def _from_the_hand(chain: Fit, grasped: Fit, etfe: Etfe) -> Fit:
+    """The better fit of the chain: as it is, or begun with the hand for a third mass."""
+    values = dict(zip(grasped.model.names, grasped.theta, strict=True))
+    values |= {"m3": values["mh"], "c3": values["bs"], "k3": values["ks"], "b3": values["bh"]}
+    start = np.array([values[name] for name in chain.model.names])
+    other = least_squares(chain.model, etfe, start=start)
+    return min(chain, other, key=lambda fit: fit.reduced_chi_square)
 
 
 def _best(candidates: Mapping[str, ScoredFit], noise: float) -> str:
