@@ -24,6 +24,7 @@ from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.law_error import with_law_error
 from bayeshaptic.diagnosis.options import Options, options_from
+from bayeshaptic.diagnosis.rivals import with_rivals
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
@@ -162,9 +163,8 @@ def close_loop(
             state.fit,
             chosen.within(0.6, 0.9),
         )
-    limit = with_discrepancy(
-        analysis.limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed
-    )
+    limit, traced = with_rivals(analysis.limit, traced, chosen.seed)
+    limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
     notices = analysis.notices + traced.notices
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, chosen.seed)

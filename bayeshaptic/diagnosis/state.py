@@ -76,6 +76,8 @@ class Accepted:
         Names of its parameters in the model, for linear effects.
     ties : tuple of str
         Effects that this recording cannot tell from it.
+    probabilities : mapping
+        Of itself and of its rivals, by name, where the limit is averaged over them.
     told_apart_by : str
         The measurement that would.
     limit_log_sd : float
@@ -93,6 +95,7 @@ class Accepted:
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
     parameters: tuple[str, ...] = ()
     ties: tuple[str, ...] = ()
+    probabilities: Mapping[str, float] = field(default_factory=dict)
     told_apart_by: str = ""
     limit_log_sd: float = 0.0
     limit_log_fall: float = 0.0

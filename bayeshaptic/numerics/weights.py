@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
 
 
 def normalised(log_weights: Floats) -> Floats:
@@ -31,3 +31,23 @@ def tempered(log_weights: Floats, least: float) -> Floats:
         if effective(weights) >= least:
             break
     return weights
+
+
+def truncated(log_weights: Floats) -> Floats:
+    """Logarithms of weights of which none is larger than the mean times the root of their number.
+
+    E. L. Ionides, "Truncated importance sampling", Journal of Computational and Graphical
+    Statistics 17, 2008: no single point decides.
+    """
+    top = log_weights.max()
+    if not np.isfinite(top):
+        return log_weights
+    mean = np.log(np.mean(np.exp(log_weights - top))) + top
+    return np.asarray(np.minimum(log_weights, mean + 0.5 * np.log(len(log_weights))))
+
+
+def systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
+    """`count` indices, each as often as its weight says, in ascending order."""
+    edges = np.cumsum(weight / weight.sum())
+    edges[-1] = 1.0
+    return np.searchsorted(edges, (np.arange(count) + rng.uniform()) / count)

@@ -15,7 +15,8 @@ import numpy as np
 from bayeshaptic.diagnosis.hidden.evidence import Evidence, sum_of
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.regression import Around
-from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, systematic
+from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed
+from bayeshaptic.numerics.weights import systematic
 from bayeshaptic.types import Floats, Ints
 
 

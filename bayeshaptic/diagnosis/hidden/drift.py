@@ -13,9 +13,10 @@ import numpy as np
 
 from bayeshaptic.diagnosis.hidden.regression import Around, log_limits
 from bayeshaptic.diagnosis.hidden.sizes import LEAST, MOST, SEEN
-from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, systematic
+from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
+from bayeshaptic.numerics.weights import systematic
 from bayeshaptic.types import Bools, Floats
 
 

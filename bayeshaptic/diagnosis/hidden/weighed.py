@@ -20,6 +20,7 @@ from bayeshaptic.diagnosis.hidden.sizes import sizes_of
 from bayeshaptic.diagnosis.hidden.suspects import Suspect
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.numerics.pareto import pareto_k
+from bayeshaptic.numerics.weights import normalised, systematic
 from bayeshaptic.types import Floats, Ints
 
 KEPT = 200  # equally weighted draws of an effect
@@ -152,24 +153,10 @@ def _followed(suspect: Suspect, known: Around, own: Floats) -> tuple[Floats, Flo
 
 def _drawn(log_weight: Floats, count: int, rng: np.random.Generator) -> tuple[Ints, Floats]:
     """Cells by their weight, some by a flatter one; and the log probability of each drawn."""
-    sharp = _normalised(log_weight)
     bold = 0.25  # share of the sizes that are drawn from the flatter distribution
-    share = (1 - bold) * sharp + bold * _normalised(0.5 * log_weight)
+    share = (1 - bold) * normalised(log_weight) + bold * normalised(0.5 * log_weight)
     cells = rng.permutation(systematic(share, count, rng))
     return cells, np.log(share[cells])
-
-
-def _normalised(log_weight: Floats) -> Floats:
-    top = log_weight.max()
-    weight = np.exp(log_weight - top) if np.isfinite(top) else np.ones(len(log_weight))
-    return weight / weight.sum()
-
-
-def systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
-    """`count` indices, each as often as its weight says, in ascending order."""
-    edges = np.cumsum(weight / weight.sum())
-    edges[-1] = 1.0
-    return np.searchsorted(edges, (np.arange(count) + rng.uniform()) / count)
 
 
 def _log_factor(

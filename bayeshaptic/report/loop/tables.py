@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.quantities import estimate, quantity, scale
+from bayeshaptic.quantities import estimate, percent, quantity, scale
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
 from bayeshaptic.report.numbers.titles import question, title_of
@@ -47,6 +47,17 @@ class EffectRows:
     told_apart_by: str
 
 
+def _ties(effect: Accepted) -> str:
+    """What cannot be told from it, with probabilities where the limit is averaged over them."""
+    known = {n: p for n, p in effect.probabilities.items() if n != effect.name}
+    names = dict.fromkeys((*effect.ties, *(n for n, p in known.items() if p >= 0.01)))
+    shown = (
+        f"{title_of(name)} ({percent(known[name])})" if name in known else title_of(name)
+        for name in names
+    )
+    return ", ".join(shown)
+
+
 def found(closed: Closed) -> tuple[EffectRows, ...]:
     """Every accepted effect, in the order in which it was found."""
     return tuple(
@@ -56,7 +67,7 @@ def found(closed: Closed) -> tuple[EffectRows, ...]:
             effect.family,
             _parameters(closed, effect, known["parameters"]),
             _sentence(effect.evidence),
-            ", ".join(title_of(name) for name in effect.ties),
+            _ties(effect),
             _sentence(effect.told_apart_by),
         )
         for effect, known in zip(closed.effects, closed.diagnosis["effects"], strict=True)
