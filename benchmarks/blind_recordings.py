@@ -117,14 +117,7 @@ def recorded(bench: Bench, seconds: float, seed: int) -> Recording:
     """A recording of white noise at the bench's usual level, in its usual band."""
     low, high = bench.band_hz
     made = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds), seed=seed)
-    return recording_from_arrays(
-        made.force,
-        made.position,
-        period_s=bench.period_s,
-        force_unit=bench.force_unit,
-        position_unit=bench.position_unit,
-        encoder_resolution=bench.encoder_resolution,
-    )
+    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
 
 
 def bench_of(job: Job) -> Bench:

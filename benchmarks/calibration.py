@@ -15,11 +15,10 @@ from scipy.stats import kstest
 
 from bayeshaptic.inference import least_squares, sample
 from bayeshaptic.models import HalfNormal, LogNormal, Model, NearZero, build_model, draw
-from bayeshaptic.recordings import Recording
+from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.noise import tremor_density, wander_density
-from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.stability.critical import critical_stiffness
 
 _MOST = 640_000  # evaluations: a run that has not converged by then is counted as it is
@@ -122,12 +121,6 @@ def truth_and_bench(
     return model, truth, bench
 
 
-def as_recording(simulated: SimulatedRecording) -> Recording:
-    """What the bench wrote down, as the package reads it."""
-    units = {"force_unit": simulated.force_unit, "position_unit": simulated.position_unit}
-    return Recording(simulated.force, simulated.position, simulated.period_s, **units)
-
-
 def one_recording(
     case: str,
     seed: int,
@@ -139,7 +132,7 @@ def one_recording(
     model, truth, bench = truth_and_bench(case, seed, setting)
     low_hz, high_hz = bench.band_hz
     excitation = WhiteNoise(bench.force_rms, high_hz, low_hz, seconds)
-    recording = as_recording(simulate(bench, excitation, seed=1000 + seed))
+    recording = recording_from_arrays(**simulate(bench, excitation, seed=1000 + seed).signals)
     etfe = estimate_etfe(recording)
     began = time.process_time()
     fit = least_squares(model, etfe)

@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from calibration import CASES, as_recording, truth_and_bench
+from calibration import CASES, truth_and_bench
 from linear_bench import (
     LHIFAM_FREE,
     LHIFAM_HELD,
@@ -31,6 +31,7 @@ from linear_bench import (
 )
 from test_windows import PERIOD, cramer_rao, record, scale_and_delay
 
+from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability import etfe_critical_stiffness
@@ -103,7 +104,8 @@ def _limit(case: str, seed: int, seconds: float, drawn: bool) -> tuple:
         bench = Bench.from_device(device, held=structure == "grasped")
     low_hz, high_hz = bench.band_hz
     excitation = WhiteNoise(bench.force_rms, high_hz, low_hz, seconds)
-    etfe = estimate_etfe(as_recording(simulate(bench, excitation, seed=9000 + seed)))
+    made = simulate(bench, excitation, seed=9000 + seed)
+    etfe = estimate_etfe(recording_from_arrays(**made.signals))
     own = etfe_critical_stiffness(etfe, seed=seed)
     return bench.true_critical_stiffness(), own.q05, own.q50, own.q95
 

@@ -85,7 +85,7 @@ def white(seed: int) -> tuple[Recording, dict[str, float]]:
         )
         noise = WhiteNoise(bench.force_rms, 400.0, 0.5, float(rng.uniform(1, 5)))
         made = simulate(own, noise, seed=10 * seed + number)
-        found.append(recording_from_arrays(made.force, made.position, bench.period_s))
+        found.append(recording_from_arrays(**made.signals))
     return join_recordings(found), values | {"delay_s": delay_s}
 
 

@@ -23,6 +23,7 @@ import numpy as np  # noqa: E402
 
 import bayeshaptic as bh  # noqa: E402
 from bayeshaptic.rig import Bench, simulate  # noqa: E402
+from bayeshaptic.rig.recording import SimulatedRecording  # noqa: E402
 
 HAND = ("mh", "bh", "kh", "bs", "ks")
 LOG_SD = {"phantom": 0.55, "lhifam": 0.30}  # K_CR: 1.6 dB from 5 to 95 %, and 0.03 dB (sd)
@@ -114,15 +115,9 @@ def run(device: str, seed: int, ess: float) -> Outcome:
     )
 
 
-def posterior(recorded: object, device: str, ess: float, seed: int) -> bh.Posterior:
+def posterior(recorded: SimulatedRecording, device: str, ess: float, seed: int) -> bh.Posterior:
     """The posterior of one recording, as `analyse` finds it."""
-    recording = bh.recording_from_arrays(
-        recorded.force,  # type: ignore[attr-defined]
-        recorded.position,  # type: ignore[attr-defined]
-        recorded.period_s,  # type: ignore[attr-defined]
-        force_unit=recorded.force_unit,  # type: ignore[attr-defined]
-        position_unit=recorded.position_unit,  # type: ignore[attr-defined]
-    )
+    recording = bh.recording_from_arrays(**recorded.signals)
     etfe = bh.estimate_etfe(recording)
     model = bh.grasped(device=device)
     return bh.sample(model, etfe, bh.least_squares(model, etfe, seed=seed), ess=ess, seed=seed)

@@ -69,11 +69,7 @@ def report(name: str, folder: Path) -> Path:
     """Record, analyse, and keep the page alone."""
     made = REPORTS[name]()
     recording = bh.recording_from_arrays(
-        made.force,
-        made.position,
-        made.period_s,
-        force_unit="Nm",
-        position_unit="rad",
+        **made.signals,
         name=name,
         encoder_resolution=Bench.from_device("phantom").encoder_resolution,
     )

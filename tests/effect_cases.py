@@ -106,12 +106,7 @@ def _recorded(case_id: str) -> Etfe:
     bench = case.truth
     excitation = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds=12.0)
     run = simulate(bench, excitation, seed=11)
-    units = (run.force_unit, run.position_unit)
-    return estimate_etfe(
-        recording_from_arrays(
-            run.force, run.position, run.period_s, force_unit=units[0], position_unit=units[1]
-        )
-    )
+    return estimate_etfe(recording_from_arrays(**run.signals))
 
 
 def recorded(case: Case) -> Etfe:

@@ -92,13 +92,7 @@ def recorded(device: str, held: bool) -> Case:
     """A case from a simulated recording of 30 s."""
     bench = Bench.from_device(device, held=held)
     run = simulate(bench, seed=11)
-    recording = bh.recording_from_arrays(
-        run.force,
-        run.position,
-        period_s=bench.period_s,
-        force_unit=bench.force_unit,
-        position_unit=bench.position_unit,
-    )
+    recording = bh.recording_from_arrays(**run.signals)
     model = build_model("grasped" if held else "free", device)
     posterior = bh.sample(model, bh.estimate_etfe(recording), ess=300)
     label, group = ("user ana", HELD) if held else ("nobody holds it", FREE)

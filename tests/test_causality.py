@@ -137,7 +137,7 @@ def test_the_opposite_sign_is_seen_in_a_force_with_nothing_new(excitation: str) 
     else:
         force = WhiteNoise(bench.force_rms, 25.0, 0.5, 12.0)
     made = simulate(bench, force, seed=2)
-    right = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    right = recording_from_arrays(**made.signals)
     wrong = replace(right, position=-right.position)
     assert not rough_response(right).opposite(bench.period_s)
     assert rough_response(wrong).opposite(bench.period_s)

@@ -37,7 +37,7 @@ def test_a_chain_of_the_bench_is_found():
     free = Bench.from_device("lhifam")
     bench = free.with_effect("second_mode", mass_ratio=0.3, frequency_hz=45.0, on="m2")
     made = simulate(bench, seed=1)
-    recording = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    recording = recording_from_arrays(**made.signals)
     model = bh.chain(2, delay_s=bench.delay_s)
     fit = bh.least_squares(model, bh.estimate_etfe(recording))
     truth = dict(bench.values) | {"m3": 0.3 * bench.values["m2"]}

@@ -30,9 +30,7 @@ def bench_at(place: float) -> Bench:
 def posterior_at(place: float) -> Posterior:
     excitation = WhiteNoise(0.05, 200.0, 0.7, seconds=12.0)
     done = simulate(bench_at(place), excitation, seed=int(100 * place))
-    recording = bh.recording_from_arrays(
-        done.force, done.position, done.period_s, force_unit="Nm", position_unit="rad"
-    )
+    recording = bh.recording_from_arrays(**done.signals)
     etfe = bh.estimate_etfe(recording)
     model = bh.free(device="phantom")
     return bh.sample(model, etfe, bh.least_squares(model, etfe, seed=1), ess=400, seed=1)

@@ -35,12 +35,7 @@ def test_a_report_evaluates_no_more_than_twice_what_it_did(
         bench = bench.with_effect(effect, **fields)
     low, high = bench.band_hz
     made = simulate(bench, WhiteNoise(bench.force_rms, high, low, 8.0), seed=8)
-    recording = recording_from_arrays(
-        made.force,
-        made.position,
-        period_s=bench.period_s,
-        encoder_resolution=bench.encoder_resolution,
-    )
+    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
     known = {"device": "lhifam"} if with_file else {"delay_s": bench.delay_s}
     with metered() as meter:
         close_loop(recording, "grasped" if held else "free", **known)

@@ -106,7 +106,7 @@ def test_nothing_is_traced_in_the_response_of_two_masses_under_a_controller() ->
         return float(3000.0 * (goals[k // 150] - position) - 60.0 * rate)
 
     done = run_loop(bench, controller, 3.0)
-    recording = recording_from_arrays(done.force, done.position, period_s=bench.period_s)
+    recording = recording_from_arrays(**done.signals)
     closed = bh.close_loop(recording, "free", ess=100)
     assert closed.force is None and closed.effects == () and closed.traced.candidates == ()
     head = headline(closed)

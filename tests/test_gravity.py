@@ -48,9 +48,7 @@ def test_gravity_is_named_and_sized(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tried, "effects", lambda family: kinds)
     bench = PHANTOM.with_effect("gravity", torque=0.04, hangs_at=0.6)
     made = simulate(bench, WhiteNoise(3 * bench.force_rms, 300.0, 0.3, 10.0), seed=1)
-    recording = recording_from_arrays(
-        made.force, made.position, period_s=bench.period_s, force_unit="Nm", position_unit="rad"
-    )
+    recording = recording_from_arrays(**made.signals)
     etfe = estimate_etfe(recording)
     state = State(etfe, least_squares(build_model("free", "phantom"), etfe))
     best = max(nonlinear_trials(state, {"x^3"}, Meter()), key=lambda trial: trial.score)

@@ -188,14 +188,7 @@ def lagging() -> tuple[Bench, Closed]:
     bench = bench.with_effect("actuator_lag", time_constant_s=15e-6)
     noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 10.0)
     made = simulate(bench, noise, seed=6)
-    recording = recording_from_arrays(
-        made.force,
-        made.position,
-        made.period_s,
-        force_unit=made.force_unit,
-        position_unit=made.position_unit,
-        encoder_resolution=bench.encoder_resolution,
-    )
+    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
     return bench, close_loop(recording, "grasped", device="phantom")
 
 

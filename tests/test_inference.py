@@ -16,13 +16,7 @@ from bayeshaptic.rig import Bench, simulate
 def measured(device: str, held: bool, seed: int) -> tuple[bh.Etfe, Bench]:
     bench = Bench.from_device(device, held=held)
     run = simulate(bench, seed=seed)
-    recording = bh.recording_from_arrays(
-        run.force,
-        run.position,
-        period_s=bench.period_s,
-        force_unit=bench.force_unit,
-        position_unit=bench.position_unit,
-    )
+    recording = bh.recording_from_arrays(**run.signals)
     return bh.estimate_etfe(recording), bench
 
 

@@ -58,12 +58,7 @@ def command() -> Any:
 
 def recorded(bench: Bench) -> Recording:
     made = simulate(bench, command(), seed=SEED)
-    return recording_from_arrays(
-        made.force,
-        made.position,
-        period_s=bench.period_s,
-        encoder_resolution=bench.encoder_resolution,
-    )
+    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
 
 
 @pytest.mark.parametrize("case", FORCES[:-1], ids=[force[0] for force in FORCES[:-1]])

@@ -25,9 +25,7 @@ def _recording() -> bh.Recording:
     bench = Bench.from_device("phantom", values=RIDGE)
     noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 30.0)
     run = simulate(bench, noise, seed=1010)
-    return bh.recording_from_arrays(
-        run.force, run.position, period_s=1e-3, force_unit="Nm", position_unit="rad"
-    )
+    return bh.recording_from_arrays(**run.signals)
 
 
 def efficiency(density, first, peak) -> float:

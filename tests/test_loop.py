@@ -35,12 +35,7 @@ def fitted(held: bool, seconds: float, effects: Effects) -> tuple[Bench, Etfe, F
     low, high = bench.band_hz
     made = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds), seed=8)
     etfe = estimate_etfe(
-        recording_from_arrays(
-            made.force,
-            made.position,
-            period_s=bench.period_s,
-            encoder_resolution=bench.encoder_resolution,
-        )
+        recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
     )
     return bench, etfe, least_squares(build_model("grasped" if held else "free", "lhifam"), etfe)
 

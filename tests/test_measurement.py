@@ -33,14 +33,7 @@ COUNT = PHANTOM.encoder_resolution
 def recorded(bench: Bench, seed: int = SEED) -> Recording:
     """Eight seconds; the declared count is that of the device."""
     made = simulate(bench, WhiteNoise(0.5 * bench.force_rms, 200.0, 0.7, SECONDS), seed=seed)
-    return recording_from_arrays(
-        made.force,
-        made.position,
-        period_s=bench.period_s,
-        force_unit=bench.force_unit,
-        position_unit=bench.position_unit,
-        encoder_resolution=bench.encoder_resolution,
-    )
+    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
 
 
 def fitted(recording: Recording, bench: Bench) -> tuple[Etfe, Fit]:
@@ -185,7 +178,7 @@ def test_a_pause_at_the_target_is_no_clipping(bench: Bench, friction: float) -> 
         return stiffness * (size * (k // 500 % 3) - position) - damping * speed
 
     made = run_loop(sticky, control, 3.0)
-    recording = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    recording = recording_from_arrays(**made.signals)
     wrong, statistic = clipped(as_recorded(recording))
     assert not wrong.any() and statistic < thresholds.CLIPPED
 
@@ -197,7 +190,7 @@ def test_rounding_is_no_tone(excitation: str) -> None:
     multisine = Multisine(4.0, 1.0, 200.0, 1.0, 8)
     force = WhiteNoise(4.0, 200.0, 0.7, 10.0) if excitation == "noise" else multisine
     made = simulate(bench, force, seed=1)
-    recording = recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    recording = recording_from_arrays(**made.signals)
     etfe = estimate_etfe(recording)
     model = build_model("free", "lhifam")
     fit = least_squares(model, etfe, start=model.values)

@@ -18,9 +18,7 @@ from bayeshaptic.rig import Bench, simulate
 def measured(seed: int) -> tuple[bh.Etfe, Bench]:
     bench = Bench.from_device("phantom")
     run = simulate(bench, seed=seed)
-    recording = bh.recording_from_arrays(
-        run.force, run.position, period_s=1e-3, force_unit="Nm", position_unit="rad"
-    )
+    recording = bh.recording_from_arrays(**run.signals)
     return bh.estimate_etfe(recording), bench
 
 

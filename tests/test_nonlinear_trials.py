@@ -35,12 +35,7 @@ SECONDS, SEED = 10.0, 3
 def state_of(bench: Bench) -> State:
     """The free model fitted to ten seconds of white noise."""
     made = simulate(bench, WhiteNoise(4.0, 300.0, 0.3, SECONDS), seed=SEED)
-    recording = recording_from_arrays(
-        made.force,
-        made.position,
-        period_s=bench.period_s,
-        encoder_resolution=bench.encoder_resolution,
-    )
+    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
     etfe = estimate_etfe(recording)
     return State(etfe, least_squares(build_model("free", "lhifam"), etfe))
 

@@ -19,7 +19,7 @@ def fitted() -> Fit:
     """A rigid device, and the model that is right."""
     bench = Bench("rigid", {"m": 2.0, "b": 20.0}, delay_s=5e-4, encoder_resolution=1e-6)
     made = simulate(bench, WhiteNoise(5.0, 400.0, 0.5, 20.0), seed=3)
-    recording = recording_from_arrays(made.force, made.position, 1e-3, force_unit="N")
+    recording = recording_from_arrays(**made.signals)
     return least_squares(rigid(period_s=1e-3), estimate_etfe(recording))
 
 

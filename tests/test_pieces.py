@@ -46,9 +46,7 @@ def noise(seconds: float, seed: int) -> Recording:
     """White noise on a free Phantom."""
     bench = Bench.from_device("phantom", False, "free")
     done = simulate(bench, WhiteNoise(bench.force_rms, 400, 0.5, seconds), seed=seed)
-    return recording_from_arrays(
-        done.force, done.position, bench.period_s, force_unit="Nm", position_unit="rad"
-    )
+    return recording_from_arrays(**done.signals)
 
 
 @pytest.fixture(scope="module")

@@ -37,9 +37,7 @@ def posteriors() -> list[Posterior]:
         values["ks"] *= float(np.exp(ks))
         values["mh"] *= float(np.exp(mh))
         done = simulate(replace(bench, values=values), seed=number)
-        recording = bh.recording_from_arrays(
-            done.force, done.position, done.period_s, force_unit="Nm", position_unit="rad"
-        )
+        recording = bh.recording_from_arrays(**done.signals)
         etfe = bh.estimate_etfe(recording)
         fit = bh.least_squares(model, etfe, seed=1)
         found.append(bh.sample(model, etfe, fit, ess=200, seed=1))

@@ -20,13 +20,7 @@ DEVICES = [("lhifam", "grasped"), ("phantom", "grasped"), ("lhifam", "free"), ("
 
 
 def logged(run: SimulatedRecording) -> Recording:
-    return recording_from_arrays(
-        run.force,
-        run.position,
-        run.period_s,
-        force_unit=run.force_unit,
-        position_unit=run.position_unit,
-    )
+    return recording_from_arrays(**run.signals)
 
 
 @cache

@@ -111,7 +111,7 @@ def recorded():
     bench = Bench.from_device("lhifam")
     noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 10.0)
     run = simulate(bench, noise, seed=6)
-    return bh.recording_from_arrays(run.force, run.position, period_s=bench.period_s)
+    return bh.recording_from_arrays(**run.signals)
 
 
 def test_an_analysis_states_every_risk(recorded):

@@ -20,9 +20,7 @@ BENCH = Bench.from_device("phantom")
 
 def recorded(excitation: object, bench: Bench = BENCH) -> Recording:
     made = simulate(bench, excitation, seed=1)
-    return recording_from_arrays(
-        made.force, made.position, period_s=made.period_s, force_unit="Nm", position_unit="rad"
-    )
+    return recording_from_arrays(**made.signals)
 
 
 def noise(seconds: float = 8.0, rms: float = 0.1) -> np.ndarray:

@@ -49,6 +49,12 @@ class SimulatedRecording:
     bench: Bench
 
     @property
+    def signals(self) -> dict[str, Any]:
+        """What `bayeshaptic.recording_from_arrays` takes: signals, period and units."""
+        names = ("force", "position", "period_s", "force_unit", "position_unit")
+        return {name: getattr(self, name) for name in names}
+
+    @property
     def columns(self) -> dict[str, Array]:
         """Time, force and position by the names that they have in files."""
         names = COLUMNS[self.force_unit]

@@ -72,13 +72,7 @@ class Row:
 
 def logged(run: SimulatedRecording) -> Recording:
     """What the logger wrote, without the truth."""
-    return recording_from_arrays(
-        run.force,
-        run.position,
-        run.period_s,
-        force_unit=run.force_unit,
-        position_unit=run.position_unit,
-    )
+    return recording_from_arrays(**run.signals)
 
 
 def identify(case: tuple[str, str], ess: int = 1000) -> Identified:
