@@ -159,9 +159,10 @@ def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Op
     A fit without an effect may be bent so far that no value of the effect beside it leads on.  Of a
     second mode on the motor of a held LHIfAM without a device file none of ten fits did; starting
     points that no fit has bent led there in nine of ten.  Both in one set crowd each other out.
+    Dynamic links have no valleys of their own, and so many of their responses would be dear.
     """
     found = refine(model, windows, start)
-    if found.reduced_chi_square <= MISFIT:
+    if found.reduced_chi_square <= MISFIT or not model.system(found.theta).rational:
         return found
     other = refine(model, windows, starting_points(model, etfe, np.random.default_rng(0)))
     return min(found, other, key=lambda one: one.reduced_chi_square)
