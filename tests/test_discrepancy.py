@@ -9,9 +9,9 @@ import pytest
 from fake_analysis import _tests, fake_closed
 
 from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _fall
+from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.stability.critical import critical_stiffness
 

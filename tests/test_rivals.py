@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from linear_bench import RIGID, Device
 
-from bayeshaptic.diagnosis.rivals import with_rivals
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.traced import EXPLAINED, Traced
+from bayeshaptic.diagnosis.widening.rivals import with_rivals
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.inference import least_squares
 from bayeshaptic.inference.fit import Fit

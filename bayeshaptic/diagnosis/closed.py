@@ -13,7 +13,6 @@ import numpy as np
 from bayeshaptic.diagnosis.analysis import Analysis, finish, without_sampling
 from bayeshaptic.diagnosis.base_model import traced_from_best_base
 from bayeshaptic.diagnosis.begun import Begun, Opened, base_model, fitted, measurement_of, opened
-from bayeshaptic.diagnosis.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
@@ -22,12 +21,13 @@ from bayeshaptic.diagnosis.feedback.explain import (
 )
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
-from bayeshaptic.diagnosis.law_error import with_law_error
 from bayeshaptic.diagnosis.options import Options, options_from
-from bayeshaptic.diagnosis.rivals import with_rivals
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
+from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.widening.law_error import with_law_error
+from bayeshaptic.diagnosis.widening.rivals import with_rivals
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
