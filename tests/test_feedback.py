@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import re
 from html import unescape
 from pathlib import Path
@@ -35,6 +36,7 @@ def text_of(page: Path) -> str:
 
 def test_the_friction_of_a_servo_is_found_in_its_force(closed: Closed) -> None:
     assert has_feedback(closed.base.notices) and closed.force is not None
+    assert pickle.loads(pickle.dumps(closed)).force is not None  # as workers hand it back
     (friction,) = closed.effects
     assert friction.name == "coulomb_friction" and friction.family == "nonlinear"
     found = closed.analysis.posterior.summary()["coulomb"]

@@ -209,12 +209,19 @@ def rounded_down(stiffness: float, unit: str, sd: float) -> tuple[float, str]:
 
 
 def _lower_witness(analysis: Analysis, safe: float) -> float | None:
-    """The measurement's own lower end, where it contradicts the model on the unsafe side."""
+    """The measurement's own lower end, where it contradicts the model on the unsafe side.
+
+    Its median lies more than twice as far below the model's interval as its own 90 % interval
+    reaches: where the phase runs along -180 degrees, that interval holds the truth in some 75 %,
+    and disjoint intervals alone were a false alarm in 3 of 40 recordings of free LHIfAMs, with and
+    without a second mode (none of 40 by this rule).
+    """
     own = own_limit(analysis)
     if own is None or own[0] <= 0:
         return None
     low, middle, high = own
-    apart = high < analysis.limit.quantile(0.05)
+    far = middle * (high / middle) ** 2
+    apart = far < analysis.limit.quantile(0.05)
     if not apart or decibel(safe) - decibel(middle) < _AGREEMENT_DB:
         return None
     return min(low, safe)

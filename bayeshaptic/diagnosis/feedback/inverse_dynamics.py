@@ -44,19 +44,17 @@ class SmoothMotion:
 
 @dataclass(frozen=True)
 class Term:
-    """One column of the inverse dynamics.
-
-    Attributes
-    ----------
-    name, title : str
-    unit : str
-    column : callable
-        From `SmoothMotion` to the force for a coefficient of one, shape (N,).
-    """
+    """One column of the inverse dynamics: what it is, and the unit of its coefficient."""
 
     name: str
     title: str
     unit: str
+
+
+@dataclass(frozen=True)
+class _Column(Term):
+    """With the column itself: from `SmoothMotion` to the force for a coefficient of one, (N,)."""
+
     column: Callable[[SmoothMotion], Floats] = field(repr=False)
 
 
@@ -179,7 +177,7 @@ def inverse_dynamics(
     value, sd = _solve(design, force, max(int(block_s / (every * recording.period_s)), 1))
     left = force - design @ value
     return InverseDynamics(
-        tuple(known[name] for name in chosen),
+        tuple(Term(name, known[name].title, known[name].unit) for name in chosen),
         value,
         sd,
         tuple(steps),
@@ -205,7 +203,9 @@ def _path(recording: Recording, cutoff_hz: float) -> SmoothMotion:
     return SmoothMotion(x, v, a, np.gradient(a, recording.period_s))
 
 
-def _terms(recording: Recording, path: SmoothMotion) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
+def _terms(
+    recording: Recording, path: SmoothMotion
+) -> tuple[tuple[_Column, ...], tuple[_Column, ...]]:
     """Those of the linear model, and those that may join it."""
     middle = float(np.mean(path.position))
 
@@ -214,45 +214,45 @@ def _terms(recording: Recording, path: SmoothMotion) -> tuple[tuple[Term, ...], 
 
     force, x = unit("force"), recording.position_unit
     start = (
-        Term("mass", "mass", unit("mass"), lambda p: p.acceleration),
-        Term("damping", "viscous damping", unit("damping"), lambda p: p.velocity),
-        Term("offset", "constant force", force, lambda p: np.ones_like(p.velocity)),
+        _Column("mass", "mass", unit("mass"), lambda p: p.acceleration),
+        _Column("damping", "viscous damping", unit("damping"), lambda p: p.velocity),
+        _Column("offset", "constant force", force, lambda p: np.ones_like(p.velocity)),
     )
     usual = Usual.of(path.velocity, path.position, x)
     laws = [*(shape for _, shape in fitted(MOTOR, usual)), *corrections(usual)]
     return start, (
         *(_term(shape, force, x, middle) for shape in laws),
-        Term(
+        _Column(
             "asymmetric_damping",
             "damping that differs between the directions",
             unit("damping"),
             lambda p: np.abs(p.velocity),
         ),
-        Term(
+        _Column(
             "friction_root",
             "friction that grows with the root of the velocity",
             f"{force} ({x}/s)^-1/2",
             lambda p: np.sign(p.velocity) * np.sqrt(np.abs(p.velocity)),
         ),
-        Term("spring", "spring", unit("stiffness"), lambda p: p.position - middle),
-        Term(
+        _Column("spring", "spring", unit("stiffness"), lambda p: p.position - middle),
+        _Column(
             "friction_slope",
             "friction that changes along the way",
             unit("stiffness"),
             lambda p: (p.position - middle) * np.sign(p.velocity),
         ),
-        Term("jerk", "lag between force and motion", f"{force} s^3/{x}", lambda p: p.jerk),
+        _Column("jerk", "lag between force and motion", f"{force} s^3/{x}", lambda p: p.jerk),
     )
 
 
-def _term(shape: Shape, force: str, x: str, middle: float) -> Term:
+def _term(shape: Shape, force: str, x: str, middle: float) -> _Column:
     """A law's force, as the command must make up for it."""
 
     def column(path: SmoothMotion) -> Floats:
         return -shape.force(path.velocity if shape.over == VELOCITY else path.position - middle)
 
     title = shape.title.replace(" {where}", "")
-    return Term(shape.name, title, shape.unit(force, x), column)
+    return _Column(shape.name, title, shape.unit(force, x), column)
 
 
 def _grow(

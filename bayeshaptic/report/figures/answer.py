@@ -42,7 +42,7 @@ def shown(result: Result) -> tuple[Witness, ...]:
 def draw_on(axes: Axes, result: Result, narrow: bool = False) -> None:
     """The same on axes that are there."""
     rows, unit = shown(result), result.analysis.limit.unit
-    style.panel(axes, f"critical stiffness, dB re 1 {unit}")
+    style.panel(axes, f"dB re 1 {unit}" if narrow else f"critical stiffness, dB re 1 {unit}")
     axes.grid(False, axis="y")
     stiffness = headline(result).stiffness
     if stiffness is not None:
