@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_analysis import FEEDBACK, fake_closed
+from one_truth import check_page
 from test_measured import PERIOD_S, servo
 
 import bayeshaptic as bh
@@ -54,6 +55,7 @@ def test_the_response_is_not_mended_with_what_the_controller_did(closed: Closed)
 
 def test_the_report_tells_of_the_force_and_of_the_motion(closed: Closed, tmp_path: Path) -> None:
     page = text_of(bh.write_report(closed, tmp_path / "out"))
+    check_page(closed, tmp_path / "out")
     assert "The motion, simulated in the loop" in page and "feedback biases it" in page
     assert "The force, explained by the motion" in page and "What the model lacked" not in page
     assert "the model lacked dry (Coulomb) friction" in page
@@ -99,7 +101,7 @@ def test_feedback_without_a_force_leaves_the_loop_as_it_was(tmp_path: Path) -> N
     assert "What the model lacked" in page and "explained by the motion" not in page
 
 
-def test_nothing_is_traced_in_the_response_of_two_masses_under_a_controller() -> None:
+def test_two_masses_under_a_controller_are_refused_before_sampling(tmp_path: Path) -> None:
     bench = Bench.from_device("lhifam", False, "free")
     goals, last = np.random.default_rng(2).uniform(-1e-3, 1e-3, 20), [0.0]
 
@@ -114,3 +116,8 @@ def test_nothing_is_traced_in_the_response_of_two_masses_under_a_controller() ->
     head = headline(closed)
     assert head.status == "untrusted" and "was computed from the motion" in head.sentence
     assert "Nothing was looked for in the response" in words.in_short(closed)
+    assert not closed.analysis.sampled
+    page = text_of(bh.write_report(closed, tmp_path))
+    check_page(closed, tmp_path)
+    assert "None is stated" in page and "bayeshaptic report NEW.csv" in page
+    assert not (tmp_path / "posterior.nc").exists()

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fake_analysis import CASES, fake_analysis, fake_closed
 from fake_study import fake_study
@@ -17,7 +18,11 @@ from one_truth import check_page, numbers_of, page_of, same, words_only
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.next_experiment import Experiment
 from bayeshaptic.report import write_report
+from bayeshaptic.report.figures.study import configurations as study_configurations
+from bayeshaptic.report.figures.study import limit as study_limit
+from bayeshaptic.report.figures.study import people as study_people
 from bayeshaptic.report.guidance.words import _next, experiment_rows
+from bayeshaptic.report.study import tables
 from bayeshaptic.report.study import write as study_write
 from bayeshaptic.report.study.words import configurations
 from bayeshaptic.stability.guidance.shares import VarianceShares
@@ -80,6 +85,38 @@ def test_a_study_says_which_way_its_limit_goes(tmp_path: Path) -> None:
         ends = re.search(r"goes from ([\d.]+) dB in configuration \S+ to ([\d.]+) dB", sentence)
         assert ends and sentence in page
         assert (float(ends[1]) < float(ends[2])) == (first < last)
+
+
+def _points(figure: Any, axis: int) -> set[str]:
+    """Every single point of a figure along an axis, to two decimals."""
+    lines = [line for axes in figure.axes for line in axes.lines]
+    lines += [box.lines[0] for axes in figure.axes for box in axes.containers if box.lines[0]]
+    data = [np.atleast_1d(line.get_data()[axis]) for line in lines]
+    return {f"{values[0]:.2f}" for values in data if len(values) == 1}
+
+
+def test_the_figures_of_a_study_say_what_its_tables_say(tmp_path: Path) -> None:
+    study = fake_study(people=2, free=2, places=(0.0, 1.0))
+    study_write.write_study_report(study, tmp_path)
+    page, found = page_of(tmp_path), numbers_of(tmp_path, "population.json")
+    figure = study_limit.draw(study)
+    labels = {tick.get_text() for tick in figure.axes[0].get_yticklabels()}
+    shown = {case.label for case in study_limit.shown_cases(study)}
+    rows = [row for row in tables.binding(study) if row[0] in shown]
+    assert rows and {f"{case}  ({probability})" for case, _, _, probability in rows} <= labels
+    assert {middle for _, middle, _, _ in rows} <= _points(figure, 0)
+    assert all(" ".join(row) in page for row in rows)
+    users = tables.users(study)
+    assert {row[2] for row in users} <= _points(study_people.draw(study), 0)
+    assert all(" ".join(row) in page for row in users)
+    drawn = {
+        f"{value:.2f}"
+        for axes in study_configurations.draw(study).axes
+        for line in axes.lines
+        for value in line.get_ydata()
+    }
+    for row in found["configurations"]:
+        assert f"{20 * np.log10(row['critical_stiffness']['q50']):.2f}" in drawn
 
 
 @pytest.mark.parametrize(("beyond", "left"), [(0.0, ["45 %"]), (0.5, ["78 %"]), (1.0, [])])

@@ -47,12 +47,11 @@ def in_short(force: ForceExplained, unit: str) -> str:
     linear, *added = force.further.steps
     before = quantity(linear.held_out_rms, unit)
     if not added:
-        return f"By inverse dynamics, a linear model leaves {before} rms of the force."
+        return f"One mass with a damper explains the force but for {before} rms."
     first = titles(force.further)[added[0].term]
     return (
-        f"By inverse dynamics, which feedback does not bias, the model lacked {first}: the force "
-        f"that is not explained falls from {before} to {quantity(added[0].held_out_rms, unit)} rms "
-        "with it."
+        f"One mass with a damper explains the force but for {before} rms. With {first} beside it, "
+        f"{quantity(added[0].held_out_rms, unit)} rms is left."
     )
 
 
