@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bayeshaptic as bh
+
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
@@ -35,6 +37,21 @@ def table_3() -> dict[tuple[str, str], margins.Margin]:
 @pytest.fixture(scope="module")
 def runs() -> dict[tuple[str, str], relays.RelayRun]:
     return {run.case: run for run in relays.relay_runs()}
+
+
+def test_numbers_in_the_text_are_those_that_are_computed() -> None:
+    text = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+    users, _ = published_relays("phantom", "grasped")
+    apart, sd = np.ptp(users), users.std(ddof=1)
+    assert f"Open: six users, {apart:.1f} dB apart" in text
+    assert f"their standard deviation is {sd:.1f} dB" in text
+    model = bh.free(device="lhifam")
+    told = float(re.search(r"stands ([\d.]+) % from it", text)[1])  # type: ignore[index]
+    kc = model.names.index("kc")
+    theta = np.tile([model.reference[name] for name in model.names], (2, 1))
+    theta[:, kc] *= 1 - (told + np.array([-0.01, 0.01])) / 100
+    before, after = bh.critical_stiffness(model, theta).frequency_hz
+    assert before < 10 < 100 < after
 
 
 # Table III

@@ -29,6 +29,7 @@ SHOWN: dict[str, Any] = {
     "walls": table_of([case_of(ANALYSIS)], draws=60),
     "relay": bh.measure_relay(bh.read_recording(RELAY)),
     "study file": bh.read_study(ROOT / "examples" / "study" / "study.toml"),
+    "limit of the response": ANALYSIS.etfe_limit,
     "case": case_of(ANALYSIS),
     "region": bh.kb_region(ANALYSIS.posterior, draws=60),
     "shares": bh.variance_shares(ANALYSIS.posterior, draws=200),

@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bayeshaptic.quantities import estimate, quantity
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.shown import Shown
 from bayeshaptic.stability.local_fit import LocalFit, ResponseData, local_fit, response_data
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
@@ -20,8 +22,8 @@ _DOUBTFUL = 1.0  # a stretch below this is worth a word where it is not in the n
 _NEAR = 2.0  # and a place that is nearer than this without reaching the other side
 
 
-@dataclass(frozen=True)
-class EtfeCriticalStiffness:
+@dataclass(frozen=True, repr=False)
+class EtfeCriticalStiffness(Shown):
     """Model-free critical stiffness of a measurement.
 
     Attributes
@@ -55,6 +57,16 @@ class EtfeCriticalStiffness:
     samples: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
     phase_sd_deg: float | None = None
     db_per_degree: float | None = None
+
+    def _lines(self) -> tuple[str, ...]:
+        if self.q05 is None or self.q50 is None or self.q95 is None:
+            return ("No critical stiffness from the response alone", self.reason or "")
+        found = estimate(self.q50, self.q05, self.q95, self.unit)
+        return (
+            f"Critical stiffness of the response alone {found}, median and 90 % interval",
+            f"crossing at {quantity(self.frequency_hz, 'Hz')}",
+            *(() if self.caveat is None else (self.caveat,)),
+        )
 
 
 class _Run(NamedTuple):

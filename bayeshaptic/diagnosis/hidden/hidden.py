@@ -16,7 +16,9 @@ from bayeshaptic.diagnosis.hidden.suspects import linear_suspects
 from bayeshaptic.diagnosis.hidden.weighed import Weighed, weigh
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.shown import Shown, listed
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.types import Floats
 
@@ -57,8 +59,8 @@ class HiddenEffect:
     pareto_k: float
 
 
-@dataclass(frozen=True)
-class Hidden:
+@dataclass(frozen=True, repr=False)
+class Hidden(Shown):
     """What could hide in a recording.
 
     Attributes
@@ -82,6 +84,13 @@ class Hidden:
     prior: HiddenPrior
     sensitivity: dict[float, tuple[float, ...]]
     looked: Looked = field(repr=False)
+
+    def _lines(self) -> tuple[str, ...]:
+        told = [f"{one.title} ({percent(one.probability)})" for one in self.effects]
+        return (
+            f"What could hide: nothing with a probability of {percent(self.nothing)}",
+            f"what would move the limit most: {listed(told, 2) or 'nothing'}",
+        )
 
 
 def with_hidden(
