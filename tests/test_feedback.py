@@ -58,7 +58,7 @@ def test_the_report_tells_of_the_force_and_of_the_motion(closed: Closed, tmp_pat
     check_page(closed, tmp_path / "out")
     assert "The motion, simulated in the loop" in page and "feedback biases it" in page
     assert "The force, explained by the motion" in page and "What the model lacked" not in page
-    assert "the model lacked dry (Coulomb) friction" in page
+    assert "With dry (Coulomb) friction beside it" in page
     names = {path.name for path in (tmp_path / "out").glob("loop_*.png")}
     assert names == {"loop_inverse.png"}
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))

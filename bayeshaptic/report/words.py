@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.quantities import estimate, interval, percent, pure, quantity
 from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
@@ -16,13 +17,14 @@ from bayeshaptic.report.numbers.trust import doubtful_parameters
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.closed import Closed
 
 _DELAY = "delay_s"
 _WORTH = 1.1  # times the posterior's width, from which an interval was widened
 _WIDER = 3.0  # times the model's interval, from which it is worth a word why
 
 
-def misfit(analysis: Analysis, loop: bool = False) -> str:
+def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
     """How the residual compares with the noise, and where it is worst."""
     if analysis.in_loop is not None:
         return (
@@ -45,7 +47,7 @@ def misfit(analysis: Analysis, loop: bool = False) -> str:
     if misfit_is_clear(analysis):
         then = (
             "What was tried stands above; the limit is widened for what is left."
-            if loop
+            if closed is not None
             else "Until the cause is found and added to the model, nothing here says how wrong "
             "the limit may be."
         )
@@ -53,6 +55,11 @@ def misfit(analysis: Analysis, loop: bool = False) -> str:
             f"The model does not explain this recording: the residual is {misfit_factor(analysis)} "
             f"times the noise ({chi}). It stands out in {outside.sum()} of {len(outside)} third "
             f"octaves and is worst at {place}. {then}"
+        )
+    if closed is not None and closed.verdict == UNEXPLAINED:
+        return (
+            f"Over frequency the residual is no larger than the noise ({chi}). But it is not "
+            "noise: what was found in it stands under What the model lacked."
         )
     if outside.any():
         return (

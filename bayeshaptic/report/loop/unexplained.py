@@ -34,8 +34,8 @@ def remainder(closed: Closed) -> tuple[str, ...]:
     where = "" if top.frequency_hz is None else f", around {quantity(top.frequency_hz, 'Hz')}"
     first = (
         f"There is something {more}here that has no name in the library. Its class is "
-        f"{' and '.join(families)}{where}: {top.text}, where {pure(top.threshold)} would raise "
-        f"suspicion. {_tried(closed)}"
+        f"{' and '.join(families)}{where}: {top.text} (noticed from {pure(top.threshold)} on). "
+        f"{_tried(closed)}"
     )
     advice = [MEASURE_NEXT[family] for family in families if family in MEASURE_NEXT]
     if "linear" in families and closed.model.held:
@@ -66,7 +66,7 @@ def _widened(closed: Closed) -> str:
     before = interval(narrow.quantile(0.05), narrow.quantile(0.95), limit.unit)
     after = interval(limit.quantile(0.05), limit.quantile(0.95), limit.unit)
     return (
-        f"The critical stiffness was widened for it: the 90 % interval goes from {before} to "
+        f"The critical stiffness was widened for it: its 90 % interval was {before}, and is now "
         f"{after}. Use its lower end."
     )
 
