@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from response_table import noisy_table
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis import base_model
@@ -142,14 +143,7 @@ def test_a_third_mass_is_no_hand(tmp_path) -> None:
     values |= {"m3": 0.1, "c3": 0.3, "k3": 2e3, "b3": 0.5}
     theta = np.array([values[name] for name in model.names])
     frequency = np.geomspace(1.0, 200.0, 300)
-    rng = np.random.default_rng(3)
-    noise = 0.01 * rng.normal(size=(2, 300)) / np.sqrt(2)
-    response = model.response(theta, frequency) * (1 + noise[0] + 1j * noise[1])
-    gain, phase = 20 * np.log10(np.abs(response)), np.angle(response, deg=True)
-    rows = np.stack([frequency, gain, phase, 0.01 * np.abs(response)], axis=1)
-    path = tmp_path / "table.csv"
-    np.savetxt(path, rows, delimiter=",", header="frequency_hz,gain_db,phase_deg,sd", comments="")
-    table = bh.read_frf(path, period_s=1e-3, kind="translational")
+    table = noisy_table(tmp_path, frequency, model.response(theta, frequency), 0.01, seed=3)
     choice = choose.choose_model(table, delay_s=2e-4)
     assert choice.fit.model.name == "chain-2"
     grasped = choice.candidates["grasped"]

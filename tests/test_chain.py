@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from response_table import noisy_table
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.begun import base_model
@@ -60,8 +61,34 @@ def test_modes_name_the_base_model():
         "free",
         "chain-2",
     ]
-    for model, options in (("grasped", asked), ("auto", replace(asked, held=True))):
-        with pytest.raises(InputError, match="nobody holds"):
+    assert base_model("grasped", asked) == base_model("auto", replace(asked, held=True))
+    assert base_model("grasped", asked) == "grasped-2"
+    for model, options in (("rigid", asked), ("free", replace(asked, held=True))):
+        with pytest.raises(InputError, match="leave one of them out"):
             base_model(model, options)
+    with pytest.raises(InputError, match="1 to 8"):
+        base_model("grasped", replace(asked, modes=0))
     with pytest.raises(InputError, match="0 to 8"):
         base_model("auto", replace(asked, modes=9))
+
+
+def test_a_held_chain_is_found(tmp_path):
+    """Three masses and a hand on the last, with a mode that `grasped` lacks: from its response."""
+    model = bh.chain(2, held=True, delay_s=2e-4, period_s=1e-3)
+    values = {"m1": 0.3, "b1": 0.5, "bc": 0.5, "kc": 2e4, "m2": 0.2, "b2": 0.2}
+    values |= {"m3": 0.2, "c3": 0.4, "k3": 4e4, "b3": 0.1}
+    values |= {"bs": 5.0, "ks": 3e3, "mh": 0.2, "bh": 4.0, "kh": 80.0}
+    truth = np.array([values[name] for name in model.names])
+    frequency = np.geomspace(1.0, 250.0, 400)
+    response = model.response(truth, frequency)
+    assert model.system(truth).mechanism.hand == 3
+    at_rest = model.system(truth).continuous_response(np.array([1e-6j]))[0, 0]
+    assert at_rest.real == pytest.approx(1 / 2e4 + 1 / 4e4 + 1 / 3e3 + 1 / 80.0, rel=1e-6)
+    table = noisy_table(tmp_path, frequency, response, 0.005, seed=2)
+    fit = bh.least_squares(model, table)
+    assert fit.reduced_chi_square < 1.2
+    limit, found = (
+        float(bh.critical_stiffness(fit.model, theta).value) for theta in (truth, fit.theta)
+    )
+    assert found == pytest.approx(limit, rel=0.02)
+    assert bh.least_squares(bh.grasped(delay_s=2e-4), table).reduced_chi_square > 2

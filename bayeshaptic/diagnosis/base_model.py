@@ -17,7 +17,7 @@ from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
 from bayeshaptic.inference.fit import MISFIT
 
-_LIKE_NO_HAND = 20.5  # chi-square of five numbers: one hand in a thousand
+_LIKE_NO_HAND = 11.1  # chi-square of five numbers: one hand in twenty
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
 
 

@@ -44,6 +44,8 @@ def device_of(options: Options, model: str | Model) -> Device | None:
 def base_model(model: str | Model, options: Options) -> str | Model:
     """The base model that is asked for: `model`, or the chain with the modes of the options.
 
+    Somebody holds that where the model is "grasped", or the options say so.
+
     Raises
     ------
     InputError
@@ -51,13 +53,14 @@ def base_model(model: str | Model, options: Options) -> str | Model:
     """
     if options.modes is None:
         return model
-    if options.held or model not in ("auto", "free"):
-        what = "somebody holds it" if options.held else f"the model is {shown(model)}"
+    held = model == "grasped" if options.held is None else options.held
+    if model not in ("auto", "grasped" if held else "free"):
+        who = "somebody" if held else "nobody"
         raise InputError(
-            f"modes is {options.modes}, which is for a device that nobody holds, and {what}; leave "
-            "one of them out"
+            f"modes is {options.modes}, for a device that {who} holds, and the model is "
+            f"{shown(model)}; leave one of them out"
         )
-    return chain(options.modes).name
+    return chain(options.modes, held).name
 
 
 def measurement_of(measurement: Any, model: Any, options: Options) -> Recording | Etfe:

@@ -45,9 +45,9 @@ class Options:
         Whether somebody held the device: the base model is then chosen among those of held, or of
         free, devices; by default from the data, in a study from its users.
     modes : int or None
-        Vibration modes of a device that nobody holds: 0 is one rigid mass, 1 two masses and a
-        transmission, N a chain of N + 1 masses, 8 modes at most; by default at most one, chosen
-        from the data.
+        Vibration modes of the device: 0 is one rigid mass, 1 two masses and a transmission, N a
+        chain of N + 1 masses, 8 modes at most; nobody holds it, or with `held` a user by its last
+        mass. By default chosen from the data.
     lever_m : float or None
         From the axis to the tip, in metres; by default the device's.
     ess : float or None

@@ -9,13 +9,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayeshaptic.models import Model, Parameter
+from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.start import informed
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
 
 MOTOR, BODY, HAND = "m1", "m2", "mh"
-MASSES = {MOTOR: 0, BODY: 1, HAND: 2}
-"""The masses of the base models by name: where they stand in the mechanism."""
+MASSES = {MOTOR: 0, BODY: 1}
+"""Masses of a device by name: where they stand in every mechanism."""
+
+
+def place_of(name: str, mechanism: Mechanism) -> int:
+    """Where the mass called `name` stands in a mechanism; the hand comes after the device."""
+    if name != HAND:
+        return MASSES[name]
+    assert mechanism.hand is not None
+    return mechanism.hand
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models.model import Model
-from bayeshaptic.models.structures import FREE, GRASPED, HAND
+from bayeshaptic.models.structures import HAND, chain
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 
@@ -169,7 +169,7 @@ def _experiments(
             louder = known.lines.sum() / known.lines[inside].sum()
             title = f"one more with all of its power from {low:.3g} to {high:.3g} Hz"
             found.append(("band", title, known.fisher(np.where(inside, louder, 0.0))))
-    if known.model.structure is GRASPED:
+    if known.model.held:
         device = np.array([name not in HAND for name in known.model.names])
         found.append(
             ("another user", "one more with another user", _without_hand(fisher, prior, device))
@@ -199,7 +199,7 @@ def _free_information(known: Information, fit: Fit) -> Floats | None:
         return None
     kept = np.array([name not in HAND for name in model.names])
     parameters = tuple(p for p, keep in zip(model.parameters, kept, strict=True) if keep)
-    free = replace(model, structure=FREE, parameters=parameters)
+    free = replace(model, structure=chain(model.structure.modes), parameters=parameters)
     said = _information(free, fit, known.theta[kept], known.noise_scale)
     added = np.zeros((model.size, model.size))
     added[np.ix_(kept, kept)] = said.fisher()

@@ -70,23 +70,28 @@ def chain(
     delay_sd_s: float | None = None,
     period_s: float | None = None,
     prior: Mapping[str, Prior] | None = None,
+    held: bool = False,
 ) -> Model:
-    """Masses in a row that nobody holds, with so many vibration modes.
+    """Masses in a row with so many vibration modes, which nobody holds, or a user by the last.
 
     Parameters
     ----------
     modes : int
         0 is `rigid`, 1 is `free`; N has N + 1 masses: beside those of `free` m3, c3, k3, b3 and so
-        on, the mass, what joins it to the one before, and its damper to the ground.
+        on, the mass, what joins it to the one before, and its damper to the ground.  Held, 1 is
+        `grasped`.
     device, delay_s, delay_sd_s, period_s, prior
         See `grasped`.  A device file gives the parameters of two masses at most; the priors of a
         longer chain come from the data at the first fit.
+    held : bool
+        Whether somebody holds it.
 
     Returns
     -------
     Model
     """
-    return _build(chain_of_masses(modes), device, delay_s, delay_sd_s, period_s, prior)
+    structure = chain_of_masses(modes, held)
+    return _build(structure, device, delay_s, delay_sd_s, period_s, prior)
 
 
 @at_the_door

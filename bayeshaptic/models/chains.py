@@ -22,10 +22,10 @@ _DAMPING = (0.01, 0.05)  # ratios
 
 
 def shorter_chain(model: Model) -> Model | None:
-    """The chain with one mode less; None where `model` is none of three masses or more."""
-    if not model.name.startswith("chain"):
+    """The chain with one mode less, held alike; None where the device has one mode or none."""
+    if model.structure.modes < 2:
         return None
-    structure = chain(_modes(model) - 1)
+    structure = chain(model.structure.modes - 1, model.held)
     gone = set(model.structure.names) - set(structure.names)
     kept = tuple(p for p in model.parameters if p.name not in gone)
     return replace(model, structure=structure, parameters=kept)
@@ -39,7 +39,7 @@ def with_one_more_mode(shorter: Model, theta: Floats, model: Model, etfe: Etfe) 
     ndarray, shape (S, P)
     """
     values = dict(zip(shorter.names, theta, strict=True)) | dict(shorter.fixed)
-    squares, weights = _modes_of(values, _modes(model))
+    squares, weights = _modes_of(values, model.structure.modes)
     low, high = etfe.band_hz
     found = []
     frequencies = 45
@@ -53,10 +53,6 @@ def with_one_more_mode(shorter: Model, theta: Floats, model: Model, etfe: Etfe) 
                 named = _named(values, masses, springs, ratio)
                 found.append([named[name] for name in model.names])
     return np.array(found)
-
-
-def _modes(model: Model) -> int:
-    return sum(name.startswith("m") for name in model.structure.names) - 1
 
 
 def _modes_of(values: dict[str, float], count: int) -> tuple[Floats, Floats]:

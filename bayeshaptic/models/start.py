@@ -148,7 +148,7 @@ def _plausible(name: str, found: Scales, rng: np.random.Generator, count: int) -
         "b1": ground * rng.uniform(size=count),
         "b2": ground * rng.uniform(size=count),
     }
-    if name != "grasped":
+    if not name.startswith("grasped"):
         return device
     mh = mass * factor(0.1, 3.0)
     grip, arm = rate(3 * found.low_hz, found.high_hz), rate(0.3 * found.low_hz, 10 * found.low_hz)

@@ -13,7 +13,7 @@ from bayeshaptic.models.response.mechanism import Link, Mechanism
 from bayeshaptic.types import Floats
 
 Values = Mapping[str, Floats]
-_CHAIN = "chain-"  # and the number of its vibration modes
+_CHAIN, _HELD_CHAIN = "chain-", "grasped-"  # and the number of the device's vibration modes
 
 # name: (dimension, title)
 QUANTITIES: dict[str, tuple[str, str]] = {
@@ -62,6 +62,11 @@ class Structure:
         """Whether somebody holds the device."""
         return set(HAND) <= set(self.names)
 
+    @property
+    def modes(self) -> int:
+        """Vibration modes of the device by itself: one less than its masses."""
+        return sum(QUANTITIES[name][0] == "mass" for name in self.names if name != "mh") - 1
+
 
 def _rigid(v: Values) -> Mechanism:
     return Mechanism((v["m"],), (Link(0, None, v["b"], np.zeros_like(v["b"])),))
@@ -78,9 +83,14 @@ def _free(v: Values) -> Mechanism:
 
 
 def _grasped(v: Values) -> Mechanism:
-    device = _free(v)
-    held = device.with_mass(v["mh"], 1, v["bs"], v["ks"])
-    return replace(held.with_link(Link(2, None, v["bh"], v["kh"])), hand=2)
+    return _in_a_hand(_free(v), v)
+
+
+def _in_a_hand(device: Mechanism, v: Values) -> Mechanism:
+    """The device with a hand on its last mass."""
+    hand = len(device.masses)
+    held = device.with_mass(v["mh"], hand - 1, v["bs"], v["ks"])
+    return replace(held.with_link(Link(hand, None, v["bh"], v["kh"])), hand=hand)
 
 
 RIGID = Structure("rigid", ("m", "b"), _rigid, "one mass and one damper, equation (1)")
@@ -95,20 +105,22 @@ STRUCTURES = {structure.name: structure for structure in (RIGID, FREE, GRASPED)}
 
 
 @cache
-def chain(modes: int) -> Structure:
-    """The device by itself with so many vibration modes: masses in a row, nobody holds it.
+def chain(modes: int, held: bool = False) -> Structure:
+    """A device with so many vibration modes, masses in a row; a hand holds the last, or nobody.
 
-    With none it is rigid, with one free; each further mass hangs on the one before.
+    With none it is rigid, with one free, or grasped; each further mass hangs on the one before.
 
     Raises
     ------
     InputError
-        For fewer than none, or more than eight.
+        For fewer than none, or one where somebody holds it, or more than eight.
     """
-    if not 0 <= modes <= MOST_MODES:
-        raise InputError(f"a chain has 0 to {MOST_MODES} vibration modes, not {modes}.")
+    fewest = 1 if held else 0
+    if not fewest <= modes <= MOST_MODES:
+        what = "a chain that somebody holds" if held else "a chain"
+        raise InputError(f"{what} has {fewest} to {MOST_MODES} vibration modes, not {modes}.")
     if modes < 2:
-        return (RIGID, FREE)[modes]
+        return GRASPED if held else (RIGID, FREE)[modes]
     further = tuple(range(3, modes + 2))
     names = tuple(f"{part}{number}" for number in further for part in "mckb")
 
@@ -117,23 +129,27 @@ def chain(modes: int) -> Structure:
         for n in further:
             mechanism = mechanism.with_mass(v[f"m{n}"], n - 2, v[f"c{n}"], v[f"k{n}"])
             mechanism = mechanism.with_link(Link(n - 1, None, v[f"b{n}"], np.zeros_like(v["m1"])))
-        return mechanism
+        return _in_a_hand(mechanism, v) if held else mechanism
 
-    title = f"{modes + 1} masses in a row, nobody holds it"
-    return Structure(f"{_CHAIN}{modes}", FREE.names + names, build, title)
+    who = "a user holds the last" if held else "nobody holds it"
+    title = f"{modes + 1} masses in a row, {who}"
+    kind, hand = (_HELD_CHAIN, HAND) if held else (_CHAIN, ())
+    return Structure(f"{kind}{modes}", FREE.names + names + hand, build, title)
 
 
 def structure_named(name: str) -> Structure:
-    """The structure called `name`: one of `STRUCTURES`, or "chain-2" for two vibration modes.
+    """The structure called `name`: of `STRUCTURES`, or with N modes "chain-N", held "grasped-N".
 
     Raises
     ------
     InputError
         If there is none.
     """
-    number = name.removeprefix(_CHAIN)
-    if number != name and number.isdecimal():
-        return chain(int(number))
+    for kind in (_CHAIN, _HELD_CHAIN):
+        number = name.removeprefix(kind)
+        if number != name and number.isdecimal():
+            return chain(int(number), held=kind == _HELD_CHAIN)
     if name not in STRUCTURES:
-        raise InputError(f"no model {name!r}; there are {', '.join(STRUCTURES)}, and {_CHAIN}N.")
+        there = ", ".join((*STRUCTURES, f"{_CHAIN}N"))
+        raise InputError(f"no model {name!r}; there are {there}, and {_HELD_CHAIN}N.")
     return STRUCTURES[name]

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
-from bayeshaptic.effects.typical import BODY, HAND, MASSES, MOTOR, Typical, apart, grid, typical
+from bayeshaptic.effects.typical import BODY, HAND, MOTOR, Typical, apart, grid, place_of, typical
 from bayeshaptic.effects.unseen import Unseen, combined
 from bayeshaptic.models import LinearSystem, LogNormal, LogUniform, Model, Parameter
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -93,7 +93,8 @@ class AttachedMass(LinearEffect):
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         frequency, mass, damping = self.own(values)
         damper, spring = mount(mass, frequency, damping)
-        mechanism = system.mechanism.with_mass(mass, MASSES[self.on], damper, spring)
+        carrier = place_of(self.on, system.mechanism)
+        mechanism = system.mechanism.with_mass(mass, carrier, damper, spring)
         return replace(system, mechanism=mechanism)
 
 

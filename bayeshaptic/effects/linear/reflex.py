@@ -9,7 +9,7 @@ import numpy as np
 
 from bayeshaptic.effects.effect import Floats, LinearEffect
 from bayeshaptic.effects.registry import register
-from bayeshaptic.effects.typical import HAND, MASSES, apart, grid, typical
+from bayeshaptic.effects.typical import HAND, apart, grid, place_of, typical
 from bayeshaptic.effects.unseen import Unseen, combined
 from bayeshaptic.models import HalfNormal, LinearSystem, LogNormal, Model, Parameter
 from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink, delayed
@@ -66,5 +66,6 @@ class Reflex(LinearEffect):
         return Unseen("number", title, 1.0, own, *combined(DELAYS_S, LAGS_S))
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
-        link = DynamicLink(MASSES[HAND], None, reflex_stiffness, self.own(values))
+        hand = place_of(HAND, system.mechanism)
+        link = DynamicLink(hand, None, reflex_stiffness, self.own(values))
         return system.with_dynamic_link(link)
