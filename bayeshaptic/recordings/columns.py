@@ -16,7 +16,9 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.readers import Arrays
 from bayeshaptic.recordings.units import base_unit, is_unit
 
-RECORDING_ROLES = ("time", "force", "position")
+# What may stand for the force and for the position (`signals.other_outputs`), where it is named.
+FORCES, POSITIONS = ("force", "measured_force"), ("position", "velocity", "acceleration")
+RECORDING_ROLES = ("time", *FORCES, *POSITIONS)
 # Of what a frequency response is: `bayeshaptic.recordings.response.frf_kinds`.
 FRF_KINDS = ("gain_db", "receptance_db", "mobility_db", "accelerance_db")
 FRF_ROLES = ("frequency", *FRF_KINDS, "phase_deg", "sd", "coherence", "averages")
@@ -29,6 +31,7 @@ DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     "position": {"position_m": "m", "angle_rad": "rad"},
     "frequency": {"frequency_hz": None},
     **{role: {role: None} for role in FRF_ROLES[1:]},
+    **{role: {} for role in (*FORCES[1:], *POSITIONS[1:])},
 }
 
 # The same in words, for headers that say their unit: "Time (s)", "Force [N]", "Position (mm)".
@@ -125,6 +128,20 @@ def is_frequency_response(arrays: Arrays, mapping: Mapping[str, Column]) -> bool
     if any(role in mapping for role in FRF_ROLES):
         return True
     return not any(role in mapping for role in RECORDING_ROLES) and "frequency_hz" in arrays
+
+
+def played_by(roles: tuple[str, ...], mapping: Mapping[str, Column], path: Path) -> str:
+    """Which of `roles` that stand for one thing the mapping names; the first where it names none.
+
+    Raises
+    ------
+    InputError
+        Where it names several.
+    """
+    named = [role for role in roles if role in mapping]
+    if len(named) > 1:
+        raise InputError(f"{path}: columns name both {' and '.join(named)}; leave one of them out")
+    return (*named, roles[0])[0]
 
 
 def name_and_unit(name: str) -> tuple[str, str | None]:

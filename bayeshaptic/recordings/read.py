@@ -13,14 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import (
+    FORCES,
+    POSITIONS,
     Column,
     as_numbers,
     is_frequency_response,
     parse_columns,
     pick,
+    played_by,
 )
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.units import base_unit, choose_units, says_volts
 
@@ -48,7 +52,8 @@ def read_recording(
         Which array is the time, the force and the position, with factors and units:
         ``"time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"``, or the same as a mapping.
         Headers ``time_s``, ``force_n`` / ``torque_nm`` / ``current_a`` and ``position_m`` /
-        ``angle_rad`` need none.
+        ``angle_rad`` need none. ``velocity`` or ``acceleration`` may stand for the position,
+        ``measured_force`` for the force (`bayeshaptic.recordings.signals.other_outputs`).
     period_s : float or None
         Sampling period; None takes it from the time stamps. Given, no time is needed.
     encoder_resolution : float or None
@@ -210,31 +215,34 @@ def recorded(
     """The recording in the arrays of a file; see `read_recording`."""
     signals: dict[str, NDArray[np.float64]] = {}
     units: dict[str, str | None] = {}
-    for role in ("force", "position", "time"):
+    force, position = played_by(FORCES, mapping, path), played_by(POSITIONS, mapping, path)
+    for role in (force, position, "time"):
         found = pick(arrays, role, mapping, path, required=role != "time" or period_s is None)
         if found is None:
             continue
         values, unit = found
         units[role], factor = (None, 1.0) if unit is None else base_unit(role, unit)
         signals[role] = values * factor if factor != 1.0 else values
+    signals["force"] = signals.pop(force)
     signals = cut.apply(signals, period_s, path)
     recording = recording_from_arrays(
         signals["force"],
-        signals["position"],
+        signals[position],
         period_s=period_s,
         time=signals.get("time"),
-        force_unit=units["force"],
-        position_unit=units["position"],
+        force_unit=units[force],
+        position_unit=units[position],
         kind=kind,
         name=name or recording_name(path),
         encoder_resolution=encoder_resolution,
         source=path,
     )
-    if units["force"] is None and "force" in mapping and _in_volts(mapping["force"]):
+    recording = as_command_and_position(recording, force, position)
+    if units[force] is None and force in mapping and _in_volts(mapping[force]):
         text = (
-            f"The name of the force, '{mapping['force'].text}', says volts, and it is taken to be "
+            f"The name of the force, '{mapping[force].text}', says volts, and it is taken to be "
             f"in {recording.force_unit}: stiffness and masses are then wrong by the force of one "
-            f"volt, C. Write force=NAME*C[{recording.force_unit}] in --columns."
+            f"volt, C. Write {force}=NAME*C[{recording.force_unit}] in --columns."
         )
         notices = (*recording.notices, Notice("warning", "units", text))
         recording = replace(recording, notices=notices)

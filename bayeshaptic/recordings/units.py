@@ -31,21 +31,42 @@ _POSITION = {
     "urad": ("rad", 1e-6),
     "deg": ("rad", math.pi / 180),
 }
+_VELOCITY = {
+    "m/s": ("m", 1.0),
+    "mm/s": ("m", 1e-3),
+    "rad/s": ("rad", 1.0),
+    "deg/s": ("rad", math.pi / 180),
+    "rpm": ("rad", math.pi / 30),
+}
+_ACCELERATION = {
+    "m/s^2": ("m", 1.0),
+    "m/s2": ("m", 1.0),
+    "mm/s^2": ("m", 1e-3),
+    "rad/s^2": ("rad", 1.0),
+    "rad/s2": ("rad", 1.0),
+}
 # Units of other things, and of these in other systems: known as units, and not turned into others.
 _FOREIGN = """
-    V mV kV Hz kHz rpm K C degC % counts count cnt inc incr ticks tick lsb kg g kgf gf lb lbf oz in
-    inch ft min h rev turns m/s mm/s rad/s deg/s m/s^2 m/s2 rad/s^2 rad/s2
+    V mV kV Hz kHz K C degC % counts count cnt inc incr ticks tick lsb kg g kgf gf lb lbf oz in
+    inch ft min h rev turns
 """
 _VOLTS = re.compile(r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$")
-_BY_ROLE = {"time": _TIME, "force": _FORCE, "position": _POSITION}
+_BY_ROLE = {
+    "time": _TIME,
+    "force": _FORCE,
+    "measured_force": _FORCE,
+    "position": _POSITION,
+    "velocity": _VELOCITY,
+    "acceleration": _ACCELERATION,
+}
 
 
 def base_unit(role: str, unit: str) -> tuple[str, float]:
-    """Base unit and factor of a unit as it was written.
+    """Base unit and factor of a unit as it was written; of a velocity, that of the position.
 
     Parameters
     ----------
-    role : {"time", "force", "position"}
+    role : {"time", "force", "measured_force", "position", "velocity", "acceleration"}
     unit : str
         For example "mm", "N m" or "µs".
 

@@ -1,0 +1,100 @@
+"""Velocities, accelerations and measured forces, read as a command and a position."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bayeshaptic as bh
+from bayeshaptic.errors import InputError
+
+PERIOD_S, SAMPLES = 1e-3, 4000
+RATES_HZ = np.arange(1.0, 151.0)  # one period a second
+
+
+@pytest.fixture(scope="module")
+def device():
+    """A free device whose mode lies at 60 Hz, without a delay, and its parameters."""
+    model = bh.free(delay_s=0.0, period_s=PERIOD_S)
+    values = {"m1": 0.2, "b1": 1.0, "bc": 0.6, "kc": 0.1 * (2 * np.pi * 60) ** 2, "m2": 0.2}
+    return model, np.array([{**values, "b2": 0.5}[name] for name in model.names])
+
+
+def continuous(device):
+    """Tones of a force, and the motion of the device with no hold between: every output, (N,)."""
+    model, theta = device
+    s = 2j * np.pi * RATES_HZ
+    rng = np.random.default_rng(4)
+    tones = np.exp(2j * np.pi * rng.uniform(size=len(s)))
+    response = model.system(theta).continuous_response(s)[0]
+    time = np.arange(SAMPLES) * PERIOD_S
+    waves = np.exp(np.outer(time, s))
+    signals = {"t": time, "u": waves @ tones}
+    signals |= {name: waves @ (tones * response * s**n) for n, name in enumerate("xva")}
+    return {name: np.real(values) for name, values in signals.items()}
+
+
+@pytest.mark.parametrize(
+    "output", ["position=x[m]", "velocity=v[m/s]", "acceleration=a[m/s^2]", "velocity=v*1e3[mm/s]"]
+)
+def test_a_continuous_experiment_gives_the_response_of_a_held_command(device, output, tmp_path):
+    """Within a few thousandths up to 150 Hz of 1 kHz, whatever was recorded of the motion."""
+    path = tmp_path / "shaker.npz"
+    np.savez(path, **continuous(device))
+    recording = bh.read_recording(path, columns=f"time=t,measured_force=u[N],{output}")
+    assert (recording.force_unit, recording.position_unit) == ("N", "m")
+    assert "columns" in [notice.topic for notice in recording.notices]
+    settled = slice(500, 3500)
+    force, position = recording.force[settled], recording.position[settled]
+    lines = np.exp(-2j * np.pi * np.outer(RATES_HZ, np.arange(3000) * PERIOD_S))
+    found = (lines @ position) / (lines @ force)
+    model, theta = device
+    expected = model.response(theta, RATES_HZ)
+    assert np.max(np.abs(found / expected - 1)) < 6e-3
+
+
+def test_a_velocity_beside_a_command(device, tmp_path):
+    """Under a held force the velocity's integral is the position, as close as the notice says."""
+    from scipy.linalg import expm
+
+    model, theta = device
+    value = dict(zip(model.names, theta, strict=True))
+    m1, m2, k, c = (value[name] for name in ("m1", "m2", "kc", "bc"))
+    rates = [[0, 0, 1, 0], [0, 0, 0, 1]]
+    rates.append([-k / m1, k / m1, -(c + value["b1"]) / m1, c / m1])
+    rates.append([k / m2, -k / m2, c / m2, -(c + value["b2"]) / m2])
+    whole = np.zeros((5, 5))
+    whole[:4, :4], whole[2, 4] = rates, 1 / m1
+    step = expm(whole * PERIOD_S)
+    rng = np.random.default_rng(8)
+    tones = 2 * np.pi * RATES_HZ[:, None] * np.arange(6000) * PERIOD_S
+    force = np.cos(tones + rng.uniform(0, 2 * np.pi, (len(RATES_HZ), 1))).sum(axis=0)
+    state, states = np.zeros(4), np.zeros((6000, 4))
+    for row, push in enumerate(force):
+        states[row] = state
+        state = step[:4, :4] @ state + step[:4, 4] * push
+    path = tmp_path / "tacho.npz"
+    np.savez(path, t=np.arange(6000) * PERIOD_S, u=force, v=states[:, 2])
+    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    lines = np.exp(-2j * np.pi * np.outer(RATES_HZ, np.arange(3000) * PERIOD_S))
+    position = recording.position
+    position = position - (position[5000] - position[4000]) / 1000 * np.arange(6000)  # of its mean
+    found = (lines @ position[3000:]) / (lines @ recording.force[3000:])
+    off = np.abs(found / model.response(theta, RATES_HZ) - 1)
+    rate = 2 * np.pi * RATES_HZ
+    of_the_motor = off * np.abs(model.response(theta, RATES_HZ)) * m1 * rate**2
+    assert np.all(of_the_motor < 1.1 * (rate * PERIOD_S) ** 2 / 12 + 1e-4)
+    assert 0.025 < of_the_motor[99] < 0.036  # 3.3 % at 100 Hz, as the recording's notice says
+    assert any("3.3 %" in notice.text for notice in recording.notices)
+
+
+def test_what_cannot_be_told_is_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    time = np.arange(50) * PERIOD_S
+    np.savez(path, t=time, u=np.sin(time), a=np.cos(time))
+    with pytest.raises(InputError, match="half a period of delay open"):
+        bh.read_recording(path, columns="time=t,force=u,acceleration=a")
+    with pytest.raises(InputError, match="both position and velocity"):
+        bh.read_recording(path, columns="time=t,force=u,position=a,velocity=a")
+    with pytest.raises(InputError, match="no unit of velocity"):
+        bh.read_recording(path, columns="time=t,force=u,velocity=a[mm]")
