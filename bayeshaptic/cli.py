@@ -17,6 +17,7 @@ import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from types import FrameType
 from typing import NoReturn
 
 from bayeshaptic.commands import COMMANDS
@@ -38,6 +39,9 @@ example:
 
 Every command has its own help: bayeshaptic COMMAND --help. With --debug, or BAYESHAPTIC_DEBUG=1 in
 the environment, errors come with their traceback."""
+
+
+LAST_S = 4.0  # from a signal to the end by force: all is to have ended after five seconds
 
 
 class _Parser(argparse.ArgumentParser):
@@ -84,14 +88,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     debug = arguments.debug or bool(os.environ.get("BAYESHAPTIC_DEBUG"))
     try:
-        with _warnings_in_one_line(), _terminated_like_interrupted():
+        with _warnings_in_one_line(), _stopped_in_order(alone=argv is None):
             return arguments.run(arguments)
-    except _Terminated:
-        complain("terminated")
-        return 143
-    except KeyboardInterrupt:
-        complain("interrupted")
-        return 130
+    except (_Stopped, KeyboardInterrupt) as stop:
+        number = signal.SIGTERM if signal.SIGTERM in stop.args else signal.SIGINT
+        complain("terminated" if number == signal.SIGTERM else "interrupted")
+        return 128 + number
     except (InputError, OSError) as error:
         if debug:
             traceback.print_exc()
@@ -107,24 +109,48 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
 
 
-class _Terminated(BaseException):
-    """SIGTERM: workers are stopped and drafts removed on the way out, as for an interrupt."""
+class _Stopped(BaseException):
+    """A signal: workers are stopped and drafts removed on the way out.
+
+    An interrupt, too: libraries hold a KeyboardInterrupt up to tidy up by themselves.
+    """
 
 
 @contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    def end(*_: object) -> NoReturn:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        raise _Terminated
+def _stopped_in_order(alone: bool) -> Iterator[None]:
+    """Signals become exceptions; where the process is ours `alone`, it ends in time, too.
 
+    Libraries may take long to close what they have started: a dask cluster that was stopped while
+    it started took six seconds.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGTERM, end)
+
+    def end(number: int, frame: FrameType | None) -> NoReturn:
+        if alone:
+            last = threading.Timer(LAST_S, _end_by_force, [128 + number])
+            last.daemon = True
+            last.start()
+        signal.signal(number, signal.SIG_IGN)
+        raise _Stopped(number)
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGINT)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _end_by_force(status: int) -> None:
+    import multiprocessing
+
+    try:
+        for child in multiprocessing.active_children():
+            child.kill()
+    finally:
+        os._exit(status)
 
 
 def _joined(argv: Sequence[str]) -> list[str]:

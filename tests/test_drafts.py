@@ -117,3 +117,29 @@ files.write_whole(Path({str(tmp_path / "index.html")!r}), "half")
     assert left.startswith(".part-")
     remove_dead_drafts(tmp_path)
     assert not os.listdir(tmp_path)
+
+
+STUCK = """
+import time
+from bayeshaptic import cli
+from bayeshaptic.commands import explain
+def run(arguments):
+    print("here", flush=True)
+    try:
+        time.sleep(60)
+    finally:
+        time.sleep(60)
+cli.LAST_S, explain.run = 0.1, run
+cli.main()
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGINT])
+def test_what_does_not_end_by_itself_is_ended(sign: int) -> None:
+    words = [sys.executable, "-c", STUCK, "explain", "units"]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "here\n"
+    process.send_signal(sign)
+    assert process.wait(timeout=30) == 128 + sign
+    process.stdout.close()

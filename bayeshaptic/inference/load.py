@@ -13,7 +13,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.diagnostics import diagnose
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.saved.archive import model_from_dict
-from bayeshaptic.inference.saved.arviz_groups import MARK, from_chains
+from bayeshaptic.inference.saved.arviz_groups import MARK, TOTAL, from_chains
 
 
 @at_the_door
@@ -63,7 +63,7 @@ def _restored(data: Any, stats: Any, about: dict[str, Any]) -> Posterior:
     return Posterior(
         model,
         chains,
-        from_chains(stats["log_likelihood"][()], walkers),
+        from_chains(stats[TOTAL][()], walkers),
         diagnose(chains),
         about["converged"],
         about["message"],

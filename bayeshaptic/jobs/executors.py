@@ -224,24 +224,28 @@ def _local_dask(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
     import distributed
 
     others = set(multiprocessing.active_children())
-    with (
-        dask.config.set(_CHEAPER),
-        distributed.LocalCluster(
-            n_workers=usable_cores(),
-            threads_per_worker=1,
-            dashboard_address=None,
-            silence_logs=logging.ERROR,
-        ) as cluster,
-    ):
-        with distributed.Client(cluster, set_as_default=False) as client:
-            client.run(look_rarely)
-        try:
-            yield from _on_dask(cluster.scheduler_address, job, items)
-        except BaseException:
-            for nanny in cluster.workers.values():
-                nanny.auto_restart = False
-            _end_children(others)  # closing would wait for what they are doing
-            raise
+    log = logging.getLogger("tornado.application")
+    cheaper = dask.config.set(_CHEAPER)
+    empty = distributed.LocalCluster(
+        n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=logging.ERROR
+    )
+    try:
+        with cheaper, empty as cluster:
+            try:
+                cluster.scale(usable_cores())
+                with distributed.Client(cluster, set_as_default=False) as client:
+                    client.wait_for_workers(usable_cores())
+                    client.run(look_rarely)
+                yield from _on_dask(cluster.scheduler_address, job, items)
+            except BaseException:
+                log.disabled = True  # closing would wait for what they do, and tell who dies
+                # Those that are starting are not among the workers yet.
+                for nanny in {*cluster.workers.values(), *getattr(cluster, "_created", ())}:
+                    nanny.auto_restart = False
+                _end_children(others)
+                raise
+    finally:
+        log.disabled = False
 
 
 def _end_children(others: set[Any]) -> None:

@@ -26,7 +26,9 @@ SHORTEST_S = 2.5
 FEWEST_CHANGES = 20
 # Fewer tones than this leave more parameters than numbers.
 FEWEST_TONES = 5
-# Share of the recording that may pass without force, or without motion.
+# Share of the recording that may pass without force, or without motion. In none of 40 clean ones of
+# the bench (both devices, held and not, five excitations, at the usual force and a third of it) was
+# the force ever idle; the position stood still for 9 % at most, of a weak chirp for 23 %.
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
 

@@ -24,6 +24,8 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 MARK = "bayeshaptic"
+TOTAL = "total_log_likelihood"
+"""In `sample_stats`: of the whole measurement, where ArviZ expects one for each observation."""
 
 
 class Sampled(Protocol):
@@ -60,9 +62,10 @@ def to_arviz(posterior: Sampled) -> Any:
     ``effective_draws`` of each variable.
 
     Groups: ``posterior`` (a variable a parameter, its unit in ``attrs["units"]``),
-    ``sample_stats`` (log likelihood), ``prior``, and, where the measurement is at hand,
-    ``log_likelihood`` (a window each), ``observed_data`` and ``posterior_predictive`` (real and
-    imaginary part of the response, noise included), and ``constant_data`` (the noise's sd).
+    ``sample_stats`` (total log likelihood), ``prior``, and, where the measurement is at hand,
+    ``log_likelihood`` (a window each), ``observed_data``, ``posterior_predictive`` and
+    ``prior_predictive`` (real and imaginary part of the response, noise included), and
+    ``constant_data`` (the noise's sd).
 
     Parameters
     ----------
@@ -118,13 +121,13 @@ def _groups(posterior: Sampled) -> dict[str, Group]:
     level = Variable(("chain", "draw"), as_chains(posterior.log_likelihood))
     groups = {
         "posterior": Group(_sampled(posterior, chains), draws, _about(posterior)),
-        "sample_stats": Group({"log_likelihood": level}, draws),
+        "sample_stats": Group({TOTAL: level}, draws),
         "prior": Group(_parameters(posterior, prior), _numbered(prior)),
     }
     if posterior.windows is not None:
         groups["log_likelihood"] = _pointwise(posterior)
     if posterior.etfe is not None:
-        groups |= _predictive(posterior, rng)
+        groups |= _predictive(posterior, prior, rng)
     return groups
 
 
@@ -200,29 +203,33 @@ def _pointwise(posterior: Sampled) -> Group:
     return Group({"response": response}, _numbered(some) | along)
 
 
-def _predictive(posterior: Sampled, rng: np.random.Generator) -> dict[str, Group]:
-    """The measured response, and what the posterior predicts of it with its noise."""
+def _predictive(posterior: Sampled, prior: Floats, rng: np.random.Generator) -> dict[str, Group]:
+    """The measured response, and what posterior and prior predict of it with its noise."""
     etfe = posterior.etfe
     assert etfe is not None
-    predictive_draws = 4  # a walker: the response at every frequency is large
-    some = _thinned(posterior, predictive_draws)
-    response = posterior.model.response(some.reshape(-1, some.shape[2]), etfe.frequency_hz)
-    noise = rng.standard_normal((2, *response.shape)) * np.sqrt(etfe.variance / 2)
-    shape = (*some.shape[:2], -1)
+    after, before = 4, 200  # draws a walker, and of the prior: each is a whole response
     unit = {"units": f"{etfe.position_unit}/{etfe.force_unit}"}
-    dims = ("chain", "draw", "frequency")
     where = {"frequency": Variable(("frequency",), etfe.frequency_hz)}
-    predicted = {
-        "response_real": Variable(dims, (response.real + noise[0]).reshape(shape), unit),
-        "response_imag": Variable(dims, (response.imag + noise[1]).reshape(shape), unit),
-    }
+
+    def predicted(theta: Floats) -> Group:
+        response = posterior.model.response(theta.reshape(-1, theta.shape[2]), etfe.frequency_hz)
+        noise = rng.standard_normal((2, *response.shape)) * np.sqrt(etfe.variance / 2)
+        shape, dims = (*theta.shape[:2], -1), ("chain", "draw", "frequency")
+        parts = {"real": response.real + noise[0], "imag": response.imag + noise[1]}
+        variables = {
+            f"response_{name}": Variable(dims, part.reshape(shape), unit)
+            for name, part in parts.items()
+        }
+        return Group(variables, _numbered(theta) | where)
+
     observed = {
         "response_real": Variable(("frequency",), etfe.value.real, unit),
         "response_imag": Variable(("frequency",), etfe.value.imag, unit),
     }
     sd = Variable(("frequency",), np.sqrt(etfe.variance), unit)
     return {
-        "posterior_predictive": Group(predicted, _numbered(some) | where),
+        "posterior_predictive": predicted(_thinned(posterior, after)),
+        "prior_predictive": predicted(prior[:, :before]),
         "observed_data": Group(observed, where),
         "constant_data": Group({"response_sd": sd}, where),
     }
