@@ -124,8 +124,8 @@ import time
 from bayeshaptic import cli
 from bayeshaptic.commands import explain
 def run(arguments):
-    print("here", flush=True)
     try:
+        print("here", flush=True)
         time.sleep(60)
     finally:
         time.sleep(60)
