@@ -13,49 +13,15 @@ A. Janot, M. Gautier and M. Brunot, "Data set and reference models of EMPS", 201
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import butter, decimate, sosfiltfilt
+from scipy.signal import decimate
 
-from bayeshaptic.effects.laws import corrections, fitted
-from bayeshaptic.effects.nonlinear.internal_force import MOTOR
-from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
+from bayeshaptic.diagnosis.feedback.terms import SmoothMotion, Term, smooth_motion, terms_of
 from bayeshaptic.errors import InputError
-from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
-
-_ITS_OWN = (
-    1e-3  # of a column's power that no others make, or it is no new term: a tone's spring is a mass
-)
-
-
-@dataclass(frozen=True)
-class SmoothMotion:
-    """A motion without what the encoder adds: position, velocity, acceleration, jerk, (N,)."""
-
-    position: Floats = field(repr=False)
-    velocity: Floats = field(repr=False)
-    acceleration: Floats = field(repr=False)
-    jerk: Floats = field(repr=False)
-
-
-@dataclass(frozen=True)
-class Term:
-    """One column of the inverse dynamics: what it is, and the unit of its coefficient."""
-
-    name: str
-    title: str
-    unit: str
-
-
-@dataclass(frozen=True)
-class _Column(Term):
-    """With the column itself: from `SmoothMotion` to the force for a coefficient of one, (N,)."""
-
-    column: Callable[[SmoothMotion], Floats] = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -150,7 +116,7 @@ def inverse_dynamics(
             f"{recording.name}: {recording.samples} samples are too few for inverse dynamics below "
             f"{cutoff_hz:g} Hz; raise cutoff_hz"
         )
-    path = _path(recording, cutoff_hz)
+    path = smooth_motion(recording, cutoff_hz)
 
     def thin(signal: Floats) -> Floats:
         inner = signal[edge:-edge]
@@ -159,7 +125,7 @@ def inverse_dynamics(
         return np.asarray(decimate(inner, every, zero_phase=True), dtype=np.float64)
 
     force, time_s = thin(recording.force), np.arange(recording.samples)[edge:-edge:every]
-    start, library = _terms(recording, path)
+    start, library = terms_of(recording, path)
     known = {term.name: term for term in (*start, *library)}
     columns = {name: thin(term.column(path)) for name, term in known.items()}
     chosen = [term.name for term in start]
@@ -193,68 +159,6 @@ def inverse_dynamics(
     )
 
 
-def _path(recording: Recording, cutoff_hz: float) -> SmoothMotion:
-    """Zero-phase low-pass and central differences."""
-    low = butter(4, cutoff_hz, fs=1 / recording.period_s, output="sos")
-    x = sosfiltfilt(low, recording.position)
-    v = np.gradient(x, recording.period_s)
-    a = np.zeros_like(x)
-    a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / recording.period_s**2
-    return SmoothMotion(x, v, a, np.gradient(a, recording.period_s))
-
-
-def _terms(
-    recording: Recording, path: SmoothMotion
-) -> tuple[tuple[_Column, ...], tuple[_Column, ...]]:
-    """Those of the linear model, and those that may join it."""
-    middle = float(np.mean(path.position))
-
-    def unit(dimension: str) -> str:
-        return unit_of(dimension, recording.force_unit, recording.position_unit)
-
-    force, x = unit("force"), recording.position_unit
-    start = (
-        _Column("mass", "mass", unit("mass"), lambda p: p.acceleration),
-        _Column("damping", "viscous damping", unit("damping"), lambda p: p.velocity),
-        _Column("offset", "constant force", force, lambda p: np.ones_like(p.velocity)),
-    )
-    usual = Usual.of(path.velocity, path.position, x)
-    laws = [*(shape for _, shape in fitted(MOTOR, usual)), *corrections(usual)]
-    return start, (
-        *(_term(shape, force, x, middle) for shape in laws),
-        _Column(
-            "asymmetric_damping",
-            "damping that differs between the directions",
-            unit("damping"),
-            lambda p: np.abs(p.velocity),
-        ),
-        _Column(
-            "friction_root",
-            "friction that grows with the root of the velocity",
-            f"{force} ({x}/s)^-1/2",
-            lambda p: np.sign(p.velocity) * np.sqrt(np.abs(p.velocity)),
-        ),
-        _Column("spring", "spring", unit("stiffness"), lambda p: p.position - middle),
-        _Column(
-            "friction_slope",
-            "friction that changes along the way",
-            unit("stiffness"),
-            lambda p: (p.position - middle) * np.sign(p.velocity),
-        ),
-        _Column("jerk", "lag between force and motion", f"{force} s^3/{x}", lambda p: p.jerk),
-    )
-
-
-def _term(shape: Shape, force: str, x: str, middle: float) -> _Column:
-    """A law's force, as the command must make up for it."""
-
-    def column(path: SmoothMotion) -> Floats:
-        return -shape.force(path.velocity if shape.over == VELOCITY else path.position - middle)
-
-    title = shape.title.replace(" {where}", "")
-    return _Column(shape.name, title, shape.unit(force, x), column)
-
-
 def _grow(
     columns: dict[str, Floats], chosen: list[str], force: Floats, steps: list[Addition]
 ) -> list[Addition]:
@@ -280,7 +184,8 @@ def _says_more(columns: dict[str, Floats], chosen: list[str], name: str) -> bool
     scale = np.linalg.norm(design, axis=0) + np.finfo(float).tiny
     column = columns[name]
     left = column - design / scale @ np.linalg.lstsq(design / scale, column, rcond=None)[0]
-    return bool(left @ left > _ITS_OWN * (column @ column))
+    its_own = 1e-3  # of its power, or it is no new term: a tone's spring is a mass
+    return bool(left @ left > its_own * (column @ column))
 
 
 def _held_out(columns: dict[str, Floats], names: list[str], force: Floats) -> tuple[float, Floats]:
