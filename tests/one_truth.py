@@ -13,6 +13,7 @@ import pytest
 
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.jobs.index import row_of
 from bayeshaptic.quantities import estimate
 from bayeshaptic.report import write
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, style
@@ -62,6 +63,7 @@ def check_page(result: Any, folder: Path) -> None:
     _doubtful_parameters_are_said_so(result, page, found)
     _effects_are_named_in_words(page)
     _methods_are_those_of_this_run(result, page)
+    _the_index_says_no_more(found, folder)
     _every_file_is_there(folder)
     _figures_say_what_the_tables_say(result, page)
 
@@ -190,6 +192,17 @@ def _methods_are_those_of_this_run(result: Any, page: str) -> None:
     assert ("excited lines" in said) == (periodic and analysis.in_loop is None)
     looked = analysis.sampled and not analysis.in_loop
     assert ("tests for effects" in said) == (result.closed is not None and looked)
+
+
+def _the_index_says_no_more(found: Any, folder: Path) -> None:
+    said = found["recommendation"]
+    safe = row_of("x", folder, said["status"], None)["safe"]
+    if said["stiffness"] is None or safe is None:
+        assert said["status"] != "untrusted" or safe is None
+    elif said["risk"] is None:
+        assert safe == said["stiffness"]
+    else:
+        assert safe == found["critical_stiffness"]["safe"]["0.01"]
 
 
 def _every_file_is_there(folder: Path) -> None:

@@ -55,11 +55,22 @@ def row_of(name: str, folder: Path, status: str | None, error: str | None) -> di
         "device": recording["device"],
         "user": recording["user"],
         "configuration": recording["configuration"],
-        "safe": None if status == "untrusted" else limit["safe"].get("0.01"),
+        "safe": _safe(summary),
         **{name: limit[name] for name in ("q05", "q50", "q95", "unit")},
         "frequency_hz": limit["frequency_hz"]["q50"],
         "verdict": (summary["diagnosis"] or {}).get("verdict"),
     }
+
+
+def _safe(summary: Mapping[str, Any]) -> float | None:
+    """The stiffness at 1 % risk; what the measurement asks for where that is lower, or nothing."""
+    said = summary["recommendation"]
+    if said["status"] == "untrusted":
+        return None
+    if said["stiffness"] is not None and said["risk"] is None:
+        return float(said["stiffness"])
+    stiffness: float | None = summary["critical_stiffness"]["safe"].get("0.01")
+    return stiffness
 
 
 def _of_study(folder: Path) -> dict[str, Any]:
@@ -83,11 +94,18 @@ def write_index(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         **frame(),
         title=folder.name,
         failed=len(failed),
-        columns={key: title for key, title in COLUMNS.items() if key != "unit"},
+        columns={key: COLUMNS[key] for key in _shown_columns(rows)},
         numbers=_NUMBERS,
         rows=[_shown(row, folder) for row in rows],
     )
     write_whole(folder / "index.html", finished(page))
+
+
+def _shown_columns(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Of the page: what is to be known first comes first, and what no row has stays out."""
+    first = ("name", "status", "safe")
+    order = (*first, *(key for key in COLUMNS if key not in first and key != "unit"))
+    return tuple(key for key in order if any(row[key] is not None for row in rows))
 
 
 def _table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
