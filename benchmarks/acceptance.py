@@ -1,6 +1,6 @@
 """What the rules of acceptance cost and find: each of them left out, and what then changes.
 
-    python acceptance.py --clean 24 --each 1 --workers 2
+    python acceptance.py --clean 24 --each 2 --seconds 20
 
 Of every recording all candidates of all classes are fitted, whether or not a test raises them: so a
 clean recording shows what acceptance alone would let through.  Then the first round is decided with
