@@ -1,9 +1,10 @@
-"""Nothing heavy is imported before it is needed; that imports run down the layers is linted."""
+"""Nothing heavy is imported before it is needed; files and folders stay small."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -68,3 +69,13 @@ for module in pkgutil.walk_packages(part.__path__, part.__name__ + "."):
     importlib.import_module(module.name)
 """
     assert not late & modules_after(code)
+
+
+def test_files_and_folders_stay_small() -> None:
+    """House rule: some 300 lines a file, and about fifteen modules a folder."""
+    lines = {
+        path: len(path.read_text(encoding="utf-8").splitlines()) for path in PACKAGE.rglob("*.py")
+    }
+    assert {str(path): count for path, count in lines.items() if count > 310} == {}
+    folders = Counter(path.parent for path in lines if path.name != "__init__.py")
+    assert {str(folder): count for folder, count in folders.items() if count > 16} == {}
