@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,6 +210,6 @@ def held_out_rms(fit: Fit, part: tuple[int, ...] = REPORT) -> float:
     return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
-def describe_gain(gain: float, extra: Any = "") -> str:
+def describe_gain(gain: float) -> str:
     """The held-out gain in words."""
-    return f"raises the log likelihood of windows it was not fitted to by {gain:.0f}{extra}"
+    return f"raises the log likelihood of windows it was not fitted to by {gain:.0f}"

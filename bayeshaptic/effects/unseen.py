@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,20 +49,8 @@ def alone(strength: Floats, shapes: Floats) -> Floats:
     return strength[:, None]
 
 
-def combined(*axes: ArrayLike, weights: Any = None) -> tuple[Floats, Floats]:
-    """Every combination of values on the axes, (S, axes), with probabilities (S,).
-
-    Parameters
-    ----------
-    *axes : array_like
-    weights : sequence of array_like, optional
-        Of each axis's values; by default all alike.
-    """
-    given = [np.ones(np.shape(axis)) for axis in axes] if weights is None else weights
+def combined(*axes: ArrayLike) -> tuple[Floats, Floats]:
+    """Every combination of values on the axes, (S, axes), with probabilities (S,), all alike."""
     values = [np.asarray(axis, float) for axis in axes]
     table = np.stack([a.ravel() for a in np.meshgrid(*values, indexing="ij")], axis=1)
-    share = np.ones(1)
-    for one in given:
-        one = np.asarray(one, float)
-        share = np.outer(share, one / one.sum()).ravel()
-    return table, share
+    return table, np.full(len(table), math.prod(1 / len(axis) for axis in values))

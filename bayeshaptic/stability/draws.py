@@ -15,9 +15,9 @@ MOST_DRAWS = 150_000
 MOST_SEARCHED = 30_000  # of a loop without a finite set of poles, whose search is slow
 
 
-def draws_of(posterior: Any, max_draws: int | None = None) -> Floats:
+def draws_of(posterior: Any) -> Floats:
     """The draws of a posterior in the order of the samples of its `critical_stiffness`."""
-    return vectors_of(posterior, None, max_draws)[0]
+    return vectors_of(posterior, None, None)[0]
 
 
 def most_draws(model: Model, vector: Floats) -> int:

@@ -29,12 +29,11 @@ def thinned(draws: NDArray[Any], count: int = DRAWS) -> NDArray[Any]:
     return draws[:: max(len(draws) // count, 1)][:count]
 
 
-def response_band(analysis: Analysis, frequency_hz: NDArray[Any] | None = None) -> ResponseBand:
-    """The posterior's response on `frequency_hz`, by default a fine grid over the band."""
-    etfe = analysis.etfe
-    if frequency_hz is None:
-        ends = etfe.frequency_hz[0], etfe.frequency_hz[-1]
-        frequency_hz = np.unique(np.r_[np.geomspace(*ends, POINTS), etfe.frequency_hz])
+def response_band(analysis: Analysis) -> ResponseBand:
+    """The posterior's response on a fine grid over the band."""
+    measured_hz = analysis.etfe.frequency_hz
+    grid = np.geomspace(measured_hz[0], measured_hz[-1], POINTS)
+    frequency_hz = np.unique(np.r_[grid, measured_hz])
     response = analysis.model.response(thinned(analysis.posterior.draws), frequency_hz)
     return ResponseBand(
         frequency_hz,
