@@ -24,6 +24,7 @@ LIMIT = {"unit": "N/m", "q05": 900.0, "q50": 1000.0, "q95": 1100.0, "safe": {"0.
 SUMMARY = {
     "recording": {"device": "d", "user": "<Ada>", "configuration": None},
     "critical_stiffness": LIMIT | {"frequency_hz": {"q50": 50.0}},
+    "recommendation": {"status": "safe", "stiffness": 850.0, "risk": 0.01},
     "diagnosis": {"verdict": "consistent"},
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.saved.archive import model_from_dict, model_to_dict
 from bayeshaptic.models.chains import _as_chain
+from bayeshaptic.models.structures import chain
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.rig import Bench, simulate
 
@@ -51,6 +53,11 @@ def test_a_chain_of_the_bench_is_found():
     again = model_from_dict(model_to_dict(fit.model))
     assert again.names == fit.model.names
     assert np.allclose(again.response(fit.theta, [80.0]), fit.model.response(fit.theta, [80.0]))
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_workers_hand_a_chain_back(held):
+    assert pickle.loads(pickle.dumps(chain(3, held))) == chain(3, held)
 
 
 def test_modes_name_the_base_model():

@@ -104,6 +104,21 @@ GRASPED = Structure("grasped", FREE.names + HAND, _grasped, "held by a user, equ
 STRUCTURES = {structure.name: structure for structure in (RIGID, FREE, GRASPED)}
 
 
+@dataclass(frozen=True)
+class _InARow:
+    """Two masses and the `further` ones, each on the one before; workers hand it back, equal."""
+
+    further: tuple[int, ...]
+    held: bool
+
+    def __call__(self, v: Values) -> Mechanism:
+        mechanism, still = _free(v), np.zeros_like(v["m1"])
+        for n in self.further:
+            mechanism = mechanism.with_mass(v[f"m{n}"], n - 2, v[f"c{n}"], v[f"k{n}"])
+            mechanism = mechanism.with_link(Link(n - 1, None, v[f"b{n}"], still))
+        return _in_a_hand(mechanism, v) if self.held else mechanism
+
+
 @cache
 def chain(modes: int, held: bool = False) -> Structure:
     """A device with so many vibration modes, masses in a row; a hand holds the last, or nobody.
@@ -124,17 +139,10 @@ def chain(modes: int, held: bool = False) -> Structure:
     further = tuple(range(3, modes + 2))
     names = tuple(f"{part}{number}" for number in further for part in "mckb")
 
-    def build(v: Values) -> Mechanism:
-        mechanism = _free(v)
-        for n in further:
-            mechanism = mechanism.with_mass(v[f"m{n}"], n - 2, v[f"c{n}"], v[f"k{n}"])
-            mechanism = mechanism.with_link(Link(n - 1, None, v[f"b{n}"], np.zeros_like(v["m1"])))
-        return _in_a_hand(mechanism, v) if held else mechanism
-
     who = "a user holds the last" if held else "nobody holds it"
     title = f"{modes + 1} masses in a row, {who}"
     kind, hand = (_HELD_CHAIN, HAND) if held else (_CHAIN, ())
-    return Structure(f"{kind}{modes}", FREE.names + names + hand, build, title)
+    return Structure(f"{kind}{modes}", FREE.names + names + hand, _InARow(further, held), title)
 
 
 def structure_named(name: str) -> Structure:
