@@ -4,7 +4,8 @@ A third of the recordings have no effect; each of the others has one of `EFFECTS
 strength is log-uniform from a thirtieth of what the tests see to three times that; where a mode
 sits, and how it is damped, is log-uniform in the band and from 1 % to 10 %.  What the tests see is
 taken from a clean recording of the same device and length: where a strength takes 18 of the log
-likelihood of the windows and of the tests for forces, after everything else has given way.
+likelihood of the windows and of the tests for forces, after everything else has given way.  Where
+pairs are asked for, every recording has two effects, each with a strength of its own.
 """
 
 from __future__ import annotations
@@ -45,7 +46,10 @@ _GRIP = 0.5  # log change of a grip that the tests see
 
 @dataclass(frozen=True)
 class Job:
-    """One recording; `file` is whether the analysis has the device's file."""
+    """One recording.
+
+    `file` is whether the analysis has the device's file, `also` a second effect and its strength.
+    """
 
     case: str
     seconds: float
@@ -53,21 +57,28 @@ class Job:
     share: float
     seed: int
     file: bool
+    also: tuple[str, float] | None = None
 
 
-def jobs(count: int, seed: int) -> list[Job]:
+def jobs(count: int, seed: int, pairs: bool = False) -> list[Job]:
     """`count` recordings, the devices, lengths, and device file or none in turn."""
     rng = np.random.default_rng([seed, 15])
     out = []
     for number in range(count):
         case = list(CASES)[number % len(CASES)]
         drawn = str(rng.choice(possible(case)))
-        effect = NONE if rng.uniform() < 1 / 3 else drawn
-        share = float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
+        effect = NONE if rng.uniform() < 1 / 3 and not pairs else drawn
+        share = _share(rng)
         turn = number // len(CASES)
         length, file = LENGTHS_S[turn % 2], turn // 2 % 2 == 0
-        out.append(Job(case, length, effect, share, 1000 * seed + number, file))
+        others = [name for name in possible(case) if name != effect]
+        also = (str(rng.choice(others)), _share(rng)) if pairs else None
+        out.append(Job(case, length, effect, share, 1000 * seed + number, file, also))
     return out
+
+
+def _share(rng: np.random.Generator) -> float:
+    return float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
 
 
 def possible(case: str) -> list[str]:
@@ -122,15 +133,26 @@ def _by_frequency(suspect: Suspect, seen: np.ndarray) -> Callable[[float], float
 
 
 def bench_of(job: Job, seen: dict[str, Callable[[float], float]]) -> Bench:
-    """The bench with the job's effect."""
+    """The bench with the job's effects."""
     bench = clean_bench(job.case)
-    if job.effect == NONE:
-        return bench
     rng = np.random.default_rng([job.seed, 3])
+    for effect, share in ((job.effect, job.share), *([job.also] if job.also else [])):
+        if effect != NONE:
+            bench = _with_effect(bench, effect, share, seen[effect], rng)
+    return bench
+
+
+def _with_effect(
+    bench: Bench,
+    effect: str,
+    share: float,
+    seen: Callable[[float], float],
+    rng: np.random.Generator,
+) -> Bench:
     low, high = bench.band_hz
     frequency = float(np.exp(rng.uniform(np.log(1.5 * low), np.log(high / 1.5))))
     damping = float(np.exp(rng.uniform(np.log(0.01), np.log(0.1))))
-    strength = job.share * seen[job.effect](frequency)
+    strength = share * seen(frequency)
     scales = bench.scales()
     mode = {"frequency_hz": frequency, "damping_ratio": damping}
     kinds = {
@@ -151,4 +173,4 @@ def bench_of(job: Job, seen: dict[str, Callable[[float], float]]) -> Bench:
         "hardening_connection": {"stiffness": strength / max(scales.stretch, 1e-30) ** 3},
         "grip_drift": {"ratio": float(np.exp(strength))},
     }
-    return bench.with_effect(job.effect, **kinds[job.effect])
+    return bench.with_effect(effect, **kinds[effect])

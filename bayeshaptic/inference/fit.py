@@ -17,7 +17,7 @@ from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.quantities import quantity, scale
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.shown import Shown, data_frame, listed
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Complexes, Floats
 
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
@@ -143,16 +143,20 @@ def search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
 
 
 def weighted_residuals(likelihood: Likelihood, here: Coordinates) -> Callable[[Floats], Floats]:
-    """Real residuals of unit variance, as a function of coordinates: (B, P) to (B, N).
+    """Real residuals of unit variance, as a function of coordinates: (B, P) to (B, N)."""
+
+    def residuals(phi: Floats) -> Floats:
+        return real_parts(likelihood.normalised(here.natural(phi)))
+
+    return residuals
+
+
+def real_parts(normalised: Complexes) -> Floats:
+    """Real residuals of unit variance, (B, N), of normalised deviations.
 
     A window after the other, of each number the real part and then the imaginary one.
     """
-
-    def residuals(phi: Floats) -> Floats:
-        left = likelihood.normalised(here.natural(phi))
-        return np.sqrt(2) * left.view(float).reshape(len(phi), -1)
-
-    return residuals
+    return np.sqrt(2) * normalised.view(float).reshape(len(normalised), -1)
 
 
 def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) -> Fit:

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.coordinates import Coordinates, coordinates, sampling_coordinates
-from bayeshaptic.inference.fit import weighted_residuals
+from bayeshaptic.inference.coordinates import Coordinates, sampling_coordinates
+from bayeshaptic.inference.fit import real_parts, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model, NearZero
@@ -85,9 +85,9 @@ class Around:
 
         With the parameters `moved`, (C, P), what the slope does not account for.
         """
-        residuals = weighted_residuals(Likelihood(model, self.windows), coordinates(model))
         with np.errstate(all="ignore"):
-            found = residuals(coordinates(model).coordinate(vectors)) - self.left
+            left = Likelihood(model, self.windows).normalised(vectors)
+            found = real_parts(left) - self.left
         if moved is not None:
             found -= moved @ self.slope.T
         impossible = 1e6
@@ -121,6 +121,11 @@ class Around:
         low = np.where(self.here.log, self.centre - np.log(most), np.maximum(far[0], self.here.low))
         high = np.where(self.here.log, self.centre + np.log(most), far[1])
         return np.clip(there, np.minimum(low, self.centre), high) - self.centre
+
+    def close(self, one: Floats, other: Floats) -> bool:
+        """Whether the residuals hardly tell the moves of all cases, (C, P), from others."""
+        apart = np.sum(((one - other) @ self.slope.T) ** 2, axis=1)
+        return bool(np.all(apart < 1e-3))
 
     def overlap(self, one: Floats, other: Floats) -> Floats:
         """What two effects at once take off the sum of their log evidences, shape (A, B)."""

@@ -147,7 +147,9 @@ def _followed(suspect: Suspect, known: Around, own: Floats) -> tuple[Floats, Flo
     for _ in range(_STEPS if len(own) <= _FEW else _STEPS_EACH):
         vectors = suspect.vectors(known.natural(known.centre + moved), own)
         changes = known.changes(suspect.model, vectors, moved)
-        moved = known.moved(changes)
+        before, moved = moved, known.moved(changes)
+        if known.close(moved, before):
+            break
     return moved, changes
 
 
