@@ -26,8 +26,6 @@ EXAMPLES = """\
   bayeshaptic inspect bench.mat
   bayeshaptic inspect bench.mat --png bench.png --write study.toml"""
 
-_MOST_COLUMNS = 40
-_WIDTH = 32
 _BARS = "▁▂▃▄▅▆▇█"
 
 
@@ -67,7 +65,8 @@ def lines(found: Overview) -> list[str]:
     from bayeshaptic.recordings.overview import doubts
 
     roles = {name: role for role, name in found.roles.items()}
-    shown = found.columns[:_MOST_COLUMNS]
+    most_columns = 40
+    shown = found.columns[:most_columns]
     width = max(len("name"), *(len(printable(one.name)) for one in shown))
     table = [f"{'name':{width}}  samples  {'low to high':^24}  resolution"]
     for one in shown:
@@ -194,7 +193,8 @@ def _sparkline(values: Any) -> str:
 
     if values.dtype.kind not in "iufb" or not np.isfinite(values).any():
         return "text" if values.dtype.kind not in "iufb" else ""
-    at = np.linspace(0, len(values) - 1, min(_WIDTH, len(values))).astype(int)
+    width = 32
+    at = np.linspace(0, len(values) - 1, min(width, len(values))).astype(int)
     some = np.nan_to_num(np.asarray(values, dtype=float)[at])
     low, high = some.min(), some.max()
     level = (some - low) / (high - low or 1.0)

@@ -17,7 +17,6 @@ from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
 from bayeshaptic.inference.fit import MISFIT
 
-_LIKE_NO_HAND = 11.1  # chi-square of five numbers: one hand in twenty
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
 
 
@@ -66,7 +65,8 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
     if choice is None:
         return ()
     chosen = choice.candidates[begun.fit.model.name]
-    if begun.fit.reduced_chi_square < MISFIT and chosen.from_a_hand < _LIKE_NO_HAND:
+    like_no_hand = 11.1  # chi-square of five numbers: one hand in twenty
+    if begun.fit.reduced_chi_square < MISFIT and chosen.from_a_hand < like_no_hand:
         return ()
     others = {name: one for name, one in choice.candidates.items() if name != "rigid"}
     if begun.fit.model.name == "rigid":

@@ -24,11 +24,9 @@ from bayeshaptic.shown import Shown
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
 
-_MATERIAL = 2.0  # a richer model that misfits too must cut the squared residual by this factor
 # Information criteria nearer than this, odds of twenty to one, leave open which model it is.
 UNDECIDED = 6.0
 _NOBODY = ("rigid", "free", "chain-2")
-_STEPS, _SETTLED = 40, 1e-3  # of the least sum of misfit and distance from a hand
 _WORDS = {
     "rigid": "one rigid mass",
     "free": "two masses and a transmission, held by nobody",
@@ -157,10 +155,11 @@ def _best(candidates: Mapping[str, ScoredFit], noise: float) -> str:
     """
     ordered = sorted(candidates, key=lambda name: candidates[name].fit.model.size)
     best = ordered[0]
+    material = 2.0  # a richer model that misfits too must cut the squared residual by this factor
     for name in ordered[1:]:
         better = candidates[name].score < candidates[best].score
         gain = candidates[best].fit.reduced_chi_square / candidates[name].fit.reduced_chi_square
-        if better and (noise < MISFIT or gain > _MATERIAL):
+        if better and (noise < MISFIT or gain > material):
             best = name
     return best
 
@@ -212,7 +211,8 @@ def deviance(fit: Fit, noise: float) -> tuple[float, float]:
         return np.concatenate([misfit(phi) / np.sqrt(noise), hand(phi)], axis=1)
 
     start = here.coordinate(fit.theta[None])
-    phi, half = minimise(both, start, low, high, _STEPS, _SETTLED)
+    steps, settled = 40, 1e-3  # of the least sum of misfit and distance from a hand
+    phi, half = minimise(both, start, low, high, steps, settled)
     return 2 * float(half[0]), float(np.sum(hand(phi) ** 2))
 
 

@@ -30,11 +30,9 @@ from bayeshaptic.types import Floats
 # reach the deepest need more than 15 steps: with 24 starts of 15 steps, one fit in 20 of a held
 # Phantom without a device file ended in another valley.
 _KEPT_STARTS, _STEPS_TO_A_VALLEY = 48, 40
-_REWINDOWINGS = 2
 # Sets of starting points: where a model misfits its valleys are many, and one set of a held LHIfAM
 # with a second mode ended in a worse one for one to two seeds in six.
 _SETS = 4
-_REFINED = 6  # of them converged to the end
 # Relative steps of cost within a valley: from 0.01 to 0.04 there are as many of them in each of 12
 # simulated recordings, most often two or more beside the deepest.
 _ONE_VALLEY = 0.02
@@ -90,7 +88,8 @@ def _fit(model: Model, etfe: Etfe, start: Floats) -> Fit:
     """The best fit from one set of starting points, shape (P,) or (S, P)."""
     found = refine(model, compress(etfe), start)
     theta = found.theta
-    for _ in range(_REWINDOWINGS):
+    rewindowings = 2
+    for _ in range(rewindowings):
         windows = compress(etfe, partial(model.response, theta))
         theta = polish(model, windows, theta)
     fit = summarise(model, windows, theta, found.agreeing)
@@ -145,7 +144,8 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
 
     phi, cost = _valleys(residuals, phi, low, high)
     elsewhere = here.natural(_other_valleys(phi, cost))
-    phi = phi[np.argsort(cost + penalty(phi))[:_REFINED]]
+    refined = 6  # of them converged to the end
+    phi = phi[np.argsort(cost + penalty(phi))[:refined]]
     phi, cost = minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
     best = np.argmin(cost + penalty(phi))
     agreeing = int(np.sum(cost < cost[best] + 0.5))

@@ -33,8 +33,6 @@ _UNITS = {
 }
 # Behind these a signal is not what was commanded, or not a position.
 _OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$"
-_EVEN = 0.25  # of the period: what varies by more is time only by its name
-_MOST_ROWS = 500_000  # that are looked at
 
 
 @dataclass(frozen=True)
@@ -110,13 +108,15 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
     unit = name_and_unit(name)[1]
     if values.dtype.kind not in "iufb":
         return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
-    signal = np.asarray(values[:_MOST_ROWS], dtype=float)
+    most_rows = 500_000  # that are looked at
+    signal = np.asarray(values[:most_rows], dtype=float)
     signal = signal[np.isfinite(signal)]
     if len(signal) < 3:
         return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
     steps = np.diff(signal)
     step = float(np.median(steps))
-    advances = (steps > 0) if _says(name, "time") else np.abs(steps - step) < _EVEN * step
+    even = 0.25  # of the period: what varies by more is time only by its name
+    advances = (steps > 0) if _says(name, "time") else np.abs(steps - step) < even * step
     is_time = step > 0 and np.mean(advances) > 0.99
     spread = float(np.std(signal))
     return ColumnFacts(

@@ -14,7 +14,6 @@ _MASSES = {
     ("N", "m"): (3e-3, 0.5, 500.0, "kg"),
     ("Nm", "rad"): (1e-7, 1e-3, 10.0, "kg m^2"),
 }
-_LEVELS = 20  # of a force, which may be whole newtons
 
 
 def mixed_units(recording: Recording) -> list[Notice]:
@@ -35,7 +34,8 @@ def whole_numbers(recording: Recording) -> list[Notice]:
     A force of few levels may be whole: a relay's, a step's.
     """
     notices = []
-    if _is_whole(recording.force) and len(np.unique(recording.force)) > _LEVELS:
+    levels = 20  # of a force, which may be whole newtons
+    if _is_whole(recording.force) and len(np.unique(recording.force)) > levels:
         text = (
             f"The forces are whole numbers, from {recording.force.min():g} to "
             f"{recording.force.max():g} {recording.force_unit}: are they counts of a converter? "

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
 
 _DELAY = "delay_s"
-_WORTH = 1.1  # times the posterior's width, from which an interval was widened
 _WIDER = 3.0  # times the model's interval, from which it is worth a word why
 
 
@@ -210,7 +209,8 @@ def widened(result: Result) -> str:
     if analysis.widened is None:
         return ""
     ratio = analysis.widened.draws.std(axis=0) / analysis.posterior.draws.std(axis=0)
-    names = [n for n, more in zip(analysis.model.names, ratio, strict=True) if more > _WORTH]
+    worth = 1.1  # times the posterior's width, from which an interval was widened
+    names = [n for n, more in zip(analysis.model.names, ratio, strict=True) if more > worth]
     if not names:
         return ""
     return (

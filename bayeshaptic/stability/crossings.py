@@ -15,8 +15,6 @@ from bayeshaptic.stability.responses.linked import linked_response
 from bayeshaptic.stability.responses.response import PoleResponse, Response, pole_response
 from bayeshaptic.types import Floats, Ints
 
-_TOLERANCE = 1e-13  # of a crossing's angle
-
 
 @dataclass(frozen=True)
 class Crossings:
@@ -149,7 +147,8 @@ def plain_search(response: Response) -> tuple[Ints, Floats, Floats]:
     def value(theta: Floats, row: Ints) -> Floats:
         return _sine(response.at(row, theta[:, None])[:, 0])
 
-    found = elementwise.find_root(value, (low, high), args=(row,), tolerances={"xrtol": _TOLERANCE})
+    tolerance = 1e-13  # of a crossing's angle
+    found = elementwise.find_root(value, (low, high), args=(row,), tolerances={"xrtol": tolerance})
     theta = np.asarray(found.x)
     return row, theta, response.at(row, theta[:, None])[:, 0].real
 

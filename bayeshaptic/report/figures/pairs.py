@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 SHOWN = 6
 POINTS = 800
 LEVELS = (0.9, 0.5)
-_MOST_DRAWS = 8000
 
 
 def correlation(draws: NDArray[Any]) -> NDArray[Any]:
@@ -74,7 +73,8 @@ def draw(result: Result) -> Figure:
 
 def _some(draws: NDArray[Any]) -> NDArray[Any]:
     """As many draws as the contours need."""
-    return draws[:: max(len(draws) // _MOST_DRAWS, 1)]
+    most_draws = 8000
+    return draws[:: max(len(draws) // most_draws, 1)]
 
 
 def _triangle(figure: Figure, size: int) -> dict[tuple[int, int], Axes]:

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
 _DB = 20 / np.log(10)
 _NAMED = 0.05  # shares that a sentence names
-_OVERLAP = 1.1
-_MOST = 4
-_KNOWN_DB = 0.05  # a limit known to this sd needs no further recording
 _HARDLY = 0.9  # of the width: a further recording that leaves more is not worth making
 _FLAT = 0.02  # relative change that is none
 
@@ -80,7 +77,8 @@ def _narrowed(shares: VarianceShares, one: Experiment) -> float:
 
 
 def _lead(shares: VarianceShares) -> str:
-    named = [share for share in shares.shares if share.share >= _NAMED][:_MOST]
+    most = 4
+    named = [share for share in shares.shares if share.share >= _NAMED][:most]
     parts = [f"{_name(share)} ({percent(round(share.share, 2))})" for share in named]
     if shares.beyond >= _NAMED:
         parts.append(f"effects and what is unexplained ({percent(round(shares.beyond, 2))})")
@@ -109,7 +107,8 @@ def _overlap(shares: VarianceShares) -> str:
         "together."
     )
     together = shares.together
-    if together > _OVERLAP:
+    overlap = 1.1
+    if together > overlap:
         return (
             f"{text} The shares add up to {percent(together)}, because parameters that correlate "
             "less than that share some of it, too."
@@ -188,7 +187,8 @@ def _next(shares: VarianceShares, experiments: Sequence[Experiment]) -> str:
         f"Of the further recordings below, each as long as this one, {best.title} would narrow "
         f"K_CR most: from ± {pure(spread, 2)} dB to ± {after} dB."
     )
-    if spread < _KNOWN_DB:
+    known_db = 0.05  # a limit known to this sd needs no further recording
+    if spread < known_db:
         text += (
             " But the limit is already known better than a wall needs: look for what the model "
             "lacks rather than for more data."

@@ -26,12 +26,8 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
     from bayeshaptic.diagnosis.state import Accepted
 
-_SAME = 0.005  # relative change of an error that is not worth a word
-_SAME_DB = 0.05
-_LESS = 0.9  # of the noise, to be worth a word
 _OVER = "_last_over_first"
 _WORST = "worst_part"  # the evidence says which
-_MOST_NUMBERS = 3
 # Titles with one of these words take no article.
 _UNCOUNTABLE = {"backlash", "damping", "delay", "drag", "friction", "quantisation", "stiffness"}
 _PLURAL = {"rows", "samples", "saturation", "steps"}
@@ -187,12 +183,14 @@ def _numbers(closed: Closed, effect: Accepted) -> str:
             f"{parameter_words(name)} {plus_minus(value.mean, value.sd, value.unit)}"
             for name, value in effect.estimates.items()
         ]
-    return f" ({', '.join(shown[:_MOST_NUMBERS])})" if shown else ""
+    most_numbers = 3
+    return f" ({', '.join(shown[:most_numbers])})" if shown else ""
 
 
 def _error_change(closed: Closed) -> str:
     before, after = (e["held_out_weighted_rms"] for e in (closed.before, closed.after))
-    if abs(after / before - 1) < _SAME:
+    same = 0.005  # relative change of an error that is not worth a word
+    if abs(after / before - 1) < same:
         return f"left the held-out error at {_times(after)} times the noise"
     verb = "cut" if after < before else "raised"
     return f"{verb} the held-out error from {_times(before)} to {_times(after)} times the noise"
@@ -207,7 +205,8 @@ def _noise_change(closed: Closed) -> str:
         return ""
     ratio = new.likelihood.noise_variance / old.likelihood.noise_variance
     share = float(np.sqrt(np.median(ratio)))
-    if share >= _LESS:
+    less = 0.9  # of the noise, to be worth a word
+    if share >= less:
         return ""
     return f", and cut the noise itself to {pure(share, 2)} of what it seemed"
 
@@ -226,7 +225,8 @@ def _limit_change(closed: Closed) -> str:
     if not (old > 0 and new > 0 and math.isfinite(old) and math.isfinite(new)):
         return f"K_CR went from {quantity(old, unit)} to {quantity(new, unit)}"
     step = decibel(new) - decibel(old)
-    if abs(step) < _SAME_DB:
+    same_db = 0.05
+    if abs(step) < same_db:
         return f"K_CR stayed at {estimate(new, after['q05'], after['q95'], unit)}"
     row = scale((old, new), unit)
     gap = abs(new - old) / 20

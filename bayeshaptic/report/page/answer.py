@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.report.numbers.rows import Rows
 
-_WORTH_NAMING = 0.001
 # Of benchmarks/README.md: how often 90 % intervals of K_CR held the truth of simulated recordings,
 # and of how many; a test compares them.
 FARED = {
@@ -72,7 +71,8 @@ def _interval(limit: Any) -> str:
 
 
 def _binding(analysis: Analysis) -> str:
-    likely = [c for c in analysis.limit.crossings if c.probability >= _WORTH_NAMING]
+    worth_naming = 0.001
+    likely = [c for c in analysis.limit.crossings if c.probability >= worth_naming]
     if not likely:
         return "nothing"
     alone = len(likely) == 1

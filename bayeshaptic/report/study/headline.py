@@ -24,7 +24,6 @@ HOLDERS = {
     NEW_PERSON: "a person not yet seen holds it",
     CONFIGURATION: "somebody holds it in a configuration that was not recorded",
 }
-_WORTH_NAMING = 0.005
 
 
 def study_headline(study: StudyAnalysis) -> Headline:
@@ -111,7 +110,8 @@ def what_binds(study: StudyAnalysis) -> str:
         who = _holder(found)
         shares[who] = shares.get(who, 0.0) + found.probability
     order = sorted(shares.items(), key=lambda item: -item[1])
-    likely = [f"{who} ({percent(share)})" for who, share in order if share >= _WORTH_NAMING]
+    worth_naming = 0.005
+    likely = [f"{who} ({percent(share)})" for who, share in order if share >= worth_naming]
     if not likely:
         return "Nothing limits it."
     text = f"What sets the limit: {', or '.join(likely)}."

@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
     from bayeshaptic.study.analysis import StudyAnalysis
 
-_HARDLY_DB = 0.15  # a spread of K_CR between people that nobody needs to care about
-_LITTLE_DB = 0.5
-_AS_BAD_DB = 1.0
-_BETWEEN_DB = 0.1  # beyond the ends of a range, worth a word
 _CONFIGURATION = ", configuration "
 Z90 = 3.29  # width of a normal 90 % interval in standard deviations
 
@@ -36,7 +32,8 @@ def hands(study: StudyAnalysis) -> str:
     both = f"the median limit is {alone:.1f} dB without one and {in_hand:.1f} dB held"
     if max(len(free), len(held)) > 1:
         both += ", each in its worst case"
-    if abs(step) < _AS_BAD_DB:
+    as_bad_db = 1.0
+    if abs(step) < as_bad_db:
         return f"A hand makes little difference: {both}."
     if step > 0:
         return (
@@ -55,14 +52,16 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
     spread = spread_db(case)
     middle, low, high = case.limit.quantile([0.5, 0.05, 0.95])
     seen = estimate(middle, low, high, case.limit.unit)
-    if spread < _HARDLY_DB:
+    hardly_db = 0.15  # a spread of K_CR between people that nobody needs to care about
+    if spread < hardly_db:
         first = (
             "People hardly move the critical stiffness of this device: for a person not yet seen"
             f"{where} it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does "
             "not matter for the limit. More people would not narrow it."
         )
     else:
-        size = "a little, " if spread < _LITTLE_DB else ""
+        little_db = 0.5
+        size = "a little, " if spread < little_db else ""
         first = (
             f"People move the critical stiffness of this device {size}by {pure(spread, 2)} dB "
             f"(sd): for a person not yet seen{where} it is {seen}."
@@ -188,6 +187,7 @@ def listed(parts: list[str]) -> str:
 def configurations(study: StudyAnalysis) -> tuple[str, ...]:
     """Where along the coordinate the limit is lowest, free and held."""
     found = []
+    between_db = 0.1  # beyond the ends of a range, worth a word
     for one in study.configurations:
         band = band_of(one)
         who = "Held" if one.held else "With nobody holding it"
@@ -197,7 +197,7 @@ def configurations(study: StudyAnalysis) -> tuple[str, ...]:
             f"{who}, the median limit goes from {first:.1f} dB in configuration "
             f"{pure(band.coordinates[0])} to {last:.1f} dB in {pure(band.coordinates[-1])}"
         )
-        if min(first, last) - low > _BETWEEN_DB or high - max(first, last) > _BETWEEN_DB:
+        if min(first, last) - low > between_db or high - max(first, last) > between_db:
             text += f" (between {low:.1f} and {high:.1f} dB over all of them)"
         sure = float(one.worst_probability.max())
         found.append(

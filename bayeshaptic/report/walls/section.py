@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 FIGURES = ("limits_curve", "limits_kb")
 DRAWS = 2400
-_SLOW_DRAWS = 2000  # of a model without a finite set of poles
 _FRICTION = "friction_force"
 _IN_LOOP = "coulomb"  # the same, as a parameter of the motion under feedback
 
@@ -66,8 +65,9 @@ def table_of(
     `limit` is that of all cases together, where it is known.
     """
     slow = any(case.model.system(case.draws[:1]).dynamic_links for case in cases)
+    slow_draws = 2000  # of a model without a finite set of poles
     return limit_table(
-        cases, dampings, draws=min(draws, _SLOW_DRAWS) if slow else draws, limit=limit
+        cases, dampings, draws=min(draws, slow_draws) if slow else draws, limit=limit
     )
 
 

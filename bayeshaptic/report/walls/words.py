@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 _DASH = "\N{EN DASH}"
 _TOLD = (0.01, 0.05)  # the first of these risks that the draws can state
-_EDGE = 1.1  # a damping that raises the limit by less is not worth a word
 _DAMPING = (
     "Damping B acts on a velocity that the controller makes from the positions it reads. Up to a "
     "point it makes a stiffer wall stable; beyond it the delay of that velocity makes the loop "
@@ -125,7 +124,8 @@ def _gain(part: FilterLimits, width: ZWidth, stiffness: float, table: LimitTable
         if part.kind.cutoff_hz is None
         else f"velocity behind a low-pass at {quantity(part.kind.cutoff_hz, 'Hz')}"
     )
-    if width.stiffness < _EDGE * stiffness:
+    edge = 1.1  # a damping that raises the limit by less is not worth a word
+    if width.stiffness < edge * stiffness:
         return f"{how}, damping gains nothing worth having"
     return (
         f"{how}, up to {quantity(width.stiffness, table.unit)} with "
