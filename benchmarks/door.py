@@ -4,11 +4,11 @@
     python door.py --show LINES...
 
 Open loops and closed ones of random devices (`door_recordings.py`), judged as `check_recording`
-judges them. In pieces: each part appends a line a recording to a file, and `--show` makes the
-tables of all. Of a closed loop, `weight` is what its answers to chance amount to (`Case.weight`):
-where they are less than one sample's worth in all, nothing tells that the force was computed, and
-nothing is biased either. `--replay` shows it: K_CR of each closed loop that was missed, and of an
-open loop with the same force on the same device.
+judges them. In pieces: each part appends a line a recording to a file, and goes on where it
+stopped; `--show` makes the tables of all. Of a closed loop, `weight` is what its answers to chance
+amount to (`Case.weight`): where they are less than one sample's worth in all, nothing tells that
+the force was computed, and nothing is biased either. `--replay` shows it: K_CR of each closed loop
+that was missed, and of an open loop with the same force on the same device.
 """
 
 from __future__ import annotations
@@ -54,9 +54,16 @@ def main() -> None:
 
 
 def made(options: argparse.Namespace) -> Iterable[dict[str, Any]]:
-    """A line for each recording of this part."""
+    """A line for each recording of this part; those that are kept already, as they are."""
+    kept = {}
+    if options.keep and options.keep.exists():
+        lines = map(json.loads, options.keep.open())
+        kept = {(line["closed"], line["seed"]): line for line in lines}
     for make in (open_case, closed_case):
         for seed in range(options.part, options.each, options.of):
+            if (done := kept.get((make is closed_case, seed))) is not None:
+                yield done
+                continue
             case = make(seed)
             line = {
                 "closed": case.closed,
