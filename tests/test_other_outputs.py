@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
+from bayeshaptic.diagnosis.begun import with_delay_of_the_loop
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 
 PERIOD_S, SAMPLES = 1e-3, 4000
@@ -43,7 +45,7 @@ def test_a_continuous_experiment_gives_the_response_of_a_held_command(device, ou
     np.savez(path, **continuous(device))
     recording = bh.read_recording(path, columns=f"time=t,measured_force=u[N],{output}")
     assert (recording.force_unit, recording.position_unit) == ("N", "m")
-    assert "columns" in [notice.topic for notice in recording.notices]
+    assert recording.notices[0].topic == "hold"
     settled = slice(500, 3500)
     force, position = recording.force[settled], recording.position[settled]
     lines = np.exp(-2j * np.pi * np.outer(RATES_HZ, np.arange(3000) * PERIOD_S))
@@ -86,6 +88,38 @@ def test_a_velocity_beside_a_command(device, tmp_path):
     assert np.all(of_the_motor < 1.1 * (rate * PERIOD_S) ** 2 / 12 + 1e-4)
     assert 0.025 < of_the_motor[99] < 0.036  # 3.3 % at 100 Hz, as the recording's notice says
     assert any("3.3 %" in notice.text for notice in recording.notices)
+
+
+@pytest.mark.parametrize("table", [True, False])
+def test_the_delay_of_the_loop_is_put_in_where_it_is_known(device, table, tmp_path):
+    """A hammer and a sensor of the force know nothing of it; the limit depends on it."""
+    model, theta = device
+    if table:
+        s = 2j * np.pi * RATES_HZ
+        response = model.system(theta).continuous_response(s)[0]
+        rows = (RATES_HZ, 20 * np.log10(np.abs(response)), np.angle(response, deg=True))
+        path = tmp_path / "hammer.csv"
+        header = "frequency_hz,receptance_db,phase_deg,sd"
+        columns = np.stack([*rows, 1e-3 * np.abs(response)], axis=1)
+        np.savetxt(path, columns, delimiter=",", header=header, comments="")
+        seen = bh.read_frf(path, period_s=PERIOD_S, kind="translational")
+    else:
+        path = tmp_path / "shaker.npz"
+        np.savez(path, **continuous(device))
+        seen = bh.read_recording(path, columns="time=t,measured_force=u[N],position=x[m]")
+    (warned,) = with_delay_of_the_loop(seen, None, Options())[1]
+    assert "--delay-s" in warned.text
+    late, none = with_delay_of_the_loop(seen, None, Options(delay_s=1.3e-3))
+    assert none == ()
+    if table:
+        found, expected = late.value, model.response(theta, RATES_HZ)
+    else:
+        settled = slice(500, 3500)
+        lines = np.exp(-2j * np.pi * np.outer(RATES_HZ, np.arange(3000) * PERIOD_S))
+        found = (lines @ late.position[settled]) / (lines @ late.force[settled])
+        expected = model.response(theta, RATES_HZ)
+    expected = expected * np.exp(-2j * np.pi * RATES_HZ * 1.3e-3)
+    assert np.max(np.abs(found / expected - 1)) < 6e-3
 
 
 def test_what_cannot_be_told_is_refused(tmp_path):

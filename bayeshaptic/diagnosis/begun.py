@@ -25,6 +25,8 @@ from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.frf_kinds import NO_LOOP
+from bayeshaptic.recordings.signals.other_outputs import with_loop_delay
 from bayeshaptic.recordings.sufficiency import refuse_too_little
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded
@@ -137,12 +139,12 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     model = base_model(model, options)
     clock = Clock()
     device = device_of(options, model)
-    notices: tuple[Notice, ...] = ()
+    measurement, notices = with_delay_of_the_loop(measurement, device, options)
     if isinstance(measurement, Recording):
         with clock.stage("checks"):
             options.report(0.0, "checking the recording")
             whole = unbroken(measurement)
-            notices = told(measurement.feedback, check_recording(whole, device))
+            notices += told(measurement.feedback, check_recording(whole, device))
             if not any(notice.topic == "feedback" for notice in notices):
                 refuse_too_little(whole)
         with clock.stage("frequency response"):
@@ -164,6 +166,29 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
         options.report(0.06, "fitting")
         fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
     return Begun(**{**vars(found), "seconds": clock.seconds}, fit=fit, choice=choice)
+
+
+def with_delay_of_the_loop(
+    measurement: Recording | Etfe, device: Device | None, options: Options
+) -> tuple[Recording | Etfe, tuple[Notice, ...]]:
+    """The measurement as of the loop: what a sensor of the force, or a hammer, saw has no delay.
+
+    Where the delay is known it is put in; otherwise whoever reads the limit is warned.
+    """
+    if not any(notice.topic == NO_LOOP for notice in measurement.notices):
+        return measurement, ()
+    delay_s = options.delay_s
+    if delay_s is None and device is not None:
+        delay_s = device.delay_s
+    if delay_s is None:
+        text = (
+            "The force was measured behind the loop's delay, and the delay is not known: the limit "
+            "is that of a loop without any, and the real one is lower. Give it with --delay-s."
+        )
+        return measurement, (Notice("warning", NO_LOOP, text),)
+    if isinstance(measurement, Recording):
+        return with_loop_delay(measurement, delay_s), ()
+    return measurement.later(delay_s), ()
 
 
 def _response(recording: Recording, band_hz: tuple[float, float] | None, biased: bool) -> Etfe:

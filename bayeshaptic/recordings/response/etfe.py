@@ -104,6 +104,12 @@ class Etfe(Shown):
     def stiffness_unit(self) -> str:
         return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
 
+    def later(self, delay_s: float) -> Etfe:
+        """A table's response with so much more delay in it, in seconds."""
+        assert isinstance(self.spectra, TableSpectra)
+        value = self.value * np.exp(-2j * np.pi * self.frequency_hz * delay_s)
+        return replace(self, value=value, spectra=replace(self.spectra, value=value))
+
     @property
     def gain_db(self) -> NDArray[Any]:
         """20 log10 of the magnitude, dB re position unit over force unit, shape (L,)."""

@@ -13,6 +13,7 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.types import Complexes, Floats
 
 SAMPLED = "gain_db"
+NO_LOOP = "hold"  # topic of what says that a measurement is not of a loop: its delay is not in it
 # Time derivatives of the position in each.
 STRUCTURAL = {"receptance_db": 0, "mobility_db": 1, "accelerance_db": 2}
 PER_TIME = {0: ("",), 1: ("/s",), 2: ("/s^2", "/s2", "/s/s")}
@@ -55,4 +56,4 @@ def told(kind: str) -> Notice:
         f"The table is the {kind.removesuffix('_db')} of a continuous structure: it was turned "
         "into the response of a loop that holds its command for a period."
     )
-    return Notice("note", "hold", text)
+    return Notice("note", NO_LOOP, text)

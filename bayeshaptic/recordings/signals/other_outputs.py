@@ -18,6 +18,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.frf_kinds import NO_LOOP
 from bayeshaptic.types import Floats
 
 MEASURED_FORCE = "measured_force"
@@ -84,6 +85,21 @@ def held_equivalent(force: Floats) -> Floats:
     return np.asarray(command, dtype=np.float64)
 
 
+def with_loop_delay(recording: Recording, delay_s: float) -> Recording:
+    """A recording with a measured force, as of a loop whose command acts `delay_s` later.
+
+    A drive's delay is before the force that its sensor measures: only the loop knows of it, and the
+    limit depends on it.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    later = delay_s / recording.period_s
+    kept = recording.samples - int(np.ceil(later))
+    spline = make_interp_spline(np.arange(recording.samples), recording.force, _ORDER)
+    command = np.asarray(spline(np.arange(kept) + later), dtype=np.float64)
+    return replace(recording, force=command, position=recording.position[:kept])
+
+
 def _told(measured: bool, position: str, period_s: float) -> tuple[Notice, ...]:
     r"""What was done; and what a velocity shows of a held command's steps, which a position hides.
 
@@ -93,12 +109,11 @@ def _told(measured: bool, position: str, period_s: float) -> tuple[Notice, ...]:
     found = []
     if measured:
         text = (
-            "The force is a measured one: it was turned into the command whose hold gives it, so "
-            "that the response is that of a loop without any delay but what is given or fitted. "
+            "The force is a measured one: it was turned into the command whose hold gives it. "
             "Feedback through whatever drives the device (a shaker, an amplifier) is not told "
             "from a controller's."
         )
-        found.append(Notice("note", "columns", text))
+        found.append(Notice("note", NO_LOOP, text))
     if position != "position":
         text = f"The position is the integral of the recorded {position}."
         if not measured:
