@@ -25,8 +25,7 @@ from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
-from bayeshaptic.recordings.response.frf_kinds import NO_LOOP
-from bayeshaptic.recordings.signals.other_outputs import with_loop_delay
+from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
 from bayeshaptic.recordings.sufficiency import refuse_too_little
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded

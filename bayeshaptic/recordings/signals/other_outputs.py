@@ -18,9 +18,9 @@ import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.frf_kinds import NO_LOOP
 from bayeshaptic.types import Floats
 
+NO_LOOP = "hold"  # topic of what says that a measurement is not of a loop: its delay is not in it
 MEASURED_FORCE = "measured_force"
 DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
 _ORDER = 5
