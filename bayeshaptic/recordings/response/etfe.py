@@ -105,7 +105,12 @@ class Etfe(Shown):
         return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
 
     def later(self, delay_s: float) -> Etfe:
-        """A table's response with so much more delay in it, in seconds."""
+        """A table's response with more delay in it.
+
+        Parameters
+        ----------
+        delay_s : float
+        """
         assert isinstance(self.spectra, TableSpectra)
         value = self.value * np.exp(-2j * np.pi * self.frequency_hz * delay_s)
         return replace(self, value=value, spectra=replace(self.spectra, value=value))
