@@ -86,13 +86,13 @@ def closed_case(seed: int) -> Case:
         bench, device, friction = _bench(rng)
         seconds = float(np.exp(rng.uniform(np.log(2.0), np.log(30.0))))
         logged = LOGGED[rng.choice(4, p=(0.4, 0.15, 0.15, 0.3))]
-        controller, size = _controller(kind, reference, bench, seconds, rng, logged)
+        law = controller_of(kind, reference, bench, seconds, rng, logged)
         noise = int(rng.integers(1e9))
-        made = run_loop(bench, controller(), seconds, noise, give_up=_FARTHEST * size)
+        made = run_loop(bench, law.begin(), seconds, noise, give_up=_FARTHEST * law.size)
         whole = len(made.force) >= round(seconds / bench.period_s) - 1
         if whole and np.ptp(made.position) > _FEWEST_COUNTS * bench.encoder_resolution:
             break
-    ideal = run_loop(bench.quiet(), controller(), seconds, noise)
+    ideal = run_loop(bench.quiet(), law.begin(), seconds, noise)
     answer = _answer(made.force, ideal.force)
     recording = written_down(made.force, made.position, bench, logged)
     return Case(True, kind, reference, logged, device, friction, answer, recording, bench)
@@ -182,15 +182,24 @@ def _reference(
     return np.zeros(samples)
 
 
-def _controller(
+@dataclass(frozen=True)
+class Law:
+    """A controller of the bench: how to begin with it, what it follows, and that one's size."""
+
+    begin: Callable[[], Callable[[int, float], float]]
+    wanted: Floats
+    size: float
+
+
+def controller_of(
     kind: str,
     reference: str,
     bench: Bench,
     seconds: float,
     rng: np.random.Generator,
     logged: str,
-) -> tuple[Callable[[], Callable[[int, float], float]], float]:
-    """How to begin with a controller of some hertz of bandwidth, and its reference's size."""
+) -> Law:
+    """A controller of some hertz of bandwidth."""
     period = bench.period_s
     samples = round(seconds / period)
     mass = sum(v for key, v in bench.values.items() if key.startswith("m"))
@@ -225,7 +234,7 @@ def _controller(
 
         return control
 
-    return begin, size
+    return Law(begin, wanted, size)
 
 
 def _answer(force: Floats, ideal: Floats) -> float:

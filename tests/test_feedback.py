@@ -19,9 +19,11 @@ from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.feedback.explain import explain_force
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import force_words, words
 from bayeshaptic.rig import Bench, run_loop
+from bayeshaptic.types import Floats
 
 FRICTION_N = 20.0
 
@@ -101,16 +103,32 @@ def test_feedback_without_a_force_leaves_the_loop_as_it_was(tmp_path: Path) -> N
     assert "What the model lacked" in page and "explained by the motion" not in page
 
 
-def test_two_masses_under_a_controller_are_refused_before_sampling(tmp_path: Path) -> None:
-    bench = Bench.from_device("lhifam", False, "free")
-    goals, last = np.random.default_rng(2).uniform(-1e-3, 1e-3, 20), [0.0]
+def two_masses(wanted: Floats, added: Floats | float = 0.0) -> tuple[Recording, Bench]:
+    """Under a PD controller that follows `wanted`, which is not written down."""
+    bench, last = Bench.from_device("lhifam", False, "free"), [0.0]
+    more = np.broadcast_to(added, wanted.shape)
 
     def controller(k: int, position: float) -> float:
         rate, last[0] = (position - last[0]) * 1000 if k else 0.0, position
-        return float(3000.0 * (goals[k // 150] - position) - 60.0 * rate)
+        return float(3000.0 * (wanted[k] - position) - 60.0 * rate + more[k])
 
-    done = run_loop(bench, controller, 3.0)
-    recording = recording_from_arrays(**done.signals)
+    done = run_loop(bench, controller, len(wanted) * bench.period_s)
+    return recording_from_arrays(**done.signals), bench
+
+
+def test_steps_of_two_masses_under_a_controller_say_their_limit() -> None:
+    goals = np.random.default_rng(2).uniform(-1e-3, 1e-3, 20)
+    recording, bench = two_masses(np.repeat(goals, 150))
+    closed = bh.close_loop(recording, "free", ess=300, hidden=False)
+    assert headline(closed).status == "safe" and closed.verdict == "consistent"
+    low, high = (closed.analysis.limit.quantile(p) for p in (0.005, 0.995))
+    assert low < bench.true_critical_stiffness() < high < 1.5 * low
+
+
+def test_two_masses_under_a_controller_are_refused_before_sampling(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    goals = np.repeat(rng.uniform(-1e-3, 1e-3, 20), 150)
+    recording, _ = two_masses(goals, 0.3 * rng.standard_normal(3000))  # no law is exact
     closed = bh.close_loop(recording, "free", ess=100)
     assert closed.force is None and closed.effects == () and closed.traced.candidates == ()
     head = headline(closed)

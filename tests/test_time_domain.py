@@ -11,7 +11,7 @@ from one_truth import check_page, page_of, words_only
 
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
-from bayeshaptic.inference.time_domain.follower import pid
+from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood
 from bayeshaptic.inference.time_domain.loop import Loop
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
@@ -67,7 +67,7 @@ def declared(recording: Recording) -> Recording:
 def test_the_simulated_motion_is_the_benchs() -> None:
     recording = in_loop(1.0, friction=0.0, resolution=0.0)
     loop = Loop.of(recording, 10.0, Way.of(recording.position))
-    loop = replace(loop, follower=pid(*GAINS, 1e-3))
+    loop = replace(loop, follower=Follower(*Feedback(*GAINS).law(1e-3)))
     values = np.array([TRUTH["m"], TRUTH["b"], 0.0, 0.0, TRUTH["delay_s"], 0.0, 0.0])
     error = loop.error(values, np.zeros(2 * WAVES))
     assert np.abs(error).max() < 1e-10 * np.ptp(recording.position)
@@ -76,7 +76,7 @@ def test_the_simulated_motion_is_the_benchs() -> None:
 def test_dry_friction_sticks_and_slips_as_on_the_bench() -> None:
     recording = in_loop(1.0, friction=TRUTH["coulomb"], resolution=0.0)
     loop = Loop.of(recording, 10.0, Way.of(recording.position))
-    loop = replace(loop, follower=pid(*GAINS, 1e-3))
+    loop = replace(loop, follower=Follower(*Feedback(*GAINS).law(1e-3)))
     values = np.array([*TRUTH.values(), 0.0, 0.0])
     values[3] = 0.0
     error = loop.error(values, np.zeros(2 * WAVES))
@@ -88,7 +88,7 @@ def test_dry_friction_sticks_and_slips_as_on_the_bench() -> None:
 @pytest.mark.parametrize("known", [False, True], ids=["unknown controller", "declared"])
 def test_the_fit_covers_what_the_bench_was(known: bool) -> None:
     recording = in_loop(2.5, TRUTH["coulomb"], 2e-6, TRUTH["offset"])
-    follower = pid(*GAINS, 1e-3) if known else None
+    follower = Follower(*Feedback(*GAINS).law(1e-3)) if known else None
     found = fit_motion(recording, follower)
     truth = np.array([TRUTH[name] for name in NAMES])
     truth[3] = TRUTH["offset"]

@@ -26,6 +26,9 @@ def is_periodic(etfe: Etfe) -> bool:
 def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tuple[Test, ...]:
     """The tests that a measurement of its kind gets.
 
+    In closed loop a command that answers to the noise makes anything look like drift, and a device
+    that rests at its target like a sensor that hangs: neither is looked for there.
+
     Parameters
     ----------
     fit : Fit
@@ -35,6 +38,8 @@ def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tupl
     """
     if is_periodic(etfe):
         return periodic_tests(fit)
+    if etfe.through_reference:
+        return (*frequency_tests(fit), *nonlinear_tests(fit, etfe))
     return (*model_tests(fit, etfe), *measurement_tests(fit, etfe, look))
 
 

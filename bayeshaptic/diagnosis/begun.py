@@ -21,6 +21,7 @@ from bayeshaptic.models.structures import chain
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
+from bayeshaptic.recordings.followed import through_reference, too_weak
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
@@ -144,11 +145,12 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             options.report(0.0, "checking the recording")
             whole = unbroken(measurement)
             notices += told(measurement.feedback, check_recording(whole, device))
+            measurement, notices = _opened(measurement, notices, model)
             if not any(notice.topic == "feedback" for notice in notices):
                 refuse_too_little(whole)
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
-            etfe = _response(measurement, options.band_hz, has_feedback(notices))
+            etfe, notices = _response(measurement, options.band_hz, notices)
     else:
         etfe = measurement
     lever_m = options.lever_m
@@ -190,16 +192,29 @@ def with_delay_of_the_loop(
     return measurement.later(delay_s), ()
 
 
-def _response(recording: Recording, band_hz: tuple[float, float] | None, biased: bool) -> Etfe:
+def _opened(
+    recording: Recording, notices: tuple[Notice, ...], model: str | Model
+) -> tuple[Recording, tuple[Notice, ...]]:
+    """Read through its reference where one is known; one mass is followed in time instead."""
+    if (model.name if isinstance(model, Model) else model) == "rigid":
+        return replace(recording, reference=None), notices
+    return through_reference(recording, notices)
+
+
+def _response(
+    recording: Recording, band_hz: tuple[float, float] | None, notices: tuple[Notice, ...]
+) -> tuple[Etfe, tuple[Notice, ...]]:
     """The response; one that feedback biases is for comparison only, and any band will do."""
     try:
-        return estimate_etfe(recording, band_hz)
-    except InputError:
-        if not biased or band_hz is not None:
+        return estimate_etfe(recording, band_hz), notices
+    except InputError as error:
+        if recording.reference is not None:
+            notices = too_weak(notices, str(error))
+        elif not has_feedback(notices) or band_hz is not None:
             raise
     longest = max(piece.duration_s for piece in recording.pieces)
     widest = (1 / longest, _WIDEST / recording.period_s)
-    return estimate_etfe(recording, widest)
+    return estimate_etfe(replace(recording, reference=None), widest), notices
 
 
 def _fit(

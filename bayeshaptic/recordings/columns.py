@@ -22,13 +22,16 @@ RECORDING_ROLES = ("time", *FORCES, *POSITIONS)
 # Of what a frequency response is: `bayeshaptic.recordings.response.frf_kinds`.
 FRF_KINDS = ("gain_db", "receptance_db", "mobility_db", "accelerance_db")
 FRF_ROLES = ("frequency", *FRF_KINDS, "phase_deg", "sd", "coherence", "averages")
-ROLES = (*RECORDING_ROLES, *FRF_ROLES)
+# What a controller followed; its unit does not matter.
+REFERENCE = "reference"
+ROLES = (*RECORDING_ROLES, REFERENCE, *FRF_ROLES)
 
 # Headers that need no mapping, with the unit they say.
 DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     "time": {"time_s": "s"},
     "force": {"force_n": "N", "torque_nm": "Nm", "current_a": "A"},
     "position": {"position_m": "m", "angle_rad": "rad"},
+    REFERENCE: {"reference": None, "reference_m": None, "reference_rad": None},
     "frequency": {"frequency_hz": None},
     **{role: {role: None} for role in FRF_ROLES[1:]},
     **{role: {} for role in (*FORCES[1:], *POSITIONS[1:])},
@@ -180,6 +183,8 @@ def _unit_times(key: str, factor: float, role: str, path: Path) -> str | None:
 def _defaults(arrays: Arrays, role: str) -> dict[str, str | None]:
     """Arrays that say by their names that they play a role, with their units."""
     found = {name: unit for name, unit in DEFAULT_HEADERS[role].items() if name in arrays}
+    if role == REFERENCE:
+        return found
     for key in arrays:
         name, unit = name_and_unit(key)
         plain = name.lower()

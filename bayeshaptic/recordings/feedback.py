@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from bayeshaptic.devices.table import Table
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.types import Floats
 
 UNDECIDED = "cannot be decided"  # in the warning where feedback is only a doubt
 _KEYS = ("law", "proportional", "derivative", "integral", "filter_hz")
@@ -36,6 +39,17 @@ class Feedback:
     derivative: float = 0.0
     integral: float = 0.0
     filter_hz: float | None = None
+
+    def law(self, period_s: float) -> tuple[Floats, Floats]:
+        """Numerator and denominator of force over -position, in powers of 1/z."""
+        keep = np.exp(-2 * np.pi * self.filter_hz * period_s) if self.filter_hz else 0.0
+        slope = (1 - keep) * self.derivative / period_s
+        lag, difference = np.array([1.0, -keep]), np.array([1.0, -1.0])
+        above = self.proportional * lag + slope * difference
+        if self.integral == 0:
+            return above, lag
+        above = np.convolve(above, difference) + self.integral * period_s * np.append(lag, 0.0)
+        return above, np.convolve(lag, difference)
 
 
 def has_feedback(notices: Iterable[Notice]) -> bool:

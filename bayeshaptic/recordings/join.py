@@ -12,6 +12,7 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.types import Floats
 
 # Shorter than this, a piece has too few lines for windows of its own.
 FEWEST_SAMPLES = 250
@@ -81,7 +82,14 @@ def join_recordings(
         name=name or f"{first.name} and {len(read) - 1} more",
         notices=(*notices, Notice("note", "pieces", text)),
         joints=tuple(int(end) for end in ends[:-1]),
+        reference=_references(pieces),
     )
+
+
+def _references(pieces: Sequence[Recording]) -> Floats | None:
+    """What the controllers followed, one piece after the other; None where one does not say."""
+    found = [piece.reference for piece in pieces if piece.reference is not None]
+    return np.concatenate(found) if len(found) == len(pieces) else None
 
 
 def unbroken(recording: Recording) -> Recording:

@@ -15,6 +15,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import (
     FORCES,
     POSITIONS,
+    REFERENCE,
     Column,
     as_numbers,
     is_frequency_response,
@@ -105,6 +106,7 @@ def recording_from_arrays(
     name: str = "recording",
     encoder_resolution: float | None = None,
     source: Path | None = None,
+    reference: ArrayLike | None = None,
 ) -> Recording:
     """A recording from arrays in memory.
 
@@ -125,6 +127,8 @@ def recording_from_arrays(
         One encoder count, in the position's unit.
     source : Path or None
         The file, for messages and reports.
+    reference : array_like, shape (N,), or None
+        What a controller followed, in any unit; used where the recording was made in closed loop.
 
     Returns
     -------
@@ -140,7 +144,10 @@ def recording_from_arrays(
     force = _signal(force, "force", where)
     position = _signal(position, "position", where)
     stamps = None if time is None else _signal(time, "time", where)
+    followed = None if reference is None else _signal(reference, "reference", where)
     lengths = {"force": len(force), "position": len(position)}
+    if followed is not None:
+        lengths["reference"] = len(followed)
     if stamps is not None:
         lengths["time"] = len(stamps)
     if len(set(lengths.values())) > 1:
@@ -168,6 +175,7 @@ def recording_from_arrays(
         time_jitter=timing.jitter,
         source=source,
         notices=notices,
+        reference=followed,
     )
 
 
@@ -224,6 +232,9 @@ def recorded(
         units[role], factor = (None, 1.0) if unit is None else base_unit(role, unit)
         signals[role] = values * factor if factor != 1.0 else values
     signals["force"] = signals.pop(force)
+    followed = pick(arrays, REFERENCE, mapping, path, required=False)
+    if followed is not None:
+        signals[REFERENCE] = followed[0]
     signals = cut.apply(signals, period_s, path)
     recording = recording_from_arrays(
         signals["force"],
@@ -236,6 +247,7 @@ def recorded(
         name=name or recording_name(path),
         encoder_resolution=encoder_resolution,
         source=path,
+        reference=signals.get(REFERENCE),
     )
     recording = as_command_and_position(recording, force, position)
     if units[force] is None and force in mapping and _in_volts(mapping[force]):

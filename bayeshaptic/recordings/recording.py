@@ -57,6 +57,9 @@ class Recording(Shown):
     joints : tuple of int
         Samples at which a further piece begins, where several recordings are joined
         (`bayeshaptic.join_recordings`); nothing is known of the time between them.
+    reference : ndarray, shape (N,), or None
+        What the controller followed, in any unit, where it was written down: it moves the force,
+        and nothing of the motion moves it.
     """
 
     force: NDArray[np.float64] = field(repr=False)
@@ -76,6 +79,7 @@ class Recording(Shown):
     notices: tuple[Notice, ...] = ()
     feedback: Feedback | None = None
     joints: tuple[int, ...] = ()
+    reference: NDArray[np.float64] | None = field(default=None, repr=False)
 
     @property
     def kind(self) -> str:
@@ -106,7 +110,8 @@ class Recording(Shown):
         """The samples from `start` up to but without `stop`, as a recording of its own."""
         joints = tuple(joint - start for joint in self.joints if start < joint < stop)
         force, position = self.force[start:stop], self.position[start:stop]
-        return replace(self, force=force, position=position, joints=joints)
+        reference = None if self.reference is None else self.reference[start:stop]
+        return replace(self, force=force, position=position, joints=joints, reference=reference)
 
     def _lines(self) -> tuple[str, ...]:
         length = quantity(self.duration_s, "s")

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import estimate, percent, pure, quantity
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
@@ -107,6 +108,8 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"the force {how} computed from the motion (feedback), which biases the response that "
             "everything here is read from"
         )
+    if analysis.etfe.through_reference:
+        found += _in_closed_loop(analysis, verdict)
     if analysis.sampled and (far := unstated(analysis)) is not None:
         found.append(far)
     if not analysis.posterior.converged:
@@ -119,6 +122,33 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"with probability {percent(never)} the loop is unstable however soft the wall is"
         )
     return tuple(found)
+
+
+def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
+    """What is asked of a limit that was read through a controller's reference beyond the usual."""
+    found = []
+    if verdict == "unexplained":
+        found.append(
+            "something is left that is not noise, and what a force that is not linear does in "
+            "closed loop is not simulated"
+        )
+    choice = analysis.choice
+    if analysis.model.held:
+        found.append(
+            "somebody holds the device, and in closed loop another hand on another device explains "
+            "the motion as well"
+        )
+    elif choice is not None and any(one.fit.model.held for one in choice.candidates.values()):
+        found.append("nobody said whether somebody holds the device, which closed loops hide")
+    if choice is not None and analysis.model.name == "rigid":
+        found.append(
+            f"nothing moves the force above {quantity(analysis.etfe.band_hz[1], 'Hz')} but noise, "
+            "and a vibration mode there may set a lower limit than that of one mass"
+        )
+    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
+    if not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB):
+        found.append("the recording leaves the limit open within more than a factor of two")
+    return found
 
 
 def _untrusted(

@@ -9,7 +9,7 @@ import numpy as np
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
-from bayeshaptic.inference.time_domain.follower import Follower, pid
+from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.models import HalfNormal
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import quantity
@@ -20,7 +20,7 @@ from bayeshaptic.types import Floats
 
 # Half a recording has too few strokes to say much: the halves may differ by so many of their sds.
 _APART = 4.0
-_WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
+WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
 # Standard deviations (Student's t, eight degrees of freedom: 1 in 1000) from which on the motion
 # contradicts what was given.
 _CONTRADICTED = 5.04
@@ -102,7 +102,7 @@ def open_questions(
         if dominated and free and name in _WORDS:
             reasons.append(f"the recording says too little of the {_WORDS[name]}")
     low, high = (limit.quantile(p) for p in (0.05, 0.95))
-    if not (low > 0 and 20 * np.log10(high / low) < _WIDEST_DB):
+    if not (low > 0 and 20 * np.log10(high / low) < WIDEST_DB):
         reasons.append("the recording leaves the limit open within more than a factor of two")
     return tuple(reasons)
 
@@ -143,8 +143,7 @@ def _declared(recording: Recording) -> Follower | None:
     told = recording.feedback
     if told is None:
         return None
-    gains = (told.proportional, told.derivative, told.integral)
-    return pid(*gains, told.filter_hz, recording.period_s)
+    return Follower(*told.law(recording.period_s))
 
 
 def _power(errors: list[Floats]) -> float:

@@ -109,12 +109,13 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
 
     What the command does comes from the model; what a hand does besides is taken from the
     measured position below 20 Hz, where the encoder sees it well, and of a free device how it began
-    and what a constant force does: friction has a sign where it slides along with that.
+    and what a constant force does: friction has a sign where it slides along with that.  In closed
+    loop the command answers to whatever moves the device besides, as to a hand.
     """
     force = recording.force - recording.force.mean()
     system = fit.model.system(fit.theta)
     x, v = linear_motion(system, force, recording.period_s)
-    if fit.model.held:
+    if fit.model.held or recording.reference is not None:
         rest = recording.position - recording.position.mean() - x
         rate = 1 / recording.period_s
         hand_hz = 20.0  # below it a hand moves the device, and the encoder sees it well

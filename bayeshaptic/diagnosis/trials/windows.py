@@ -46,7 +46,12 @@ class WindowTrials:
         return residual_tests(state.fit, state.etfe, self._look)
 
     def mended(self, state: State) -> State:
-        """With what is wrong with the samples mended; the very same where nothing is."""
+        """With what is wrong with the samples mended; the very same where nothing is.
+
+        In closed loop the command answers to the samples as they were.
+        """
+        if state.etfe.through_reference:
+            return state
         return state if _is_mended(state) else repair_measurement(state, self._look)
 
     def trials(
@@ -55,6 +60,8 @@ class WindowTrials:
         """Trials of every class that a test raises."""
         raised = {test.name for test in tests if test.flagged}
         families = {test.family for test in tests if test.flagged}
+        if state.etfe.through_reference and families != {"linear"}:
+            return []  # a force is simulated under the command, which answers to it in closed loop
         found: list[Trial] = []
         if "linear" in families:
             found += linear_trials(state, meter, tick)
@@ -62,6 +69,10 @@ class WindowTrials:
             far_off = state.fit.reduced_chi_square > thresholds.LINEAR_FIRST
             if far_off and any(trial.convincing for trial in found):
                 return found
+        if (
+            state.etfe.through_reference
+        ):  # forces are simulated under a command that answers to them
+            return found
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
         if "nonlinear" in families:

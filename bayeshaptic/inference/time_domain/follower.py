@@ -37,33 +37,6 @@ def spring_and_damper(mass: float, bandwidth_hz: float, period_s: float) -> Foll
     return Follower(np.array([spring + damper / period_s, -damper / period_s]), np.ones(1))
 
 
-def pid(
-    proportional: float,
-    derivative: float,
-    integral: float,
-    filter_hz: float | None,
-    period_s: float,
-) -> Follower:
-    """The law P e[k] + I T sum e + D d[k], d a first difference, low-passed at `filter_hz`.
-
-    Parameters
-    ----------
-    proportional, derivative, integral : float
-        Force over position, over velocity, over the integral of position.
-    filter_hz : float or None
-        d[k] = a d[k-1] + (1 - a) (e[k] - e[k-1]) / T, a = exp(-2 pi filter_hz T).
-    period_s : float
-    """
-    keep = np.exp(-2 * np.pi * filter_hz * period_s) if filter_hz else 0.0
-    slope = (1 - keep) * derivative / period_s
-    lag, difference = np.array([1.0, -keep]), np.array([1.0, -1.0])
-    if integral == 0:
-        return Follower(proportional * lag + slope * difference, lag)
-    above = np.convolve(proportional * lag + slope * difference, difference)
-    above = above + integral * period_s * np.append(lag, 0.0)
-    return Follower(above, np.convolve(lag, difference))
-
-
 def bandwidth_hz(command: Floats, period_s: float) -> float:
     """Below which most of the command's power lies: there it says how the device moves."""
     window = np.hanning(len(command))

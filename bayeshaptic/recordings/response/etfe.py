@@ -91,6 +91,11 @@ class Etfe(Shown):
         return None if self.recording is None or self.recording.joints else self.recording
 
     @property
+    def through_reference(self) -> bool:
+        """Whether it was made in closed loop, and is read through what the controller followed."""
+        return self.recording is not None and self.recording.reference is not None
+
+    @property
     def relative_sd(self) -> NDArray[Any]:
         """Standard deviation over the magnitude of the estimate, shape (L,)."""
         return np.sqrt(self.variance) / np.abs(self.value)
@@ -162,6 +167,7 @@ def estimate_etfe(
     Parameters
     ----------
     recording : Recording or path
+        One with a `reference` is read through that.
     band_hz : (low, high), optional
         Frequencies to use, Hz. By default chosen from the data: where the force has power and
         the response stands out of the noise.
@@ -185,12 +191,9 @@ def estimate_etfe(
     _check(recording, band_hz)
     if minimum_lines is not None and minimum_lines < 10:
         raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
-    found = estimate_periodic(recording, band_hz)
+    found = None if recording.reference is not None else estimate_periodic(recording, band_hz)
     spectra: PeriodicSpectra | RandomSpectra
-    if found is not None:
-        spectra, points, notices = found
-    else:
-        spectra, points, notices = estimate_random(recording, band_hz, minimum_lines)
+    spectra, points, notices = found or estimate_random(recording, band_hz, minimum_lines)
     return Etfe(
         frequency_hz=points.frequency_hz,
         value=points.value,

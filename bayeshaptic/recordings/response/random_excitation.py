@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band
+from bayeshaptic.recordings.response.instrument import STRONG, InstrumentSpectra
 from bayeshaptic.recordings.response.local_polynomial import window_edges
 from bayeshaptic.recordings.response.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.points import Points
@@ -24,6 +25,10 @@ FEWEST_WINDOWS = 8
 LOW_END_WINDOWS = 0.875
 # Slower than this a hand wanders more than it answers; the paper's lowest frequency too.
 LOWEST_HZ = 0.3
+# Of the sampling rate: above, a command that is held moves next to nothing.
+HIGHEST_THROUGH_REFERENCE = 0.4
+# Windows in which the reference must move the force.
+FEWEST_STRONG = 16
 # A rational reference must explain a window better than chance does with its two more terms.
 BETTER = 10.0
 # Share of samples that were cut off, from which that may be why nothing follows the force.
@@ -55,11 +60,13 @@ def estimate_random(
         When there are too few lines for `FEWEST_WINDOWS` windows, or no response.
     """
     minimum = minimum_lines or default_minimum_lines(recording.duration_s)
-    spectra, notice = (
-        _in_chosen_band(recording, minimum)
-        if band_hz is None
-        else _in_given_band(recording, band_hz, minimum)
-    )
+    notice: Notice | None
+    if recording.reference is not None:
+        spectra, notice = _through_reference(recording, band_hz, minimum)
+    elif band_hz is None:
+        spectra, notice = _in_chosen_band(recording, minimum)
+    else:
+        spectra, notice = _in_given_band(recording, band_hz, minimum)
     spectra = _with_reference(spectra)
     return spectra, points(spectra.windows()), (notice,) if notice else ()
 
@@ -96,6 +103,41 @@ def _in_chosen_band(recording: Recording, minimum: int) -> tuple[RandomSpectra, 
     return _spectra(recording, (low, high), minimum, "the force drives"), Notice(
         "note", "band", text
     )
+
+
+def _through_reference(
+    recording: Recording, band_hz: tuple[float, float] | None, minimum: int
+) -> tuple[RandomSpectra, Notice]:
+    """With the reference as instrument, between the lowest and the highest window that it moves."""
+    lowest = max(LOWEST_HZ, LOW_END_WINDOWS * minimum / recording.duration_s)
+    everything = band_hz or (lowest, HIGHEST_THROUGH_REFERENCE / recording.period_s)
+    spectra = _with_instrument(_spectra(recording, everything, minimum), recording)
+    strong = np.flatnonzero(spectra.strength > STRONG)
+    if len(strong) < FEWEST_STRONG:
+        raise InputError(
+            f"{recording.name}: the reference moves the force in {len(strong)} of "
+            f"{len(spectra.strength)} windows of frequencies, and {FEWEST_STRONG} are needed; "
+            "let it step more often or more widely, or be noise, and record longer"
+        )
+    first, last = spectra.edges[strong[0]], spectra.edges[strong[-1] + 1] - 1
+    low, high = (float(spectra.frequency_hz[line]) for line in (first, last))
+    text = (
+        f"Band {low:.3g} to {high:.4g} Hz, chosen where the reference moves the force: in "
+        f"{len(strong)} of {len(spectra.strength)} windows."
+    )
+    spectra = _with_instrument(_spectra(recording, (low, high), minimum), recording)
+    return spectra, Notice("note", "band", text)
+
+
+def _with_instrument(spectra: RandomSpectra, recording: Recording) -> InstrumentSpectra:
+    """With the reference at the same lines; its leakage is projected out with the position's."""
+    assert recording.reference is not None
+    reference = recording.reference - recording.reference.mean()
+    frequency = np.fft.rfftfreq(recording.samples, recording.period_s)
+    first = int(np.argmin(np.abs(frequency - spectra.frequency_hz[0])))
+    lines = np.fft.rfft(reference / np.ptp(reference))[first : first + spectra.lines]
+    same = {field.name: getattr(spectra, field.name) for field in fields(RandomSpectra)}
+    return InstrumentSpectra(**same, instrument=lines)
 
 
 def _cut_off(recording: Recording) -> InputError | None:
@@ -184,7 +226,8 @@ def _with_reference(spectra: RandomSpectra) -> RandomSpectra:
     fitted = spectra.windows(rational)
     gain = (plain.lines - 1) * np.log(plain.scatter / fitted.scatter)
     spectra = replace(spectra, reference=rational.where(gain > BETTER))
-    return replace(spectra, noise_slope=noise_slopes(spectra))
+    whole = spectra.regressed() if isinstance(spectra, InstrumentSpectra) else spectra
+    return replace(spectra, noise_slope=noise_slopes(whole))
 
 
 def _detrended(values: NDArray[Any]) -> NDArray[Any]:

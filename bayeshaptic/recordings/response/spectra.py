@@ -31,7 +31,7 @@ class Spectra(Protocol):
         """The windows of the likelihood."""
 
 
-class _Block(NamedTuple):
+class Block(NamedTuple):
     """Windows of similar width side by side, padded with lines that weigh nothing."""
 
     window: slice
@@ -88,7 +88,7 @@ class RandomSpectra:
         return (low + high) / 2 + (high - low) / 2 * NODES
 
     @cached_property
-    def _blocks(self) -> list[_Block]:
+    def _blocks(self) -> list[Block]:
         # Padding costs less than a call a window: a block spans widths up to a factor 1.5.
         width = np.maximum.accumulate(np.diff(self.edges))
         blocks, first = [], 0
@@ -98,7 +98,7 @@ class RandomSpectra:
             first = last
         return blocks
 
-    def _block(self, window: slice) -> _Block:
+    def _block(self, window: slice) -> Block:
         start, width = self.edges[:-1][window, None], np.diff(self.edges)[window, None]
         offset = np.arange(width.max())
         inside = offset < width
@@ -113,12 +113,12 @@ class RandomSpectra:
         terms = leakage_terms(x, frequency, centre)
         leakage = np.linalg.qr(terms * whitened[..., None])[0]
         position = self.position[line] * whitened
-        return _Block(
+        return Block(
             window=window,
             line=line,
             whitened=whitened,
             force=self.force[line] * whitened,
-            position=_project_out(leakage, position[..., None])[..., 0],
+            position=project_out(leakage, position[..., None])[..., 0],
             leakage=leakage,
             weights=interpolation(x),
         )
@@ -164,7 +164,7 @@ class RandomSpectra:
             columns = [block.force[..., None] * response]
             # The padding of a block has no force and must have no input either.
             columns += [(row[block.line] * block.whitened)[..., None] for row in further]
-            column = _project_out(block.leakage, np.concatenate(columns, axis=-1))
+            column = project_out(block.leakage, np.concatenate(columns, axis=-1))
             q, design[block.window] = np.linalg.qr(column)
             z = np.einsum("wlk,wl->wk", q.conj(), block.position)
             rest = block.position - np.einsum("wlk,wk->wl", q, z)
@@ -180,7 +180,7 @@ class RandomSpectra:
         )
 
 
-def _project_out(basis: NDArray[Any], columns: NDArray[Any]) -> NDArray[Any]:
+def project_out(basis: NDArray[Any], columns: NDArray[Any]) -> NDArray[Any]:
     """What is left of the columns (..., w, c) outside the span of the basis (..., w, b)."""
     return columns - basis @ (np.swapaxes(basis.conj(), -1, -2) @ columns)
 

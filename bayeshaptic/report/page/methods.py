@@ -82,6 +82,8 @@ def _measured(etfe: Etfe) -> tuple[str, ...]:
         if etfe.period_lines is None
         else f"at the {etfe.period_lines} excited lines of its steady periods"
     )
+    if etfe.through_reference:
+        how += ", through the reference of the controller that computed the force as an instrument"
     return (
         f"The device's response to a commanded force was recorded for {length} at {rate}, and "
         f"estimated {how} with its noise ({band}).",

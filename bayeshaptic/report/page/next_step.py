@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.numbers.result import is_unexplained
 
 if TYPE_CHECKING:
@@ -41,11 +41,21 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
             f"bayeshaptic report NEW.csv{_device(result)}",
         )
         if analysis.in_loop is None or analysis.in_loop.doubts:
-            return (again,)
+            return (again, _through(result)) if is_certain(analysis.notices) else (again,)
         rigid = (
             "Or, where the device is known to be one rigid mass, say so. This recording will do:"
         )
         return again, Step(rigid, f"{command} --model rigid")
+    if analysis.etfe.through_reference:
+        free = Step("Where nobody holds the device, say so:", f"{command} --held no")
+        return (
+            *((free,) if analysis.choice is not None and not analysis.model.held else ()),
+            Step(
+                "Record again with a reference of white noise that keeps the device moving, or in "
+                "open loop, where friction can be told from the rest. Then:",
+                f"bayeshaptic report NEW.csv{_device(result)}",
+            ),
+        )
     if not analysis.posterior.converged:
         return (
             Step(
@@ -70,6 +80,14 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
             "LOW,HIGH), and see whether the misfit goes:",
             f"{command} --model free",
         ),
+    )
+
+
+def _through(result: Result) -> Step:
+    return Step(
+        "Or tell what the controller followed: declare it in [feedback] of a study, or write its "
+        "reference beside the force and name that column:",
+        f"{_command(result)} --columns time=NAME,force=NAME,position=NAME,reference=NAME",
     )
 
 

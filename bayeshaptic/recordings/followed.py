@@ -1,0 +1,98 @@
+"""Closed loops whose reference is known: then the response can be estimated without bias."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.errors import Notice
+from bayeshaptic.recordings.feedback import Feedback, has_feedback
+from bayeshaptic.recordings.join import unbroken
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.causality import causality
+from bayeshaptic.recordings.signals.controller import followed
+from bayeshaptic.types import Floats
+
+_COLUMN = "the reference that was written down beside it"
+_DECLARED = "the controller that [feedback] declares"
+_READ_OFF = "the controller's law, which was read off the recording (exact between its targets),"
+
+
+def through_reference(
+    recording: Recording, notices: tuple[Notice, ...]
+) -> tuple[Recording, tuple[Notice, ...]]:
+    """A recording with feedback, with the reference that it is to be read through, if one is known.
+
+    A column that was written down, what a declared controller leaves of the command, or what one
+    does that shows its law to the last digit.  Neither of the first two is taken where it answers
+    to the motion itself.
+
+    Parameters
+    ----------
+    recording : Recording
+    notices : tuple of Notice
+        Those of its checks.
+
+    Returns
+    -------
+    recording : Recording
+        Its `reference` is None where none can be used, and in open loop.
+    notices : tuple of Notice
+        Without the warning of feedback where that biases nothing any more.
+    """
+    alone = replace(recording, reference=None)
+    if not has_feedback(notices):
+        return alone, notices
+    if recording.reference is not None:
+        found, what = recording.reference, _COLUMN
+    elif recording.feedback is not None:
+        found, what = _left_by(recording.feedback, recording), _DECLARED
+    elif (left := followed(recording)) is not None:
+        found, what = left, _READ_OFF
+    else:
+        return alone, notices
+    if np.ptp(found) == 0:
+        return alone, (*notices, _unusable(f"{what} never moves the command"))
+    tried = replace(recording, reference=found)
+    judged = causality(replace(unbroken(tried), force=found))
+    if what != _READ_OFF and judged.has_feedback:
+        why = f"{what} answers to the motion itself ({judged.evidence})"
+        return alone, (*notices, _unusable(f"{why}: check its gains, its filter and its sign"))
+    text = (
+        f"The force was computed from the motion; {what} tells what of it was not, and the "
+        "response is read through that alone, so that feedback does not bias it."
+    )
+    told = Notice("note", "feedback", text)
+    kept = (n for n in notices if (n.level, n.topic) != ("warning", "feedback"))
+    return tried, (*kept, told)
+
+
+def too_weak(notices: tuple[Notice, ...], why: str) -> tuple[Notice, ...]:
+    """`notices` of a recording whose reference says too little, with the warnings of feedback."""
+    text = (
+        "The force was computed from the motion: the recording was made in closed loop, so the "
+        f"ETFE, the fit and K_CR are biased, and its reference does not help: {why}."
+    )
+    kept = tuple(n for n in notices if (n.level, n.topic) != ("note", "feedback"))
+    return (*kept, Notice("warning", "feedback", text))
+
+
+def _unusable(why: str) -> Notice:
+    return Notice("warning", "reference", f"The reference is not used: {why}.")
+
+
+def _left_by(feedback: Feedback, recording: Recording) -> Floats:
+    """What the controller's law leaves of the command: its reference, through its numerator.
+
+    With N over D the law, D u + N y = N r, whatever the states of the controller were.
+    """
+    from scipy.signal import lfilter
+
+    above, below = feedback.law(recording.period_s)
+    parts = []
+    for piece in recording.pieces:
+        left = lfilter(below, [1.0], piece.force) + lfilter(above, [1.0], piece.position)
+        left[: max(len(above), len(below)) - 1] = 0.0
+        parts.append(left)
+    return np.concatenate(parts)

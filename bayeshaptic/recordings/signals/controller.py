@@ -1,0 +1,80 @@
+"""A controller read off a recording: between steps or corners of its reference its law is exact.
+
+There a linear controller obeys
+
+    A(z) u + B(z) y = B(z) r,    and second differences of r are zero,
+
+to the last digit that was written down.  The coefficients that make the second differences of the
+left side zero in most samples are its law, and what is left in the others is what it followed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.types import Bools, Floats
+
+_LAGS = 3  # an integrator, a filter, and a difference
+_ROUNDS = 40
+_FITTED = 8000  # samples
+# Left over, relative to the command's second differences, where nothing changes: rounding.
+_EXACT = 1e-5
+# A change of the reference stands so far out of what nine samples in ten leave, and is at least
+# such a share of the largest: without an exact law nothing does.
+_OUT, _SHARE = 30.0, 1e-3
+_FEWEST_CHANGES = 8
+_MOST_AT_LIMIT = 1e-3  # of the samples: a command that was cut off obeys no law there
+
+
+def followed(recording: Recording) -> Floats | None:
+    """What the controller followed, through its law, shape (N,); None where no law is exact."""
+    if _cut_off(recording.force):
+        return None
+    parts = [_left(piece) for piece in recording.pieces]
+    return np.concatenate([part for part in parts if part is not None]) if _all(parts) else None
+
+
+def _all(parts: list[Floats | None]) -> bool:
+    return all(part is not None for part in parts)
+
+
+def _cut_off(force: Floats) -> bool:
+    at = [np.mean(force == limit) for limit in (force.min(), force.max())]
+    return max(at) > max(_MOST_AT_LIMIT, 2 / len(force))
+
+
+def _left(piece: Recording) -> Floats | None:
+    force, position = (np.diff(signal, 2) for signal in (piece.force, piece.position))
+    commanded, moved = float(np.std(force)), float(np.std(position))
+    if commanded == 0 or moved == 0:
+        return None
+    rows = len(force) - _LAGS
+    columns = [force[_LAGS - lag : _LAGS - lag + rows] / commanded for lag in range(1, _LAGS + 1)]
+    columns += [position[_LAGS - lag : _LAGS - lag + rows] / moved for lag in range(_LAGS + 1)]
+    design, target = np.stack(columns, axis=1), force[_LAGS:] / commanded
+    law = _sparsest(design[:_FITTED], target[:_FITTED])
+    left = target - design @ law
+    size = np.abs(left)
+    changes = size > max(_OUT * float(np.quantile(size, 0.9)), _SHARE * float(size.max()))
+    if np.count_nonzero(changes) < _FEWEST_CHANGES:
+        return None
+    found = np.zeros(piece.samples)
+    found[_LAGS + 2 :] = np.where(changes, left, 0.0)
+    return found
+
+
+def _sparsest(design: Floats, target: Floats) -> Floats:
+    """Coefficients that leave nothing in most rows: least absolute errors, reweighted."""
+    weight = np.ones(len(target))
+    for number in range(_ROUNDS):
+        root = np.sqrt(weight)
+        law = np.linalg.lstsq(design * root[:, None], target * root, rcond=1e-14)[0]
+        left = np.abs(target - design @ law)
+        floor = max(float(np.quantile(left, 0.5)), 1e-14) * (1.0 if number < _ROUNDS // 2 else 0.1)
+        weight = 1 / np.maximum(left, floor) ** (1.0 if number < _ROUNDS // 2 else 2.0)
+        weight /= weight.max()
+    kept: Bools = left < max(_EXACT, float(np.quantile(left, 0.5)))
+    if np.count_nonzero(kept) > 4 * design.shape[1]:
+        law = np.linalg.lstsq(design[kept], target[kept], rcond=1e-14)[0]
+    return np.asarray(law)

@@ -1,0 +1,182 @@
+"""Devices of two masses and hands in closed loop: how often the intervals hold what the bench was.
+
+    python -m benchmarks.through_reference [COUNT] [FILE]
+
+LHIfAM- and PHANToM-like devices, free and held, under five controllers that follow steps, ramps or
+noise, 2 to 30 s, every other one with dry friction.  References of noise are written down beside
+the force; where they step or ramp, the controller is read off the recording.  Each recording takes
+the whole way to a recommendation.  FILE keeps what is done, a line a recording: a run that was
+stopped goes on from there.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.errors import InputError
+from bayeshaptic.models import Model
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report.headline import headline
+from bayeshaptic.rig import Bench, run_loop
+from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.types import Floats
+from benchmarks.door_recordings import controller_of, written_down
+
+CONTROLLERS = ("P", "PD", "PI", "PID", "PD filtered")
+REFERENCES = ("steps", "ramps", "noise")
+FEWEST_COUNTS, FARTHEST = 20.0, 20.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recording with its reference, the bench without friction, and what they are in words."""
+
+    recording: Recording
+    bench: Bench
+    friction: float
+    what: str
+
+
+def make(seed: int) -> Case:
+    """One recording; controllers and references in turn."""
+    rng = np.random.default_rng((12, seed))
+    kind, reference = CONTROLLERS[seed % 5], REFERENCES[seed // 5 % 3]
+    while True:
+        name, held = str(rng.choice(["lhifam", "phantom"])), bool(rng.random() < 0.5)
+        bench = Bench.from_device(name, held, "grasped" if held else "free")
+        values = {key: v * float(np.exp(rng.normal(0, 0.3))) for key, v in bench.values.items()}
+        delay_s = float(rng.uniform(0, 2)) * bench.period_s
+        bench = replace(bench, values=values, delay_s=delay_s)
+        friction = bench.force_rms * float(10 ** rng.uniform(-1.5, -0.5)) * (seed % 2)
+        rubbing = bench.with_effect("coulomb_friction", force=friction) if friction else bench
+        seconds = float(np.exp(rng.uniform(np.log(2), np.log(30))))
+        law = controller_of(kind, reference, bench, seconds, rng, "at the sample")
+        made = run_loop(rubbing, law.begin(), seconds, seed, give_up=FARTHEST * law.size)
+        whole = len(made.force) >= round(seconds / bench.period_s) - 1
+        if whole and np.ptp(made.position) > FEWEST_COUNTS * bench.encoder_resolution:
+            break
+    recording = written_down(made.force, made.position, bench, "at the sample")
+    if reference == "noise":
+        recording = replace(recording, reference=law.wanted[: recording.samples])
+    what = f"{name} {'held' if held else 'free'}, {kind}, {reference}, {seconds:.1f} s"
+    return Case(recording, bench, friction / bench.force_rms, what)
+
+
+def bound_db(case: Case, model: Model) -> float:
+    """Least standard deviation of K_CR in dB (Cramer and Rao) where only the encoder disturbs.
+
+    Then the innovations of a free device are white noise of its encoder, whatever the controller.
+    """
+    recording, bench = case.recording, case.bench
+    truth = np.array([bench.values.get(name, bench.delay_s) for name in model.names])
+    power = bench.encoder_resolution**2 / 12 + bench.sensor_noise_rms**2
+    frequency = np.fft.rfftfreq(recording.samples, recording.period_s)[1:-1]
+    force = np.fft.rfft(recording.force)[1:-1] / np.sqrt(recording.samples)
+    size = np.maximum(truth, 1e-6 * np.abs(truth).max())
+    steps = 1e-4 * np.diag(size)
+    both = np.concatenate([truth + steps, truth - steps])
+    count = len(truth)
+    seen = model.response(np.abs(both), frequency) * force
+    slope = (seen[:count] - seen[count:]) / 2e-4
+    information = 2 * (slope.conj() @ slope.T).real / power
+    limits = 20 * np.log10(critical_stiffness(model, np.abs(both)).samples)
+    gradient = (limits[:count] - limits[count:]) / 2e-4
+    return float(np.sqrt(gradient @ np.linalg.pinv(information, rcond=1e-14) @ gradient))
+
+
+def one(seed: int) -> dict[str, Any]:
+    """What became of one recording."""
+    case = make(seed)
+    found: dict[str, Any] = {"seed": seed, "what": case.what, "friction": case.friction}
+    began = time.process_time()
+    try:
+        closed = close_loop(case.recording, hidden=False)
+    except InputError as error:
+        return found | {"outcome": "refused", "why": str(error)}
+    found["seconds"] = time.process_time() - began
+    analysis, told = closed.analysis, headline(closed)
+    truth = case.bench.true_critical_stiffness()
+    low, middle, high = (float(analysis.limit.quantile(p)) for p in (0.05, 0.5, 0.95))
+    found |= {
+        "outcome": "refused" if told.status == "untrusted" else "recommended",
+        "why": told.sentence,
+        "through": analysis.etfe.through_reference,
+        "model": analysis.model.name,
+        "verdict": closed.verdict,
+        "flags": [test.name for test in closed.traced.after if test.flagged],
+        "limit_db": [20 * float(np.log10(max(v, 1e-12) / truth)) for v in (low, middle, high)],
+        "ranks": _ranks(analysis.posterior.draws, analysis.model, case.bench),
+    }
+    if case.bench.mechanism == "free" and analysis.model.name == "free" and not case.friction:
+        sd = float(np.std(20 * np.log10(analysis.limit.samples)))
+        found["over_bound"] = sd / bound_db(case, analysis.model)
+    return found
+
+
+def _ranks(draws: Floats, model: Model, bench: Bench) -> dict[str, float]:
+    truth = {**bench.values, "delay_s": bench.delay_s}
+    return {
+        name: float(np.mean(draws[:, i] < truth[name]))
+        for i, name in enumerate(model.names)
+        if truth.get(name, 0.0) > 0
+    }
+
+
+def summary(found: list[dict[str, Any]]) -> None:
+    """Print what the intervals held."""
+    for label, friction in (("without dry friction", False), ("with dry friction", True)):
+        some = [one for one in found if (one["friction"] > 0) == friction]
+        told = [one for one in some if one["outcome"] == "recommended"]
+        through = [one for one in told if one["through"]]
+        print(
+            f"{label}: {len(some)} recordings, {len(told)} recommended, {len(through)} of them "
+            "through the reference"
+        )
+        if not through:
+            continue
+        held = [one["limit_db"][0] <= 0 <= one["limit_db"][2] for one in through]
+        above = [one["limit_db"][0] > 0 for one in through]
+        widths = [one["limit_db"][2] - one["limit_db"][0] for one in through]
+        ranks = np.array([rank for one in through for rank in one["ranks"].values()])
+        inside = np.mean((ranks > 0.05) & (ranks < 0.95))
+        print(
+            f"  K_CR's 90 % interval holds the truth in {100 * np.mean(held):.0f} %, lies above it "
+            f"in {100 * np.mean(above):.0f} %; median width {np.median(widths):.2g} dB; the "
+            f"parameters' in {100 * inside:.0f} % of {len(ranks)}"
+        )
+    told = [one for one in found if one["outcome"] == "recommended" and "over_bound" in one]
+    ratios = np.array([one["over_bound"] for one in told])
+    if len(ratios):
+        print(
+            f"sd of K_CR over the Cramer-Rao bound, free devices: median {np.median(ratios):.2f} "
+            f"of {len(ratios)}, below 1.25 in {100 * np.mean(ratios < 1.25):.0f} %"
+        )
+
+
+def main(count: int, path: Path) -> None:
+    """Run what is not in the file yet, and print what all say."""
+    kept = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    done = {one["seed"] for one in kept}
+    for seed in range(count):
+        if seed in done:
+            continue
+        kept.append(one(seed))
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(kept[-1]) + "\n")
+        print(seed, kept[-1]["what"], kept[-1]["outcome"], kept[-1].get("limit_db"), flush=True)
+    summary(kept)
+
+
+if __name__ == "__main__":
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 200,
+        Path(sys.argv[2] if len(sys.argv) > 2 else "through-reference.jsonl"),
+    )

@@ -1,0 +1,147 @@
+"""Closed loops whose reference is known: written down, declared, or read off the recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.begun import begin
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings import join_recordings, read_recording, recording_from_arrays
+from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.feedback import Feedback, has_feedback
+from bayeshaptic.recordings.followed import through_reference
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
+from bayeshaptic.recordings.signals.controller import followed
+from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
+from bayeshaptic.types import Floats
+
+SECONDS = 8.0
+
+
+def wanted(kind: str, bench: Bench, size: float) -> Floats:
+    rng = np.random.default_rng(3)
+    count = round(SECONDS / bench.period_s)
+    if kind == "noise":
+        return size * rng.standard_normal(count)
+    return np.repeat(size * rng.standard_normal(count // 200 + 1), 200)[:count]
+
+
+def in_loop(
+    kind: str = "noise", held: bool = False, counts: float = 1.0
+) -> tuple[Recording, Bench, Feedback]:
+    """Under a PD controller of some 3 Hz, whose derivative answers to every count."""
+    bench = Bench.from_device("lhifam", held, "grasped" if held else "free")
+    bench = replace(bench, encoder_resolution=counts * bench.encoder_resolution)
+    mass = bench.values["m1"] + bench.values["m2"]
+    law = Feedback(mass * 20.0**2, 0.5 * mass * 20.0)
+    target = wanted(kind, bench, 2 * bench.force_rms / law.proportional)
+    last = [0.0]
+
+    def control(k: int, position: float) -> float:
+        rate, last[0] = (position - last[0]) / bench.period_s if k else 0.0, position
+        return float(law.proportional * (target[k] - position) - law.derivative * rate)
+
+    done = run_loop(bench, control, SECONDS, seed=1)
+    made = recording_from_arrays(done.force, done.position, bench.period_s, reference=target)
+    return made, bench, law
+
+
+def excess(recording: Recording, bench: Bench) -> float:
+    """Twice the log likelihood that the best fit is ahead of the truth, and its freedom."""
+    model = build_model(bench.mechanism, None, None, None, bench.period_s)
+    etfe = estimate_etfe(recording)
+    fit = least_squares(model, etfe)
+    truth = np.array([bench.values.get(name, bench.delay_s) for name in fit.model.names])
+    truth = np.maximum(truth, 1e-9)
+    windows = compress(etfe, partial(fit.model.response, truth))
+    both = Likelihood(fit.model, windows)(np.stack([fit.theta, truth]))
+    return float(2 * (both[0] - both[1])) / len(truth)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_the_truth_is_as_likely_as_noise_lets_it_be(held: bool) -> None:
+    recording, bench, _ = in_loop(held=held)
+    # 2 dL is a chi-square of 7 or 12 degrees of freedom: over 3 a degree in one of a thousand.
+    assert excess(recording, bench) < 3.0
+
+
+def test_a_coarse_encoder_biases_the_response_and_not_what_is_read_through_the_reference() -> None:
+    recording, bench, _ = in_loop(counts=30.0)
+    assert excess(recording, bench) < 3.0
+    assert excess(replace(recording, reference=None), bench) > 10.0
+
+
+def test_in_open_loop_it_is_the_likelihood_of_the_response() -> None:
+    bench = Bench.from_device("lhifam", False, "free")
+    made = simulate(bench, WhiteNoise(bench.force_rms, 400.0, 0.5, SECONDS), seed=4)
+    plain = recording_from_arrays(made.force, made.position, bench.period_s)
+    model = build_model("free", None, None, None, bench.period_s)
+    band = estimate_etfe(plain).band_hz
+    one = least_squares(model, estimate_etfe(plain, band))
+    other = least_squares(model, estimate_etfe(replace(plain, reference=plain.force), band))
+    inner = np.isfinite(one.sd) & np.isfinite(other.sd)
+    assert inner.sum() >= 5
+    assert np.all(np.abs(one.theta - other.theta)[inner] < 0.1 * one.sd[inner])
+    assert np.all(np.abs(np.log(other.sd / one.sd))[inner] < np.log(1.1))
+
+
+def test_a_declared_controller_leaves_its_reference() -> None:
+    recording, _, law = in_loop()
+    told = replace(recording, reference=None, feedback=law)
+    found, notices = through_reference(told, check_recording(told))
+    assert found.reference is not None and not has_feedback(notices)
+    assert recording.reference is not None
+    expected = law.proportional * recording.reference[1:]  # its derivative is of the position alone
+    np.testing.assert_allclose(found.reference[1:], expected, atol=1e-6 * np.ptp(expected))
+
+
+def test_a_controller_declared_wrongly_is_not_believed() -> None:
+    recording, _, law = in_loop(counts=30.0)
+    wrong = replace(law, derivative=-law.derivative)
+    told = replace(recording, reference=None, feedback=wrong)
+    found, notices = through_reference(told, check_recording(told))
+    assert found.reference is None and has_feedback(notices)
+    assert any(notice.topic == "reference" for notice in notices)
+
+
+def test_the_controller_is_read_off_where_its_reference_steps() -> None:
+    recording, _, _ = in_loop("steps")
+    target, found = recording.reference, followed(recording)
+    assert found is not None and target is not None
+    changes = np.flatnonzero(np.diff(target))
+    assert {int(np.abs(changes - k).min()) for k in np.flatnonzero(found)} <= set(range(8))
+    assert followed(in_loop("noise")[0]) is None
+
+
+def test_a_reference_that_says_nothing_leaves_the_warning() -> None:
+    recording, _, _ = in_loop()
+    slow = np.sin(np.arange(recording.samples) * 2e-3)
+    begun = begin(replace(recording, reference=slow), "free", Options())
+    assert has_feedback(begun.notices) and not begun.etfe.through_reference
+    with pytest.raises(InputError, match="the reference moves the force in"):
+        estimate_etfe(replace(recording, reference=slow))
+
+
+def test_a_reference_is_read_cut_and_joined(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    rows = np.column_stack([np.arange(600) * 1e-3, rng.standard_normal((600, 3))])
+    path = tmp_path / "loop.csv"
+    np.savetxt(path, rows, delimiter=",", header="time_s,force_n,position_m,aim", comments="")
+    whole = read_recording(path, columns={"reference": "aim"})
+    part = read_recording(path, columns={"reference": "aim"}, rows=(101, 600))
+    assert read_recording(path).reference is None
+    assert whole.reference is not None and part.reference is not None
+    np.testing.assert_allclose(part.reference, rows[100:, 3])
+    joined = join_recordings([whole, part])
+    assert joined.reference is not None and len(joined.reference) == joined.samples
+    assert join_recordings([whole, replace(part, reference=None)]).reference is None
