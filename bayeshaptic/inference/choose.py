@@ -26,7 +26,7 @@ from bayeshaptic.types import Floats
 
 # Information criteria nearer than this, odds of twenty to one, leave open which model it is.
 UNDECIDED = 6.0
-_NOBODY = ("rigid", "free", "chain-2")
+_CHAIN = "chain-2"
 _WORDS = {
     "rigid": "one rigid mass",
     "free": "two masses and a transmission, held by nobody",
@@ -103,7 +103,9 @@ def choose_model(
     held: bool | None = None,
     seed: int = 0,
 ) -> Choice:
-    """Fit the rigid, the free, the chain and the grasped model; choose by an information criterion.
+    """Fit the rigid, the free and the grasped model; choose by an information criterion.
+
+    Where no device that nobody holds explains it, a chain of three masses is fitted, too.
 
     Parameters
     ----------
@@ -121,21 +123,32 @@ def choose_model(
     -------
     Choice
     """
-    names = {None: (*_NOBODY, "grasped"), True: ("grasped",), False: _NOBODY[:2]}[held]
-    fits = {}
-    for name in names:
+
+    def fitted(name: str) -> Fit:
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
         own = {key: value for key, value in (prior or {}).items() if key in model.names}
-        fits[name] = least_squares(model.with_prior(own), etfe, seed=seed)
-    if held is None and fits["chain-2"].misfits:
-        fits["chain-2"] = _from_the_hand(fits["chain-2"], fits["grasped"], etfe)
+        return least_squares(model.with_prior(own), etfe, seed=seed)
+
+    names = {None: ("rigid", "free", "grasped"), True: ("grasped",), False: ("rigid", "free")}
+    fits = {name: fitted(name) for name in names[held]}
+    best, candidates, noise = _compared(fits)
+    # Where two masses that nobody holds explain it, a third has nothing to explain.
+    if held is None and (fits[best].misfits or candidates[best].held):
+        fits[_CHAIN] = fitted(_CHAIN)
+        if fits[_CHAIN].misfits:
+            fits[_CHAIN] = _from_the_hand(fits[_CHAIN], fits["grasped"], etfe)
+        best, candidates, noise = _compared(fits)
+    return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
+
+
+def _compared(fits: Mapping[str, Fit]) -> tuple[str, dict[str, ScoredFit], float]:
+    """The best, what each scored, and the noise's factor by which they were judged."""
     noise = max(1.0, min(fit.reduced_chi_square for fit in fits.values()))
     candidates = {
         name: ScoredFit(fit, information_criterion(fit, noise), deviance(fit, noise)[1])
         for name, fit in fits.items()
     }
-    best = _best(candidates, noise)
-    return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
+    return _best(candidates, noise), candidates, noise
 
 
 def _from_the_hand(chain: Fit, grasped: Fit, etfe: Etfe) -> Fit:
