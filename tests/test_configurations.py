@@ -279,7 +279,7 @@ def test_a_new_person_is_where_most_people_were() -> None:
     assert new["critical_stiffness"]["q50"] == pytest.approx(first.quantile(0.5))
     assert new["critical_stiffness"]["safe"]["0.01"] == pytest.approx(first.safe(0.01))
     words = " ".join(people(found))
-    assert "(in configuration 0.5)" in words and "in configuration 0;" in words
+    assert "(in configuration 0.5)" in words and "in configuration 0." in words
 
 
 def test_nothing_left() -> None:
