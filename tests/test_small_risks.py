@@ -129,3 +129,17 @@ def test_an_analysis_states_every_risk(recorded):
 def test_a_short_run_is_left_short(recorded):
     found = bh.analyse(recorded, model=bh.free(device="lhifam"), ess=200)
     assert found.posterior.chains.shape[1] == 32
+
+
+def test_no_risk_is_stated_below_one_that_is_not():
+    """A thousandth of independent draws far below a chain that hardly moved."""
+    rng = np.random.default_rng(4)
+    slow = np.repeat(rng.standard_normal(100), 500)
+    draws = np.where(rng.random(len(slow)) < 2e-3, -9 - rng.random(len(slow)), slow)
+
+    def effective(threshold: float) -> float:
+        return 100.0 if threshold > -5 else 50_000.0
+
+    assert np.mean(draws < -5) * effective(-9) > 40
+    assert low_quantile(draws, 0.01, effective) is None
+    assert low_quantile(draws, 0.001, effective) is None

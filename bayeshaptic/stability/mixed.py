@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayeshaptic.stability.binding import BindingCrossing
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.types import Ints
 
@@ -49,7 +50,7 @@ def mixed(
     )
 
 
-def _numbers(crossings: list, other: CriticalStiffness) -> Ints:  # type: ignore[type-arg]
+def _numbers(crossings: list[BindingCrossing], other: CriticalStiffness) -> Ints:
     """Where the crossings of `other` stand among `crossings`; what is new there is added."""
     found = []
     for own in other.crossings:
@@ -66,5 +67,5 @@ def _numbers(crossings: list, other: CriticalStiffness) -> Ints:  # type: ignore
     return np.array(found, int)
 
 
-def _log(crossing) -> float:  # type: ignore[no-untyped-def]
+def _log(crossing: BindingCrossing) -> float:
     return float(np.log(crossing.frequency_hz or 1e-9))

@@ -20,6 +20,7 @@ from bayeshaptic.types import Floats
 
 ENOUGH_BELOW = 20  # effective draws below a quantile that is stated as it is
 PRECISE = 0.2  # of the 90 % interval: a larger error of a fitted tail, and nothing is stated
+LARGEST = 0.05  # risk that a stiffness is stated for
 _SHARE = 0.05  # of the draws that a tail is fitted to; halved while it does not fit
 # Of sqrt(n) times the largest difference of distributions: 95 % of fits to eight smooth laws stay
 # below 0.9 to 1.1.
@@ -49,7 +50,8 @@ def low_quantile(
 ) -> LowQuantile | None:
     """The quantile at `risk` of what `samples`, shape (n,), are draws of.
 
-    None where they do not say it.
+    None where they do not say it, or do not say that of twice the risk: the lowest draws may be
+    many, and independent, where those above them are few.
 
     Parameters
     ----------
@@ -60,13 +62,15 @@ def low_quantile(
         From a threshold to the number of independent draws that would give the share of samples
         below it as well.
     """
+    if 2 * risk <= LARGEST and low_quantile(samples, 2 * risk, effective) is None:
+        return None
     ordered = np.sort(samples)
     own = quantile_with_error(ordered, risk, effective)
     if risk * effective(own.value) >= ENOUGH_BELOW:
         return own
     low, high = quantiles(ordered, np.array([0.05, 0.95]))
     share = max(_SHARE, 5 * risk)
-    while share >= 2 * risk:
+    while share > risk:  # the same tails for all risks: none is stated where a larger one is not
         tail = _fitted(ordered, risk, share, effective)
         if tail is not None:
             return tail if tail.error <= PRECISE * (high - low) else None
