@@ -159,8 +159,8 @@ def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Op
     A fit without an effect may be bent so far that no value of the effect beside it leads on.  Of a
     second mode on the motor of a held LHIfAM without a device file none of ten fits did; starting
     points that no fit has bent led there in nine of ten.  Both in one set crowd each other out.
-    Dynamic links have no valleys of their own, and so many of their responses would be dear.  Where
-    more than this is lacking a valley that is a little deeper is but bent in another way: the far
+    Not with dynamic links, of which so many responses would be dear (not measured).  Where more
+    than this effect is lacking a valley that is a little deeper is but bent in another way: the far
     one must halve what is left.
     """
     found = refine(model, windows, start)

@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.recordings.response.local_polynomial import LEAKAGE_TERMS
-from bayeshaptic.recordings.response.spectra import Block, RandomSpectra, project_out
+from bayeshaptic.recordings.response.regressors import Block, regressors
+from bayeshaptic.recordings.response.spectra import RandomSpectra, project_out
 from bayeshaptic.recordings.response.windows import Reference, Windows
 
 # F of the force's regression on the reference in a window, from which on what noise in the force
@@ -77,24 +78,21 @@ class InstrumentSpectra(RandomSpectra):
         """
         given = reference is not None
         reference = reference or self.reference
-        at_lines = np.asarray(reference(self.frequency_hz))
-        at_nodes = np.asarray(reference(self.nodes_hz.ravel())).reshape(self.nodes_hz.shape)
-        further = np.zeros((0, self.lines), complex) if inputs is None else np.asarray(inputs)
-        count, k = len(self.nodes_hz), self.nodes_hz.shape[1] + len(further)
+        columns = regressors(self.frequency_hz, self.nodes_hz, reference, inputs)
+        count, k = len(self.nodes_hz), columns.count
         design = np.empty((count, k, k), dtype=complex)
         target = np.empty((count, k), dtype=complex)
         scatter = np.empty(count)
         for block in self._blocks:
-            known = [(row[block.line] * block.whitened)[..., None] for row in further]
-            response = at_lines[block.line, None] * block.weights / at_nodes[block.window, None, :]
-            columns = [block.force[..., None] * response, *known]
-            column = project_out(block.leakage, np.concatenate(columns, axis=-1))
+            response, known = columns.response(block), columns.known(block)
+            moved = [block.force[..., None] * response, *known]
+            column = project_out(block.leakage, np.concatenate(moved, axis=-1))
             basis = self._basis(block, response, known)
             seen, answer = _onto(basis, column), _onto(basis, block.position[..., None])
             value = np.linalg.pinv(seen, rcond=1e-10) @ answer
             if given:
                 value = np.concatenate(
-                    [at_nodes[block.window], np.zeros((len(value), len(known)))], 1
+                    [columns.at_nodes[block.window], np.zeros((len(value), len(known)))], 1
                 )[..., None]
             error = block.position[..., None] - column @ value
             kept = _onto(basis, error)

