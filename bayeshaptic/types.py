@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,3 +20,7 @@ Progress = Callable[[float, str], None]
 """Called with the share of the work done, 0 to 1, and a word about it."""
 Tick = Callable[[str], None]
 """Called with what is being tried."""
+Work = Callable[[Any], Any]
+"""A job: called with an item, in whatever process."""
+Executor = Callable[[Work, Sequence[Any]], Iterator[Any]]
+"""Runs a job on every item and yields an outcome (`item`, `result`, `error`) as each ends."""

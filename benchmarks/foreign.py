@@ -11,7 +11,7 @@ import numpy as np
 
 from bayeshaptic.rig.dynamics.laws import DryFriction, SmoothLaw
 from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
-from bayeshaptic.rig.effects.effect import Effect, Samples, Scales
+from bayeshaptic.rig.effects.effect import Effect, MotionScales, Readings
 from bayeshaptic.types import Floats
 
 
@@ -23,7 +23,7 @@ class TanhSaturation(Effect):
     limit: float = 8.0
 
     @classmethod
-    def typical(cls, scales: Scales) -> TanhSaturation:
+    def typical(cls, scales: MotionScales) -> TanhSaturation:
         return cls(2.0 * scales.force)
 
     def command(self, force: Floats, progress: Floats, time_s: Floats) -> Floats:
@@ -49,7 +49,7 @@ class CoarseCommand(Effect):
     step: float = 2.0
 
     @classmethod
-    def typical(cls, scales: Scales) -> CoarseCommand:
+    def typical(cls, scales: MotionScales) -> CoarseCommand:
         return cls(0.5 * scales.force)
 
     def command(self, force: Floats, progress: Floats, time_s: Floats) -> Floats:
@@ -65,10 +65,10 @@ class EccentricEncoder(Effect):
     pitch: float = 1e-2
 
     @classmethod
-    def typical(cls, scales: Scales) -> EccentricEncoder:
+    def typical(cls, scales: MotionScales) -> EccentricEncoder:
         return cls(0.03 * scales.position, 0.7 * scales.position)
 
-    def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
+    def sense(self, samples: Readings, rng: np.random.Generator) -> Readings:
         wave = self.amplitude * np.sin(2 * np.pi * samples.position / self.pitch)
         return replace(samples, position=samples.position + wave)
 
@@ -110,7 +110,7 @@ class VelocityCubed(Effect):
     coefficient: float = 100.0
 
     @classmethod
-    def typical(cls, scales: Scales) -> VelocityCubed:
+    def typical(cls, scales: MotionScales) -> VelocityCubed:
         return cls(0.2 * scales.force / (15**0.5 * scales.velocity**3))
 
     def build(self, structure: Structure) -> None:
@@ -125,7 +125,7 @@ class LoadFriction(Effect):
     force: float = 0.6
 
     @classmethod
-    def typical(cls, scales: Scales) -> LoadFriction:
+    def typical(cls, scales: MotionScales) -> LoadFriction:
         return cls(0.15 * scales.force)
 
     def build(self, structure: Structure) -> None:
@@ -141,7 +141,7 @@ class LopsidedFriction(Effect):
     velocity: float = 3e-3
 
     @classmethod
-    def typical(cls, scales: Scales) -> LopsidedFriction:
+    def typical(cls, scales: MotionScales) -> LopsidedFriction:
         return cls(0.12 * scales.force, 0.03 * scales.velocity)
 
     def build(self, structure: Structure) -> None:
@@ -157,7 +157,7 @@ class EndStops(Effect):
     free: float = 1e-2
 
     @classmethod
-    def typical(cls, scales: Scales) -> EndStops:
+    def typical(cls, scales: MotionScales) -> EndStops:
         return cls(5 * scales.force / scales.position, 1.3 * scales.position)
 
     def build(self, structure: Structure) -> None:

@@ -36,6 +36,7 @@ from bayeshaptic.report.headline import Headline
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.walls.section import table_of
 from bayeshaptic.study import analysis as study_analysis
+from bayeshaptic.types import Executor
 
 Run = Callable[..., tuple[int, str, str]]
 # The quickest analysis: two parameters, below the first mode.
@@ -619,7 +620,7 @@ def die(_: int) -> None:
     os._exit(3)
 
 
-def outcomes(executor: executors.Executor, job: Any, items: list[int]) -> dict[int, Any]:
+def outcomes(executor: Executor, job: Any, items: list[int]) -> dict[int, Any]:
     return {one.item: (one.result, one.error) for one in executor(job, items)}
 
 

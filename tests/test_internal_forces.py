@@ -18,7 +18,7 @@ from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
-from bayeshaptic.rig.excitation import Given
+from bayeshaptic.rig.excitation import Prescribed
 
 LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 6.0, 4
@@ -53,7 +53,7 @@ OURS = {"hardening_connection": "hardening_spring"}
 def command() -> Any:
     """White noise without a mean: a free device then does not run away."""
     force = simulate(LHIFAM, WhiteNoise(4.0, 300.0, 0.3, SECONDS), seed=SEED).force
-    return Given(force - force.mean())
+    return Prescribed(force - force.mean())
 
 
 def recorded(bench: Bench) -> Recording:

@@ -11,7 +11,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.population.cavity import Cavity, cavity, described
 from bayeshaptic.inference.population.gaussian_likelihood import fit_quadratic
 from bayeshaptic.inference.population.hierarchy import Hierarchy
-from bayeshaptic.inference.population.hyperparameters import LKJ, Layout
+from bayeshaptic.inference.population.hyperparameters import LKJ, Unknowns
 from bayeshaptic.inference.population.infer import (
     infer_population,
     prior_moments,
@@ -87,7 +87,7 @@ def test_integrals_against_one_big_normal_density() -> None:
 
 
 def test_correlations_have_the_density_that_they_should() -> None:
-    layout = Layout(3, 0, False)
+    layout = Unknowns(3, 0, False)
     rng = np.random.default_rng(3)
     partial = 0.6 * rng.standard_normal((4, 3))
     phi = np.concatenate([np.zeros((4, 3)), partial], axis=1)

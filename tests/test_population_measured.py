@@ -12,7 +12,7 @@ import bayeshaptic as bh
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.population.cavity import cavity
 from bayeshaptic.inference.population.gaussian_likelihood import linearised
-from bayeshaptic.inference.population.hyperparameters import Layout
+from bayeshaptic.inference.population.hyperparameters import Unknowns
 from bayeshaptic.inference.population.infer import (
     infer_population,
     prior_moments,
@@ -61,7 +61,7 @@ def joint_draws(posteriors: list[Posterior]) -> tuple[Floats, Floats]:
     import emcee
 
     model = posteriors[0].model
-    here, layout = study_coordinates(model), Layout(2, 1, False)
+    here, layout = study_coordinates(model), Unknowns(2, 1, False)
     mean, sd = prior_moments(model, here)
     hand = [model.names.index(name) for name in ("ks", "mh")]
     device = model.names.index("kc")

@@ -15,7 +15,7 @@ from bayeshaptic.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from bayeshaptic.jobs.manifest import Entry
+    from bayeshaptic.jobs.manifest import ManifestEntry
     from bayeshaptic.report.reported import Reported
 
 NAME = "batch"
@@ -93,7 +93,9 @@ def run(arguments: argparse.Namespace) -> int:
     as_json = arguments.log == "json"
     with Talk(arguments.quiet or as_json) as talk:
 
-        def tell(entry: Entry, reports: tuple[Reported, ...], done: int, count: int) -> None:
+        def tell(
+            entry: ManifestEntry, reports: tuple[Reported, ...], done: int, count: int
+        ) -> None:
             if as_json:
                 facts = {"source": entry.source, "state": entry.state, "error": entry.error}
                 more = {"seconds": entry.seconds, "done": done, "of": count}

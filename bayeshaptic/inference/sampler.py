@@ -20,7 +20,7 @@ from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
 from bayeshaptic.inference.sampling.run import Run, run_until_done
-from bayeshaptic.inference.saved.checkpoint import Arrays, Checkpoint, key_of
+from bayeshaptic.inference.saved.checkpoint import Checkpoint, Stored, key_of
 from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import minimise
@@ -118,7 +118,7 @@ def sample(
     about = (seed, most_evaluations, getattr(asked, "key", None))
     checkpoint = _checkpoint(checkpoints, density, origin, about)
 
-    def restore(arrays: Arrays) -> Run:
+    def restore(arrays: Stored) -> Run:
         run = Run.from_arrays(arrays, counted, redraw)
         counted.count = int(arrays["evaluations"])
         return run

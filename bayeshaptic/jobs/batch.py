@@ -19,13 +19,13 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.files import remove_dead_drafts
 from bayeshaptic.jobs import executors
-from bayeshaptic.jobs.executors import Executor, Outcome
+from bayeshaptic.jobs.executors import Outcome
 from bayeshaptic.jobs.index import row_of, write_index
 from bayeshaptic.jobs.job import Job, Settings, refuse_file
-from bayeshaptic.jobs.manifest import Entry, entry_of, read_manifest, write_manifest
+from bayeshaptic.jobs.manifest import ManifestEntry, manifest_entry, read_manifest, write_manifest
 from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.recordings.read import recording_name
-from bayeshaptic.types import Progress
+from bayeshaptic.types import Executor, Progress
 
 if TYPE_CHECKING:
     from bayeshaptic.report.reported import Reported
@@ -107,8 +107,8 @@ def run_batch(
     executor: concurrent.futures.Executor | Executor | None = None,
     resume: bool = True,
     command: str | None = None,
-    tell: Callable[[Entry, tuple[Reported, ...], int, int], None] | None = None,
-) -> tuple[Entry, ...]:
+    tell: Callable[[ManifestEntry, tuple[Reported, ...], int, int], None] | None = None,
+) -> tuple[ManifestEntry, ...]:
     """Report on many sources, and write an index of them.
 
     Every source has a folder in `out_dir`; beside them are ``index.html``, ``index.csv``,
@@ -136,7 +136,7 @@ def run_batch(
 
     Returns
     -------
-    tuple of Entry
+    tuple of ManifestEntry
         In the order of the sources.
 
     Raises
@@ -191,14 +191,14 @@ class _Batch:
         folder: Path,
         settings: Settings,
         command: str | None,
-        tell: Callable[[Entry, tuple[Reported, ...], int, int], None] | None,
+        tell: Callable[[ManifestEntry, tuple[Reported, ...], int, int], None] | None,
         work: Mapping[str, Job],
     ) -> None:
         self.folder, self.settings, self.command, self.tell = folder, settings, command, tell
-        self.entries = {source: entry_of(job) for source, job in work.items()}
+        self.entries = {source: manifest_entry(job) for source, job in work.items()}
         self._written = -math.inf
 
-    def is_done(self, old: Entry | None, job: Job) -> bool:
+    def is_done(self, old: ManifestEntry | None, job: Job) -> bool:
         """Whether an earlier run has done the same; its entry is kept then."""
         entry = self.entries[str(job.source)]
         whole = any((job.folder / name).exists() for name in ("summary.json", "population.json"))
@@ -233,7 +233,7 @@ class _Batch:
         )
         self._keep(entry, reports)
 
-    def _keep(self, entry: Entry, reports: tuple[Reported, ...]) -> None:
+    def _keep(self, entry: ManifestEntry, reports: tuple[Reported, ...]) -> None:
         self.entries[entry.source] = entry
         if self.tell is not None:
             ended = sum(one.state != "waiting" for one in self.entries.values())

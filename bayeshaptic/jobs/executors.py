@@ -18,7 +18,7 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -30,8 +30,7 @@ from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import entry, explained
 from bayeshaptic.garbage import look_rarely
 from bayeshaptic.threads import THREADS
-
-Work = Callable[[Any], Any]
+from bayeshaptic.types import Executor, Work
 
 # Dask asks for memory to be handed back at once (MALLOC_TRIM_THRESHOLD_), which makes every larger
 # array a system call, and reports cost a quarter more; its loop looks fifty times a second whether
@@ -66,9 +65,6 @@ class Outcome:
     result: Any = None
     error: str | None = None
     refused: bool = False
-
-
-Executor = Callable[[Work, Sequence[Any]], Iterator[Outcome]]
 
 
 def serial(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:

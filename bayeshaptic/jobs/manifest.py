@@ -21,7 +21,7 @@ FORMAT = "bayeshaptic batch 1"
 
 
 @dataclass(frozen=True)
-class Entry:
+class ManifestEntry:
     """One source of a batch.
 
     Attributes
@@ -48,7 +48,7 @@ class Entry:
     rows: tuple[Mapping[str, Any], ...] = field(default=())
 
 
-def entry_of(job: Job) -> Entry:
+def manifest_entry(job: Job) -> ManifestEntry:
     """The entry of a job that is still to be done."""
     files = [job.source]
     if job.source.suffix.lower() == ".toml":
@@ -63,21 +63,26 @@ def entry_of(job: Job) -> Entry:
     inputs = {str(file): sha256(file) for file in files}
     about = [inputs, job.settings.facts(), versions()]
     key = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
-    return Entry(str(job.source), str(job.folder), inputs, key)
+    return ManifestEntry(str(job.source), str(job.folder), inputs, key)
 
 
-def read_manifest(folder: Path) -> dict[str, Entry]:
+def read_manifest(folder: Path) -> dict[str, ManifestEntry]:
     """Entries by source; none where there is no manifest, or one that cannot be understood."""
     try:
         content = json.loads((folder / NAME).read_text(encoding="utf-8"))
-        entries = [Entry(**{**one, "rows": tuple(one["rows"])}) for one in content["entries"]]
+        entries = [
+            ManifestEntry(**{**one, "rows": tuple(one["rows"])}) for one in content["entries"]
+        ]
     except (OSError, ValueError, TypeError, KeyError):
         return {}
     return {entry.source: entry for entry in entries}
 
 
 def write_manifest(
-    folder: Path, entries: Mapping[str, Entry], command: str | None, options: Mapping[str, Any]
+    folder: Path,
+    entries: Mapping[str, ManifestEntry],
+    command: str | None,
+    options: Mapping[str, Any],
 ) -> None:
     """Write it whole."""
     content = {

@@ -13,7 +13,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.faq import explained
 from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.jobs import executors
-from bayeshaptic.jobs.executors import Executor, Outcome
+from bayeshaptic.jobs.executors import Outcome
 from bayeshaptic.jobs.job import Job, checkpoints_of, refuse_file
 from bayeshaptic.jobs.recording import reported
 from bayeshaptic.provenance import provenance
@@ -24,7 +24,7 @@ from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.write import write_study_report
 from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
-from bayeshaptic.types import Progress
+from bayeshaptic.types import Executor, Progress
 
 _WRITING = 0.95
 

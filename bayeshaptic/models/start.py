@@ -16,7 +16,7 @@ from bayeshaptic.types import Floats
 
 
 @dataclass(frozen=True)
-class Scales:
+class ResponseScales:
     """The asymptotes and the peaks of a measured response.
 
     Attributes
@@ -40,7 +40,7 @@ class Scales:
         return float(2 * np.pi * np.sqrt(self.low_hz * self.high_hz))
 
 
-def scales(etfe: Etfe) -> Scales:
+def scales(etfe: Etfe) -> ResponseScales:
     """Read the scales off a measured response."""
     from scipy.ndimage import median_filter
     from scipy.signal import find_peaks
@@ -53,7 +53,7 @@ def scales(etfe: Etfe) -> Scales:
     smooth = median_filter(log_inertance, 5, mode="nearest")
     peaks, found = find_peaks(smooth, prominence=0.3)
     order = np.argsort(-found["prominences"])
-    return Scales(float(np.exp(-np.median(smooth))), low, high, grid[peaks[order]][:6])
+    return ResponseScales(float(np.exp(-np.median(smooth))), low, high, grid[peaks[order]][:6])
 
 
 def informed(model: Model, etfe: Etfe) -> Model:
@@ -83,7 +83,7 @@ def informed(model: Model, etfe: Etfe) -> Model:
     )
 
 
-def _weak_prior(name: str, dimension: str, found: Scales, period_s: float) -> Prior:
+def _weak_prior(name: str, dimension: str, found: ResponseScales, period_s: float) -> Prior:
     if name in GROUND_DAMPERS:
         scale = 0.5 * found.mass * found.middle
         return NearZero(scale, DAMPER_FLOOR * scale, DAMPER_RISE)
@@ -119,7 +119,9 @@ def starting_points(model: Model, etfe: Etfe, rng: np.random.Generator, count: i
     return np.concatenate(points)
 
 
-def _plausible(name: str, found: Scales, rng: np.random.Generator, count: int) -> dict[str, Floats]:
+def _plausible(
+    name: str, found: ResponseScales, rng: np.random.Generator, count: int
+) -> dict[str, Floats]:
     """Random mechanisms around the data's scales: name of the parameter to values."""
 
     def factor(low: float, high: float) -> Floats:

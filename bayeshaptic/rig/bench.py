@@ -13,7 +13,7 @@ from bayeshaptic.devices import Device, load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.dynamics.plant import Plant, assemble
 from bayeshaptic.rig.dynamics.structure import chain, check_parameters
-from bayeshaptic.rig.effects import Effect, Scales, make_effect
+from bayeshaptic.rig.effects import Effect, MotionScales, make_effect
 from bayeshaptic.rig.scales import motion_scales
 from bayeshaptic.rig.truth import critical_limit
 
@@ -199,7 +199,7 @@ class Bench:
             effect.build(structure)
         return assemble(structure)
 
-    def scales(self) -> Scales:
+    def scales(self) -> MotionScales:
         """How far and how fast the bench moves under its usual excitation, without effects."""
         return motion_scales(replace(self, effects=()))
 

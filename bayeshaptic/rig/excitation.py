@@ -211,7 +211,7 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class Given:
+class Prescribed:
     """Commands from an array, shape (samples,); nothing before it but rest."""
 
     command: Array

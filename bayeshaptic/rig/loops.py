@@ -13,7 +13,7 @@ from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.dynamics.propagate import split_delay
 from bayeshaptic.rig.dynamics.stepper import SUBSTEPS, Stepper
 from bayeshaptic.rig.effects import Effect
-from bayeshaptic.rig.motion import Start, blocks, initial_state
+from bayeshaptic.rig.motion import Start, epochs, initial_state
 from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.rig.sensing import Encoder, Streams, actuate, hand_force, write_down
 from bayeshaptic.rig.truth import smoothing_of
@@ -87,7 +87,7 @@ class _Run:
         self.hand = hand_force(bench, count + 1, self.streams)
         self.time_s = np.arange(count) * bench.period_s
         self.progress = self.time_s / self.time_s[-1]
-        self.parts = blocks(bench, self.progress)
+        self.parts = epochs(bench, self.progress)
         self.plant = self.parts[0].plant
         self.stepper = Stepper(self.plant, bench.period_s, substeps)
         self.stepper.start(initial_state(self.plant, start))

@@ -14,13 +14,13 @@ from bayeshaptic.rig.dynamics.propagate import period_map, run_linear, split_del
 from bayeshaptic.rig.dynamics.stepper import Stepper
 
 # A mechanism that changes does so in this many small jumps.
-BLOCKS = 100
+EPOCHS = 100
 
 Start = Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Block:
+class Epoch:
     """Samples `first` up to but without `stop`, in which the plant stays the same."""
 
     first: int
@@ -28,8 +28,8 @@ class Block:
     plant: Plant
 
 
-def blocks(bench: Bench, progress: Array) -> list[Block]:
-    """The run as blocks of one plant each.
+def epochs(bench: Bench, progress: Array) -> list[Epoch]:
+    """The run as epochs of one plant each.
 
     Parameters
     ----------
@@ -39,10 +39,10 @@ def blocks(bench: Bench, progress: Array) -> list[Block]:
     """
     count = len(progress)
     if not bench.varies:
-        return [Block(0, count, bench.plant())]
-    edges = np.unique(np.linspace(0, count, BLOCKS + 1).round().astype(int)).tolist()
+        return [Epoch(0, count, bench.plant())]
+    edges = np.unique(np.linspace(0, count, EPOCHS + 1).round().astype(int)).tolist()
     return [
-        Block(a, b, bench.plant(float(progress[(a + b) // 2])))
+        Epoch(a, b, bench.plant(float(progress[(a + b) // 2])))
         for a, b in zip(edges[:-1], edges[1:], strict=True)
     ]
 
@@ -82,7 +82,7 @@ def respond(
     -------
     position, velocity : ndarray, shape (N,)
     """
-    parts = blocks(bench, progress)
+    parts = epochs(bench, progress)
     plant = parts[0].plant
     state = initial_state(plant, start)
     if plant.laws or plant.delayed:
@@ -91,22 +91,22 @@ def respond(
         states = _step_through(stepper, parts, force, hand)
     else:
         states = np.empty((len(force), plant.states))
-        for block in parts:
-            period = period_map(block.plant, bench.period_s)
-            a, b = block.first, block.stop
+        for epoch in parts:
+            period = period_map(epoch.plant, bench.period_s)
+            a, b = epoch.first, epoch.stop
             found = run_linear(period, state, force[a:b], force[:a], hand[a : b + 1])
             states[a:b], state = found[:-1], found[-1]
     return states @ plant.position, states @ plant.velocity
 
 
-def _step_through(stepper: Stepper, parts: list[Block], force: Array, hand: Array) -> Array:
+def _step_through(stepper: Stepper, parts: list[Epoch], force: Array, hand: Array) -> Array:
     """States at every sample, shape (N, n), by time steps."""
     whole, _ = split_delay(stepper.plant.delay_s, stepper.period_s)
     acting = np.concatenate([np.zeros(whole + 1), force])
     states = []
-    for block in parts:
-        if block.first:
-            stepper.retune(block.plant)
-        own = slice(block.first, block.stop + 1)
+    for epoch in parts:
+        if epoch.first:
+            stepper.retune(epoch.plant)
+        own = slice(epoch.first, epoch.stop + 1)
         states.append(stepper.run(acting[own], hand[own]))
     return np.concatenate(states)

@@ -8,12 +8,12 @@ import numpy as np
 import scipy.integrate
 
 from bayeshaptic.rig.dynamics.plant import Array
-from bayeshaptic.rig.effects import Scales
+from bayeshaptic.rig.effects import MotionScales
 from bayeshaptic.rig.noise import tremor_density, wander_density
 from bayeshaptic.rig.setup import Setup
 
 
-def motion_scales(bench: Setup) -> Scales:
+def motion_scales(bench: Setup) -> MotionScales:
     """Root mean squares under white noise in the bench's band, tremor and wander.
 
     From the frequency response of the continuous chain, without hold and delay.
@@ -44,7 +44,7 @@ def motion_scales(bench: Setup) -> Scales:
             shape *= rms**2 / scipy.integrate.trapezoid(shape, frequency)
             power += scipy.integrate.trapezoid(shape * np.abs(rows @ state.T) ** 2, frequency)
     position, velocity, apart = np.sqrt(power).tolist()
-    return Scales(
+    return MotionScales(
         force=bench.force_rms,
         position=position,
         velocity=velocity,

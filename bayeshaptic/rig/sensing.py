@@ -6,7 +6,7 @@ import numpy as np
 
 from bayeshaptic.rig.bench import Bench
 from bayeshaptic.rig.dynamics.plant import Array
-from bayeshaptic.rig.effects.effect import Effect, Log, Samples
+from bayeshaptic.rig.effects.effect import Effect, Log, Readings
 from bayeshaptic.rig.noise import shaped_noise, tremor_density, wander_density
 from bayeshaptic.rig.recording import SimulatedRecording
 
@@ -50,16 +50,16 @@ class Encoder:
             if type(effect).sense is not Effect.sense
         ]
 
-    def read(self, time_s: Array, position: Array, velocity: Array) -> Samples:
-        """Samples with stamps and counted positions, any number of them."""
+    def read(self, time_s: Array, position: Array, velocity: Array) -> Readings:
+        """Readings with stamps and counted positions, any number of them."""
         if self.noise_rms > 0:
             position = position + self.rng.normal(0.0, self.noise_rms, len(position))
-        samples = Samples(time_s, position, velocity)
+        samples = Readings(time_s, position, velocity)
         for effect, rng in self.effects:
             samples = effect.sense(samples, rng)
         if self.resolution > 0:
             counts = np.round(samples.position / self.resolution)
-            samples = Samples(samples.time_s, counts * self.resolution, samples.velocity)
+            samples = Readings(samples.time_s, counts * self.resolution, samples.velocity)
         return samples
 
     def read_one(self, time_s: float, position: float, velocity: float) -> float:
@@ -70,9 +70,9 @@ class Encoder:
         arrays = (np.array([number]) for number in (time_s, position, velocity))
         return float(self.read(*arrays).position[0])
 
-    def stamped(self, time_s: Array, reading: Array) -> Samples:
+    def stamped(self, time_s: Array, reading: Array) -> Readings:
         """What was read one by one, as samples; the stamps are the nominal ones."""
-        return Samples(time_s, reading, np.zeros(len(reading)))
+        return Readings(time_s, reading, np.zeros(len(reading)))
 
 
 def actuate(bench: Bench, command: Array, progress: Array, time_s: Array) -> Array:
@@ -85,7 +85,7 @@ def actuate(bench: Bench, command: Array, progress: Array, time_s: Array) -> Arr
 def write_down(
     bench: Bench,
     streams: Streams,
-    samples: Samples,
+    samples: Readings,
     command: Array,
     true_time_s: Array,
     true_position: Array,

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.bench import Bench
 from bayeshaptic.rig.dynamics.stepper import HALVINGS, SUBSTEPS
-from bayeshaptic.rig.excitation import Excitation, Given, WhiteNoise
+from bayeshaptic.rig.excitation import Excitation, Prescribed, WhiteNoise
 from bayeshaptic.rig.motion import Start, respond
 from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.rig.sensing import Encoder, Streams, actuate, hand_force, write_down
@@ -82,4 +82,4 @@ def _excitation(bench: Bench, excitation: Excitation | ArrayLike | None) -> Exci
             f"the commanded force has shape {command.shape} or values that are not finite; "
             "give one finite number a sample, two samples at least"
         )
-    return Given(command)
+    return Prescribed(command)

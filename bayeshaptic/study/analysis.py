@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,10 +27,7 @@ from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.cases import StudyCases, study_cases
 from bayeshaptic.study.configuration_limits import ConfigurationLimits
 from bayeshaptic.study.hidden import known_together
-from bayeshaptic.types import Progress
-
-Executor = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
-"""As in `bayeshaptic.jobs.executors`: yields outcomes with `item`, `result` and `error`."""
+from bayeshaptic.types import Executor, Progress
 
 _RECORDINGS = 0.8  # share of the progress that the recordings take
 

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood
-from bayeshaptic.inference.population.hyperparameters import Hyperparameters, Layout
+from bayeshaptic.inference.population.hyperparameters import Hyperparameters, Unknowns
 from bayeshaptic.types import Floats, Ints
 
 _SCATTER = (0.05, 1.0)  # of hands, that a first guess stays within
@@ -54,9 +54,9 @@ class Hierarchy:
     prior_sd: Floats
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> Unknowns:
         repeated = len(self.user) > len(np.unique(self.user))
-        return Layout(len(self.hand), len(self.device), repeated)
+        return Unknowns(len(self.hand), len(self.device), repeated)
 
     @cached_property
     def mean(self) -> Floats:
@@ -127,7 +127,7 @@ class Hierarchy:
             covariances.append(kept @ covariance @ kept.T + kept * spread)
         return np.stack(means) + self.prior_mean, np.stack(covariances)
 
-    def before(self, given: Given, r: int) -> tuple[Floats, Floats]:
+    def before(self, given: Conditionals, r: int) -> tuple[Floats, Floats]:
         """Mean, less the prior's, and covariance of A_r beta + E v_u; shapes (B, D), (B, D, D)."""
         own = given.own_covariance[:, self.user[r]]
         slope = np.tile(self.design[r], (len(own), 1, 1))
@@ -138,7 +138,7 @@ class Hierarchy:
         covariance[:, self.hand[:, None], self.hand] += own
         return mean, covariance
 
-    def given(self, phi: Floats) -> Given:
+    def given(self, phi: Floats) -> Conditionals:
         """Everything below the hyperparameters phi of shape (B, Q)."""
         level = self.layout.read(phi)
         spread = self.spread(level)
@@ -169,11 +169,13 @@ class Hierarchy:
         log_det += 2 * people * np.log(root_diagonal).sum(axis=1)
         log_det += np.linalg.slogdet(own)[1].sum(axis=1) + np.linalg.slogdet(precision)[1]
         value = level.log_prior - 0.5 * (log_det + chi - np.sum(score * beta, axis=1))
-        return Given(level, spread, weight, precision, beta, own_covariance, own_score, gain, value)
+        return Conditionals(
+            level, spread, weight, precision, beta, own_covariance, own_score, gain, value
+        )
 
 
 @dataclass(frozen=True)
-class Given:
+class Conditionals:
     """What the recordings say below given hyperparameters, B of them.
 
     Attributes

@@ -52,7 +52,7 @@ class Hyperparameters:
 
 
 @dataclass(frozen=True)
-class Layout:
+class Unknowns:
     """Where the hyperparameters stand in phi.
 
     Attributes

@@ -27,7 +27,7 @@ from bayeshaptic.files import whole_file
 EVERY_S = 10.0  # what is lost at most, beyond the step that runs; shorter runs write nothing
 MOST_BYTES = 1 << 30
 
-Arrays = Mapping[str, NDArray[Any]]
+Stored = Mapping[str, NDArray[Any]]
 T = TypeVar("T")
 
 
@@ -60,7 +60,7 @@ class Checkpoint:
     def path(self) -> Path | None:
         return None if self.folder is None else self.folder / f"{self.key[:32]}.state"
 
-    def read(self, restore: Callable[[Arrays], T]) -> T | None:
+    def read(self, restore: Callable[[Stored], T]) -> T | None:
         """What `restore` makes of what was kept; None where there is nothing that can be used."""
         if self.path is None or not self.path.is_file():
             return None
@@ -79,7 +79,7 @@ class Checkpoint:
         """Whether what was done since the last writing is worth another."""
         return self.folder is not None and time.monotonic() - self._written >= EVERY_S
 
-    def write(self, arrays: Arrays) -> None:
+    def write(self, arrays: Stored) -> None:
         """Keep a state in the place of the one before, whole; a full disk is a warning."""
         if self.folder is None or self.path is None:
             return
@@ -112,7 +112,7 @@ def kept_until_done(folder: Path) -> Iterator[Path]:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def _unpacked(path: Path, key: str) -> Arrays:
+def _unpacked(path: Path, key: str) -> Stored:
     if path.stat().st_size > MOST_BYTES:
         raise ValueError("too large")
     content = path.read_bytes()

@@ -21,7 +21,7 @@ Fields = list[str]
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """Where the numbers are.
 
     Attributes
@@ -41,7 +41,7 @@ def find_layout(
     rows: int,
     remarks: Mapping[int, Fields],
     where: str,
-) -> Layout:
+) -> TextLayout:
     """The layout of a table.
 
     Parameters
@@ -80,7 +80,7 @@ def find_layout(
     twice = [name for name, count in Counter(names).items() if count > 1 and name]
     if twice:
         raise InputError(f"{where}: the header has '{twice[0]}' more than once; rename one")
-    return Layout([name or f"column {i}" for i, name in enumerate(names, start=1)], first)
+    return TextLayout([name or f"column {i}" for i, name in enumerate(names, start=1)], first)
 
 
 def _names(

@@ -26,7 +26,7 @@ _FLAT = 0.02  # relative change that is none
 
 
 @dataclass(frozen=True)
-class Words:
+class GuidanceWords:
     """What `guidance.jinja` says."""
 
     lead: str
@@ -37,9 +37,9 @@ class Words:
     sweeps_caption: str
 
 
-def words(guidance: Guidance, experiments: Sequence[Experiment]) -> Words:
+def words(guidance: Guidance, experiments: Sequence[Experiment]) -> GuidanceWords:
     """The sentences of the section."""
-    return Words(
+    return GuidanceWords(
         _lead(guidance.shares),
         _overlap(guidance.shares),
         _raise(guidance.elasticities),

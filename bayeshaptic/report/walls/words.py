@@ -26,7 +26,7 @@ _DAMPING = (
 
 
 @dataclass(frozen=True)
-class Words:
+class WallWords:
     """What `limits.jinja` says."""
 
     lead: tuple[str, ...]
@@ -38,9 +38,9 @@ class Words:
     rules: str
 
 
-def words(table: LimitTable, rules: Rules) -> Words:
+def words(table: LimitTable, rules: Rules) -> WallWords:
     """The sentences of the section."""
-    return Words(
+    return WallWords(
         _lead(table),
         _DAMPING,
         _curve_caption(table),

@@ -12,7 +12,7 @@ from bayeshaptic.rig.dynamics.plant import Array, Plant
 
 
 @dataclass(frozen=True)
-class Layout:
+class StateLayout:
     """Where the inputs stand behind the states in the augmented state of the propagator.
 
     Every input is a state of its own: the command and the nonlinear forces keep their values during
@@ -52,8 +52,8 @@ class Layout:
         return self.first_slope + self.delayed
 
 
-def layout(plant: Plant) -> Layout:
-    return Layout(plant.states, len(plant.laws), len(plant.delayed))
+def layout(plant: Plant) -> StateLayout:
+    return StateLayout(plant.states, len(plant.laws), len(plant.delayed))
 
 
 def generator(plant: Plant) -> Array:

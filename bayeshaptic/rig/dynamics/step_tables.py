@@ -59,7 +59,7 @@ class Memory(NamedTuple):
     Attributes
     ----------
     z : ndarray, shape (size,)
-        States and inputs, as `propagate.Layout` has them.
+        States and inputs, as `propagate.StateLayout` has them.
     mode : ndarray of int, shape (L,)
         Direction in which dry friction slides, 0 where it sticks.
     history : ndarray, shape (D, capacity)

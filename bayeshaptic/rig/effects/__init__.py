@@ -10,7 +10,7 @@ from bayeshaptic.rig.effects.dynamics import (
     SecondMode,
     StructuralDamping,
 )
-from bayeshaptic.rig.effects.effect import REGISTRY, Effect, Scales, make_effect, register
+from bayeshaptic.rig.effects.effect import REGISTRY, Effect, MotionScales, make_effect, register
 from bayeshaptic.rig.effects.friction import CoulombFriction, DahlFriction, StribeckFriction
 from bayeshaptic.rig.effects.hand import GripDrift, Reflex
 from bayeshaptic.rig.effects.nonlinear import (
@@ -58,7 +58,7 @@ __all__ = [
     "Quantisation",
     "Reflex",
     "SampleJitter",
-    "Scales",
+    "MotionScales",
     "SecondMode",
     "StribeckFriction",
     "StructuralDamping",

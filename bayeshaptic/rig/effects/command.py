@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayeshaptic.rig.dynamics.plant import Array
-from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 
 
 @register
@@ -21,7 +21,7 @@ class ActuatorSaturation(Effect):
     limit: float = 6.0
 
     @classmethod
-    def typical(cls, scales: Scales) -> ActuatorSaturation:
+    def typical(cls, scales: MotionScales) -> ActuatorSaturation:
         return cls(1.5 * scales.force)
 
     def command(self, force: Array, progress: Array, time_s: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.dynamics.structure import FRAME, GROUND, Link, Relaxation, Structure
-from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 
 
 def _mounted(mass: float, frequency_hz: float, damping_ratio: float) -> tuple[float, float]:
@@ -87,7 +87,7 @@ class CentringStiffness(Effect):
     on: str = "m1"
 
     @classmethod
-    def typical(cls, scales: Scales) -> CentringStiffness:
+    def typical(cls, scales: MotionScales) -> CentringStiffness:
         return cls(0.5 * scales.force / scales.position)
 
     def build(self, structure: Structure) -> None:
@@ -140,7 +140,7 @@ class ExtraDelay(Effect):
     delay_s: float = 0.6e-3
 
     @classmethod
-    def typical(cls, scales: Scales) -> ExtraDelay:
+    def typical(cls, scales: MotionScales) -> ExtraDelay:
         return cls(0.6 * scales.period_s)
 
     def build(self, structure: Structure) -> None:

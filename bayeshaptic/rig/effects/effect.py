@@ -15,7 +15,7 @@ from bayeshaptic.rig.dynamics.structure import Structure
 
 
 @dataclass(frozen=True)
-class Scales:
+class MotionScales:
     """Sizes that make an effect's default strength sensible on a bench.
 
     Attributes
@@ -43,7 +43,7 @@ class Scales:
 
 
 @dataclass(frozen=True)
-class Samples:
+class Readings:
     """What the encoder is about to read: stamps, positions and velocities, shape (samples,)."""
 
     time_s: Array
@@ -102,7 +102,7 @@ class Effect:
                 )
 
     @classmethod
-    def typical(cls, scales: Scales) -> Effect:
+    def typical(cls, scales: MotionScales) -> Effect:
         """The effect at a strength that is clear, but not absurd, on a bench with these scales."""
         return cls()
 
@@ -117,7 +117,7 @@ class Effect:
         """What the actuator gets of the commands."""
         return force
 
-    def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
+    def sense(self, samples: Readings, rng: np.random.Generator) -> Readings:
         """What the encoder gets to see, before it is rounded to counts."""
         return samples
 
@@ -140,7 +140,7 @@ def register(effect: EffectType) -> EffectType:
     return effect
 
 
-def make_effect(name: str, scales: Scales, **changes: Any) -> Effect:
+def make_effect(name: str, scales: MotionScales, **changes: Any) -> Effect:
     """A registered effect at its typical strength, with `changes` to its fields.
 
     Raises

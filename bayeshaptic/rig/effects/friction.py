@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from bayeshaptic.rig.dynamics.laws import Dahl, DryFriction
 from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
-from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 
 SHARE = 0.15
 
@@ -23,7 +23,7 @@ class CoulombFriction(Effect):
     on: str = "m1"
 
     @classmethod
-    def typical(cls, scales: Scales) -> CoulombFriction:
+    def typical(cls, scales: MotionScales) -> CoulombFriction:
         return cls(SHARE * scales.force)
 
     def build(self, structure: Structure) -> None:
@@ -49,7 +49,7 @@ class StribeckFriction(Effect):
     on: str = "m1"
 
     @classmethod
-    def typical(cls, scales: Scales) -> StribeckFriction:
+    def typical(cls, scales: MotionScales) -> StribeckFriction:
         level = SHARE * scales.force
         return cls(level, 1.6 * level, 0.3 * scales.velocity)
 
@@ -71,7 +71,7 @@ class DahlFriction(Effect):
     on: str = "m1"
 
     @classmethod
-    def typical(cls, scales: Scales) -> DahlFriction:
+    def typical(cls, scales: MotionScales) -> DahlFriction:
         level = SHARE * scales.force
         return cls(level, level / (0.01 * scales.velocity))
 

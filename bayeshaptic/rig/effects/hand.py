@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.dynamics.structure import GROUND, DelayedSpring, Structure
-from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 
 
 @register
@@ -28,7 +28,7 @@ class Reflex(Effect):
     time_constant_s: float = 0.01
 
     @classmethod
-    def typical(cls, scales: Scales) -> Reflex:
+    def typical(cls, scales: MotionScales) -> Reflex:
         values = scales.parameters
         return cls(0.5 * values.get("kh", 0.0), 0.5 * values.get("bh", 0.0))
 

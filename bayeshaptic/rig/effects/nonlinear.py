@@ -9,7 +9,7 @@ from typing import ClassVar
 from bayeshaptic.rig.dynamics.laws import Drag as DragLaw
 from bayeshaptic.rig.dynamics.laws import Gap, PowerSpring, Ripple
 from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
-from bayeshaptic.rig.effects.effect import Effect, Scales, register
+from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 
 # Root mean square of x^3 over the cube of that of x, for a Gaussian x.
 CUBE = 15.0**0.5
@@ -25,7 +25,7 @@ class HardeningSpring(Effect):
     on: str = "m1"
 
     @classmethod
-    def typical(cls, scales: Scales) -> HardeningSpring:
+    def typical(cls, scales: MotionScales) -> HardeningSpring:
         return cls(0.2 * scales.force / (CUBE * scales.position**3))
 
     def build(self, structure: Structure) -> None:
@@ -42,7 +42,7 @@ class HardeningConnection(Effect):
     stiffness: float = 1e12
 
     @classmethod
-    def typical(cls, scales: Scales) -> HardeningConnection:
+    def typical(cls, scales: MotionScales) -> HardeningConnection:
         return cls(0.2 * scales.force / (CUBE * scales.stretch**3)) if scales.stretch else cls()
 
     def build(self, structure: Structure) -> None:
@@ -69,7 +69,7 @@ class Backlash(Effect):
     free_damping: float = 0.0
 
     @classmethod
-    def typical(cls, scales: Scales) -> Backlash:
+    def typical(cls, scales: MotionScales) -> Backlash:
         return cls(0.4 * scales.stretch) if scales.stretch else cls()
 
     def build(self, structure: Structure) -> None:
@@ -90,7 +90,7 @@ class ForceRipple(Effect):
     phase: float = 0.0
 
     @classmethod
-    def typical(cls, scales: Scales) -> ForceRipple:
+    def typical(cls, scales: MotionScales) -> ForceRipple:
         return cls(0.05 * scales.force, scales.position)
 
     def build(self, structure: Structure) -> None:
@@ -109,7 +109,7 @@ class Gravity(Effect):
     hangs_at: float = 0.0
 
     @classmethod
-    def typical(cls, scales: Scales) -> Gravity:
+    def typical(cls, scales: MotionScales) -> Gravity:
         return cls(0.5 * scales.force)
 
     def build(self, structure: Structure) -> None:
@@ -126,7 +126,7 @@ class ConstantForce(Effect):
     force: float = 0.2
 
     @classmethod
-    def typical(cls, scales: Scales) -> ConstantForce:
+    def typical(cls, scales: MotionScales) -> ConstantForce:
         return cls(0.03 * scales.force)
 
     def build(self, structure: Structure) -> None:
@@ -146,7 +146,7 @@ class Drag(Effect):
     on: str = "m1"
 
     @classmethod
-    def typical(cls, scales: Scales) -> Drag:
+    def typical(cls, scales: MotionScales) -> Drag:
         return cls(0.2 * scales.force / (3.0**0.5 * scales.velocity**2))
 
     def build(self, structure: Structure) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.dynamics.plant import Array
-from bayeshaptic.rig.effects.effect import Effect, Log, Samples, Scales, register
+from bayeshaptic.rig.effects.effect import Effect, Log, MotionScales, Readings, register
 
 
 @register
@@ -22,7 +22,7 @@ class Quantisation(Effect):
     count: float = 3.14e-5
 
     @classmethod
-    def typical(cls, scales: Scales) -> Quantisation:
+    def typical(cls, scales: MotionScales) -> Quantisation:
         return cls(6 * scales.resolution) if scales.resolution else cls(0.01 * scales.position)
 
     def resolution(self, resolution: float) -> float:
@@ -42,7 +42,7 @@ class MainsTone(Effect):
     on: str = "position"
 
     @classmethod
-    def typical(cls, scales: Scales) -> MainsTone:
+    def typical(cls, scales: MotionScales) -> MainsTone:
         return cls(0.03 * scales.position)
 
     def _tone(self, time_s: Array) -> Array:
@@ -53,7 +53,7 @@ class MainsTone(Effect):
     def command(self, force: Array, progress: Array, time_s: Array) -> Array:
         return force + self._tone(time_s) if self.on == "force" else force
 
-    def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
+    def sense(self, samples: Readings, rng: np.random.Generator) -> Readings:
         if self.on == "force":
             return samples
         return replace(samples, position=samples.position + self._tone(samples.time_s))
@@ -69,10 +69,10 @@ class PositionClipping(Effect):
     limit: float = 0.05
 
     @classmethod
-    def typical(cls, scales: Scales) -> PositionClipping:
+    def typical(cls, scales: MotionScales) -> PositionClipping:
         return cls(1.5 * scales.position)
 
-    def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
+    def sense(self, samples: Readings, rng: np.random.Generator) -> Readings:
         return replace(samples, position=np.clip(samples.position, -self.limit, self.limit))
 
 
@@ -94,10 +94,10 @@ class SampleJitter(Effect):
     stamped: bool = False
 
     @classmethod
-    def typical(cls, scales: Scales) -> SampleJitter:
+    def typical(cls, scales: MotionScales) -> SampleJitter:
         return cls(0.05 * scales.period_s)
 
-    def sense(self, samples: Samples, rng: np.random.Generator) -> Samples:
+    def sense(self, samples: Readings, rng: np.random.Generator) -> Readings:
         late = rng.normal(0.0, self.sd_s, len(samples.time_s))
         stamps = samples.time_s + late if self.stamped else samples.time_s
         return replace(samples, position=samples.position + late * samples.velocity, time_s=stamps)
