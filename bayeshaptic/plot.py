@@ -5,6 +5,8 @@ Each function draws on the axes that it is given, or on those of a new figure, a
     closed = bh.close_loop("lhifam-user.csv", device="lhifam")
     ax = bh.plot.limit(closed)
     ax.figure.savefig("limit.pdf")
+
+On narrow axes, as in a column of a journal, legends stand below and numbers under their names.
 """
 
 from __future__ import annotations
@@ -46,6 +48,7 @@ __all__ = [
 ]
 
 _WIDTH_IN = 7.4
+_NARROW_IN = 4.5  # axes less wide have no room for a legend or numbers beside them
 
 
 class OnePanel(Protocol):
@@ -68,6 +71,7 @@ def _one(name: str, what: str, draw_on: Callable[[Axes, Any], None], height_in: 
     def drawn(result: Result, ax: Axes | None = None) -> Axes:
         axes = _axes(ax, height_in)
         draw_on(axes, result)
+        _fit((axes,))
         return axes
 
     return _named(drawn, name, what, "ax : Axes, optional\n    By default those of a new figure.")
@@ -86,6 +90,7 @@ def _several(
     def drawn(result: Result, ax: Sequence[Axes] | None = None) -> Sequence[Axes]:
         given = _stacked(ax, heights_in, range(2, most(result) + 1))
         draw_on(given, result)
+        _fit(given)
         return given
 
     return _named(
@@ -112,13 +117,13 @@ limit = _one(
 estimates = _one(
     "estimates",
     "Every estimate of the limit on one axis: model, deterministic fit, measurement, rules.",
-    answer.draw_on,
+    lambda axes, result: answer.draw_on(axes, result, _is_narrow(axes)),
     2.4,
 )
 before_after = _one(
     "before_after",
     "The critical stiffness before and after closing the loop, beside the measurement's own.",
-    loop_stiffness.draw_on,
+    lambda axes, result: loop_stiffness.draw_on(axes, result, _is_narrow(axes)),
     2.0,
 )
 response = _several(
@@ -163,6 +168,7 @@ def walls(result: Result, ax: Axes | None = None, table: LimitTable | None = Non
     kb.draw_on(axes, known.filters[0], known)
     if axes.get_legend_handles_labels()[0]:  # no boundary where the draws are too few for one
         style.legend(axes)
+    _fit((axes,))
     return axes
 
 
@@ -189,6 +195,8 @@ def marginals(result: Result, name: str, ax: Axes | None = None) -> Axes:
     _known(result, name)
     axes = _axes(ax, 2.4, 3.6)
     marginals_figure.draw_on(axes, result, name)
+    style.legend(axes)
+    _fit((axes,))
     return axes
 
 
@@ -231,6 +239,41 @@ def _axes(ax: Axes | None, height_in: float, width_in: float = _WIDTH_IN) -> Axe
     import matplotlib.pyplot as plt
 
     return plt.subplots(figsize=(width_in, height_in), layout="constrained")[1]
+
+
+def _is_narrow(axes: Axes) -> bool:
+    figure = axes.get_figure(root=True)
+    return figure is not None and axes.get_position().width * figure.get_figwidth() < _NARROW_IN
+
+
+def _fit(panels: Sequence[Axes]) -> None:
+    """On narrow axes one legend below the lowest, in the place of those beside and inside them."""
+    if not _is_narrow(panels[-1]):
+        return
+    entries: dict[str, Any] = {}
+    for axes in panels:
+        legend = axes.get_legend()
+        if legend is not None:
+            shown = {text.get_text() for text in legend.get_texts()}
+            known = zip(*axes.get_legend_handles_labels(), strict=True)
+            entries.update({label: handle for handle, label in known if label in shown})
+            legend.remove()
+    if not entries:
+        return
+    from matplotlib.transforms import ScaledTranslation
+
+    last, figure, gap_in = panels[-1], panels[-1].get_figure(root=True), 0.42
+    assert figure is not None
+    style.legend(
+        last,
+        handles=list(entries.values()),
+        labels=list(entries),
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        bbox_transform=last.transAxes + ScaledTranslation(0, -gap_in, figure.dpi_scale_trans),
+        ncols=2 if max(map(len, entries)) < 26 else 1,
+        borderaxespad=0.0,
+    )
 
 
 def _stacked(

@@ -27,17 +27,22 @@ class Scale:
     factor: float
     unit: str
 
-    def number(self, value: float | None, sd: float | None = None, digits: int = 3) -> str:
-        """The number alone: two digits of `sd` where that is known, else `digits` digits."""
+    def number(
+        self, value: float | None, sd: float | None = None, digits: int = 3, least: int = 2
+    ) -> str:
+        """The number alone: two digits of `sd` where that is known, else `digits` digits.
+
+        `least` digits of the number itself are written, however large its `sd` is.
+        """
         if value is None or not math.isfinite(value):
             return _NOTHING
         scaled = value * self.factor
-        decimals = _decimals(scaled, None if sd is None else sd * self.factor, digits)
-        return _minus(f"{round(scaled, decimals):.{max(decimals, 0)}f}")
+        decimals = _decimals(scaled, None if sd is None else sd * self.factor, digits, least)
+        return _minus(f"{round(scaled, decimals) + 0.0:.{max(decimals, 0)}f}")
 
     def with_error(self, value: float | None, sd: float | None) -> str:
         """A number and its error with as many decimals: ``"0.590 ± 0.020"``; alone without one."""
-        number = self.number(value, sd)
+        number = self.number(value, sd, least=0)
         if value is None or not sd or not math.isfinite(sd):
             return number
         places = len(number.partition(".")[2])
@@ -143,8 +148,8 @@ def _first_symbol(unit: str) -> tuple[str, str]:
     return unit, ""
 
 
-def _decimals(value: float, sd: float | None, digits: int) -> int:
-    """Decimal places: two digits of `sd`, but at least two and at most nine of `value`."""
+def _decimals(value: float, sd: float | None, digits: int, least: int) -> int:
+    """Decimal places: two digits of `sd`, but at least `least` and at most nine of `value`."""
     if value == 0.0:
         return 0 if not sd else max(1 - math.floor(math.log10(sd)), 0)
     # Of the rounded number: 0.09998 is written 0.100.
@@ -153,7 +158,7 @@ def _decimals(value: float, sd: float | None, digits: int) -> int:
         return digits - 1 - exponent
     wanted = 1 - math.floor(math.log10(sd))
     most_digits = 9
-    return min(max(wanted, 1 - exponent), most_digits - 1 - exponent)
+    return min(max(wanted, least - 1 - exponent) if least else wanted, most_digits - 1 - exponent)
 
 
 def _minus(text: str) -> str:

@@ -66,13 +66,28 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
         if analysis.noise_scale != 1.0
         else ""
     )
+    if etfe.recording is None:
+        scatter = (
+            "The noise is Gaussian, independent from row to row of the table, and as large as the "
+            "table says."
+        )
+    elif etfe.period_lines is not None:
+        scatter = (
+            "The noise is Gaussian: at each excited line it is what does not repeat from period to "
+            "period, and its variance is integrated out. The device has settled in the periods "
+            "that were kept."
+        )
+    else:
+        scatter = (
+            "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is "
+            "estimated in each window of lines and integrated out. The leakage of a random "
+            "excitation is removed in each window; what is left over is independent from window to "
+            "window."
+        )
     return (
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
         "extrapolates.",
-        "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is "
-        "estimated in each window of lines and integrated out. The leakage of a random excitation "
-        "is removed in each window; what is left over is independent from window to "
-        f"window.{noise}",
+        scatter + noise,
     )
 
 

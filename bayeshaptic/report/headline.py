@@ -19,6 +19,7 @@ from bayeshaptic.report.numbers.misfit import (
     residual_is_noticed,
 )
 from bayeshaptic.report.numbers.result import tip_limit
+from bayeshaptic.report.numbers.rounded import rounded_down
 from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
@@ -188,26 +189,28 @@ def _recommended(
     limit = analysis.limit
     safe = limit.safe(risk)
     assert safe is not None
-    sd = (limit.quantile(0.95) - limit.quantile(0.05)) / 3.29
+    ends = (limit.quantile(0.05), limit.quantile(0.95))
     cap = _lower_witness(analysis, safe)
-    stiffness, shown = rounded_down(safe if cap is None else cap, limit.unit, sd)
+    stated = rounded_down(safe if cap is None else cap, limit.unit, *ends)
     if cap is None:
         sentence = (
-            f"Render walls of at most {shown}: the risk that the loop is unstable there is "
-            f"{percent(risk)}."
+            f"Render walls of at most {stated.with_level}: the risk that the loop is unstable "
+            f"there is {percent(risk)}."
         )
     else:
         sentence = (
-            f"Stay below {shown}: the measured response itself puts the limit lower than the model "
-            f"does ({quantity(safe, limit.unit)} at {percent(risk)} risk), and the two must agree "
-            "before the model's figure is used."
+            f"Stay below {stated.with_level}: the measured response itself puts the limit lower "
+            f"than the model does ({quantity(safe, limit.unit)} at {percent(risk)} risk), and the "
+            "two must agree before the model's figure is used."
         )
     details = [] if closed is None else [text for text in (in_short(closed),) if text]
     tip = tip_limit(analysis)
     if tip is not None and analysis.lever_m is not None:
         lever = analysis.lever_m
-        _, at_tip = rounded_down(stiffness / lever**2, tip.unit, sd / lever**2)
-        details.append(f"At the tip, {quantity(lever, 'm')} from the axis, that is {at_tip}.")
+        there = rounded_down(stated.value, tip.unit, *ends, lever)
+        details.append(
+            f"At the tip, {quantity(lever, 'm')} from the axis, that is {there.with_level}."
+        )
     details.append(_what_binds(analysis))
     warnings = [n.text for n in analysis.notices if n.level == "warning"]
     unexplained = diagnosis.get("verdict") == "unexplained"
@@ -224,18 +227,8 @@ def _recommended(
     if warnings:
         details.append("Beware: " + " ".join(_sentence(text) for text in warnings))
     status = "caution" if any(doubts) else "safe"
-    stated = risk if cap is None else None
-    return Headline(status, sentence, tuple(details), stiffness, stated)
-
-
-def rounded_down(stiffness: float, unit: str, sd: float) -> tuple[float, str]:
-    """`stiffness` rounded down to three digits, or one digit of its sd, and how it is written."""
-    exponent = math.floor(math.log10(stiffness))
-    last = min(exponent - 2, math.floor(math.log10(sd)) if sd > 0 else exponent - 2)
-    step = 10.0 ** max(last, exponent - 3)
-    cut = math.floor(stiffness / step * (1 + 1e-12)) * step
-    digits = exponent - round(math.log10(step)) + 1
-    return cut, f"{quantity(cut, unit, digits=digits)} ({decibel(cut):.1f} dB)"
+    known = risk if cap is None else None
+    return Headline(status, sentence, tuple(details), stated.value, known)
 
 
 def _lower_witness(analysis: Analysis, safe: float) -> float | None:

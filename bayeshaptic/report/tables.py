@@ -21,6 +21,7 @@ from bayeshaptic.quantities import (
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
+from bayeshaptic.report.numbers.rounded import rounded_down
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 
@@ -43,7 +44,7 @@ def parameters(result: Result) -> tuple[ParameterRow, ...]:
     for i, (name, found) in enumerate(posterior.summary().items()):
         row = scale((found["q50"], found["q95"]), found["unit"])
         value, sd = float(fit.theta[i]), finite(fit.sd[i])
-        low, high = (row.number(found[q], found["sd"]) for q in ("q05", "q95"))
+        low, high = (row.number(found[q], found["sd"], least=0) for q in ("q05", "q95"))
         remarks = [_OUTCOMES.get(fit.outcome.get(name, ""), "")]
         if found["prior_dominated"]:
             remarks.append("the prior decides this one")
@@ -97,21 +98,23 @@ def limit(analysis: Analysis) -> Rows:
 
 
 def safe(analysis: Analysis) -> Rows:
-    """The stiffness at each risk: (risk, stiffness, dB), and at the tip where there is a lever."""
+    """The stiffness at each risk: (risk, stiffness, dB), and at the tip where there is a lever.
+
+    Rounded down, as in the sentence that leads the page.
+    """
     limit, tip = analysis.limit, tip_limit(analysis)
-    # Digits by the standard deviation: these are ends of the distribution, to be acted on.
-    sd = (limit.quantile(0.95) - limit.quantile(0.05)) / 3.29
-    share = sd / limit.quantile(0.5)
+    ends = (limit.quantile(0.05), limit.quantile(0.95))
     shown: dict[tuple[str, ...], list[float]] = {}
     for risk in RISKS:
         found = limit.safe(risk)
         if found is None:
-            row = ["too few draws to say", _DASH]
+            row = ["too few draws to say", _DASH, _DASH]
         else:
-            row = [_known_to(found, limit.unit, share), _db(found)]
-        if tip is not None:
-            there = None if found is None else tip.safe(risk)
-            row.append(_DASH if there is None else _known_to(there, tip.unit, share))
+            stated = rounded_down(found, limit.unit, *ends)
+            row = [stated.text, _db(stated.value)]
+            if tip is not None and analysis.lever_m is not None:
+                row.append(rounded_down(stated.value, tip.unit, *ends, analysis.lever_m).text)
+        row = row[: 2 if tip is None else 3]
         shown.setdefault(tuple(row), []).append(risk)
     # Risks that are one number to the digits shown are said once.
     return tuple((percents(risks), *row) for row, risks in shown.items())
@@ -198,12 +201,6 @@ def _scaled(
     if spread is None and known:
         spread = spread_of(min(known), max(known))
     return tuple(_DASH if v is None else row.quantity(v, spread) for v in values)
-
-
-def _known_to(value: float, unit: str, share: float) -> str:
-    """A stiffness by its relative standard deviation; four digits where that is none."""
-    sd = value * share if np.isfinite(share) else None
-    return quantity(value, unit, sd, digits=4)
 
 
 def _db(stiffness: float) -> str:

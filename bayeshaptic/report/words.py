@@ -6,13 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import binom
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.quantities import estimate, interval, percent, pure, quantity
 from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
-from bayeshaptic.report.numbers.octaves import third_octaves
+from bayeshaptic.report.numbers.octaves import EXPECTED, third_octaves
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 
 if TYPE_CHECKING:
@@ -61,10 +62,12 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
             "noise: what was found in it stands under What the model lacked."
         )
     if outside.any():
+        by_chance = float(binom.sf(outside.sum() - 1, len(outside), 1 - EXPECTED[1]))
         return (
             f"Overall the residual is no larger than the noise ({chi}), but {outside.sum()} of "
             f"{len(outside)} third octaves {'lies' if outside.sum() == 1 else 'lie'} above what "
-            f"99 % of pure noise stays below; the highest is {place}."
+            f"99.5 % of pure noise stays below; the highest is {place}. By chance that happens in "
+            f"{percent(by_chance)} of recordings."
         )
     if residual_is_noticed(analysis):
         return (
@@ -73,7 +76,7 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
         )
     return (
         f"The residual is what pure noise would leave ({chi}): all {len(outside)} third octaves "
-        "lie below the level that 99 % of pure noise stays below."
+        "lie below the level that 99.5 % of pure noise stays below."
     )
 
 

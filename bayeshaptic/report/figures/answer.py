@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
@@ -67,10 +68,17 @@ def draw_on(axes: Axes, result: Result, narrow: bool = False) -> None:
         )
     spread = spread_of(rows[0].low or 0.0, rows[0].high or 0.0) if rows else None
     names, numbers = [w.label for w in rows], [_number(w, unit, spread) for w in rows]
+    level_rows(axes, names, numbers, narrow)
+
+
+def level_rows(axes: Axes, names: Sequence[str], numbers: Sequence[str], narrow: bool) -> None:
+    """Names of rows of levels in dB at the left, their numbers at the right or, narrow, under them.
+
+    The axis is at least 1 dB long.
+    """
     if narrow:
-        both = zip(names, numbers, strict=True)
-        names, numbers = [f"{name}\n{number}" for name, number in both], []
-    style.rows(axes, names, numbers)
+        names = [f"{name}\n{number}" for name, number in zip(names, numbers, strict=True)]
+    style.rows(axes, names, () if narrow else numbers)
     low, high = axes.get_xlim()
     narrowest_db = 1.0
     if high - low < narrowest_db:

@@ -129,7 +129,7 @@ def _marks(
             "markersize": 6.5,
             "zorder": 5,
         }
-        label = f"{hz:.4g} Hz: {quantity(stiffness, unit)}"
+        label = f"{quantity(hz, 'Hz')}: {quantity(stiffness, unit)}"
         top.plot([hz], [stiffness * row.factor], MARKERS[number], label=label, **look)
         bottom.plot([hz], [0], MARKERS[number], **look)
 

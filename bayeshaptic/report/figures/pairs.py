@@ -142,11 +142,14 @@ def _map(figure: Figure, matrix: NDArray[Any], names: tuple[str, ...]) -> None:
     axes.set_yticks(marks, names, fontsize=style.SMALL - 0.5)
     axes.tick_params(length=0)
     axes.set_title("rank correlation × 10, all parameters", fontsize=style.SMALL + 0.5)
+    dark = 0.85  # from which black on the colour cannot be read
     for i in marks:
         for j in range(i):
             text = f"{10 * matrix[i, j]:.0f}".replace("-0", "0").replace("-", "\N{MINUS SIGN}")
-            axes.text(j, i, text, ha="center", va="center", fontsize=style.SMALL - 1.5)
-            axes.text(i, j, text, ha="center", va="center", fontsize=style.SMALL - 1.5)
+            look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": style.SMALL - 1.5}
+            look["color"] = "white" if abs(matrix[i, j]) > dark else style.DATA
+            axes.text(j, i, text, **look)
+            axes.text(i, j, text, **look)
 
 
 def _turned(x: NDArray[Any], y: NDArray[Any]) -> tuple[NDArray[Any], Callable[[Any], NDArray[Any]]]:

@@ -23,6 +23,7 @@ _DB = 20 / np.log(10)
 _NAMED = 0.05  # shares that a sentence names
 _HARDLY = 0.9  # of the width: a further recording that leaves more is not worth making
 _FLAT = 0.02  # relative change that is none
+_DOUBT = "The model is in doubt by what was found, what could hide, or what is unexplained."
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,12 @@ def _lead(shares: VarianceShares) -> str:
     named = [share for share in shares.shares if share.share >= _NAMED][:most]
     parts = [f"{_name(share)} ({percent(round(share.share, 2))})" for share in named]
     if shares.beyond >= _NAMED:
-        parts.append(f"effects and what is unexplained ({percent(round(shares.beyond, 2))})")
+        parts.append(f"doubt about the model ({percent(round(shares.beyond, 2))})")
     spread = f"± {pure(_DB * shares.log_sd, 2)} dB (one standard deviation)"
     if not parts:
         return f"The critical stiffness is known to {spread}. No parameter stands out in that."
-    return f"The critical stiffness is known to {spread}. That comes from {_listed(parts)}."
+    text = f"The critical stiffness is known to {spread}. That comes from {_listed(parts)}."
+    return f"{text} {_DOUBT}" if shares.beyond >= _NAMED else text
 
 
 def _all_of(share: float) -> str:
@@ -179,9 +181,9 @@ def _next(shares: VarianceShares, experiments: Sequence[Experiment]) -> str:
     after = pure(spread * _narrowed(shares, best), 2)
     if _narrowed(shares, best) > _HARDLY:
         return (
-            "No further recording of this kind would narrow K_CR by much: "
-            f"{_all_of(shares.beyond)} its variance comes from effects and what is unexplained, "
-            "and more of the same data do not change that."
+            "No further recording of this kind would tell much more of K_CR: "
+            f"{_all_of(shares.beyond)} its variance is doubt about the model, and not about its "
+            "parameters."
         )
     text = (
         f"Of the further recordings below, each as long as this one, {best.title} would narrow "

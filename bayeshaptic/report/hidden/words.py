@@ -5,7 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import percent, quantity, spread_of
-from bayeshaptic.report.numbers.hidden import FEW, db, interval_of, reach, size, strength
+from bayeshaptic.report.numbers.hidden import (
+    FEW,
+    interval_of,
+    moves,
+    reach,
+    size,
+    strength,
+)
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -37,20 +44,20 @@ def lead(analysis: Analysis, hidden: Hidden) -> str:
     return (
         f"If the model is exact, the critical stiffness is {declared}. No device is exactly its "
         f"model: what the tests of this recording cannot see may still move the limit. {allowed} "
-        "All of this page is of the limit with that allowed for. The model is exact with a "
-        f"probability of {percent(hidden.nothing)}."
+        "All of this page is of the limit with that allowed for. With a probability of "
+        f"{percent(hidden.nothing)} nothing hides."
     )
 
 
 def largest(hidden: Hidden) -> str:
-    """The effect that lowers the limit most, and what would rule it out."""
+    """The effect that counts most, and what would rule it out."""
     first = next(iter(hidden.effects), None)
     if first is None or reach(first) < FEW:
         return "Nothing that could hide here would move the limit by more than 0.005 dB."
     return (
-        f"What could move it most: {first.title}. It is there with a probability of "
+        f"What counts most: {first.title}. It is there with a probability of "
         f"{percent(first.probability)}, and then it is {size(first)} and moves the limit by "
-        f"{db(first.shift_db[0])} to {db(first.shift_db[2])} dB. To rule it out, "
+        f"{moves(first)}. To rule it out, "
         f"{ruled_out(first)}. A longer recording, or one with more force, shrinks all of them."
     )
 
@@ -71,7 +78,7 @@ def rows(hidden: Hidden) -> Rows:
             percent(effect.probability),
             strength(effect),
             effect.what,
-            f"{db(effect.shift_db[0])} to {db(effect.shift_db[2])}",
+            moves(effect).removesuffix(" dB"),
         )
         for effect in hidden.effects
     )

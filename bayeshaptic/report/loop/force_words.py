@@ -105,10 +105,16 @@ def motion(found: InLoop, recording: Recording) -> str:
     text = (
         "One mass with viscous and dry friction, a constant force and a delay, simulated in the "
         f"same loop, stays within {quantity(found.motion.error_rms, unit)} rms of the measured "
-        f"motion over {way}. A force that changes along the way and with the direction, "
-        f"{quantity(found.motion.uneven_rms, force)} rms, was fitted with it: how much of it is "
-        "friction or constant force cannot be told, which widens both."
+        f"motion over {way}."
     )
+    rms = float(np.sqrt(np.mean(np.square(recording.force))))
+    worth_naming = 1e-4  # of the force
+    if found.motion.uneven_rms > worth_naming * rms:
+        text += (
+            " A force that changes along the way and with the direction, "
+            f"{quantity(found.motion.uneven_rms, force)} rms, was fitted with it: how much of it "
+            "is friction or constant force cannot be told, which widens both."
+        )
     if not found.halves:
         return text
     return (
@@ -132,16 +138,17 @@ def halves(found: InLoop, analysis: Analysis) -> Rows:
         if name not in analysis.model.names:
             continue
         fits = (found.motion, *found.halves)
-        row = scale(float(fits[0].values[index]), analysis.model.unit(name))
+        first = fits[0]
+        row = scale((float(first.values[index]), float(first.sd[index])), analysis.model.unit(name))
         cells = []
         for fit in fits:
             value, sd = float(fit.values[index]), float(fit.sd[index])
-            cells.append(f"{row.number(value, sd)} ± {row.number(sd, sd)} {row.unit}".rstrip())
+            cells.append(f"{row.with_error(value, sd)} {row.unit}".rstrip())
         rows.append((analysis.model.parameter(name).title, *cells))
     return tuple(rows)
 
 
 def _value(found: InverseDynamics, name: str, unit: str) -> str:
     value, sd = found[name]
-    row = scale(value, unit)
-    return f"{row.number(value, sd)} ± {row.number(sd, sd)} {row.unit}".rstrip()
+    row = scale((value, sd), unit)
+    return f"{row.with_error(value, sd)} {row.unit}".rstrip()

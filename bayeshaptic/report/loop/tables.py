@@ -20,6 +20,16 @@ if TYPE_CHECKING:
 
 _DASH = "\N{EN DASH}"
 _SHOWN = 8
+# Of tests whose statistic is no number of standard deviations.
+_UNITS = {
+    "excess noise": ", dB",
+    "quantisation": ", over the declared",
+    "position_clipping": ", errors of the prediction",
+    "held_samples": ", samples",
+    "dropped_samples": ", rows",
+    "wild_samples": ", samples",
+    "mains_tone": ", \N{MINUS SIGN}log10 of its chance",
+}
 
 
 @dataclass(frozen=True)
@@ -107,7 +117,7 @@ def outcomes(closed: Closed) -> Rows:
     later = {test.name: test for test in closed.traced.after}
     return tuple(
         (
-            question(test),
+            f"{question(test)}{_UNITS.get(test.name, '')}",
             test.family,
             *_outcome(test),
             *(_outcome(later.get(test.name)) if closed.effects else ()),
@@ -204,7 +214,7 @@ def _score(value: float) -> str:
     """One decimal where the number is small, none where it is large."""
     if not math.isfinite(value):
         return _DASH
-    text = f"{value:,.1f}" if abs(value) < 99.95 else f"{value:,.0f}"
+    text = f"{value + 0.0:,.1f}" if abs(value) < 99.95 else f"{value:,.0f}"
     return text.replace("-", "\N{MINUS SIGN}")
 
 

@@ -22,13 +22,12 @@ def in_short(analysis: Analysis) -> str:
         return ""
     first = next(iter(hidden.effects), None)
     declared = interval_of(hidden.declared)
-    text = "is allowed for, and leaves the interval as it is"
+    text = "allowed for; it leaves the interval as it is"
     if declared != interval_of(analysis.limit):
-        text = f"is allowed for: without it the limit would be {declared}"
+        text = f"allowed for; if the model were exact, the limit would be {declared}"
     if first is None or reach(first) < FEW:
         return text
-    shift = min(first.shift_db[0], 0.0) if first.shift_db[0] < 0 else first.shift_db[2]
-    return f"{text}. It is mostly: {first.title}, {size(first)} of it ({db(shift)} dB)"
+    return f"{text}. What counts most: {first.title}, {size(first)} ({moves(first)})"
 
 
 def interval_of(limit: CriticalStiffness) -> str:
@@ -42,6 +41,11 @@ def interval_of(limit: CriticalStiffness) -> str:
 def reach(effect: HiddenEffect) -> float:
     """How far it could move the limit, dB."""
     return max(abs(shift) for shift in effect.shift_db)
+
+
+def moves(effect: HiddenEffect) -> str:
+    """What it does to the limit, if it is there: 90 % interval."""
+    return f"{db(effect.shift_db[0])} to {db(effect.shift_db[2])} dB"
 
 
 def size(effect: HiddenEffect) -> str:

@@ -24,9 +24,11 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 _UNIT = r"(?:%|dB|kg|[kMmn\N{MICRO SIGN}]?(?:N|Hz|s|m|g|A))(?:\W|$)"
-# Between a number and its unit, and in a unit of several parts as in "8.50 mN m s/rad".
-_BEFORE_UNIT = re.compile(
-    rf"(?<=\d) (?={_UNIT})|(?<=N) (?=m\b)|(?<=N) (?=s\b)|(?<=N m) (?=s\b)|(?<=g) (?=m²)"
+# Around the sign of an error, between a number and its unit, and in a unit of several parts as in
+# "8.50 mN m s/rad".
+_NO_BREAK = re.compile(
+    rf"(?<=\d) (?=\xb1 \d)|(?<=\xb1) (?=\d)|(?<=\d) (?={_UNIT})|(?<=N) (?=m\b)|(?<=N) (?=s\b)"
+    r"|(?<=N m) (?=s\b)|(?<=g) (?=m²)"
 )
 _TEXT = re.compile(
     r"(<(?:style|script|svg|pre|code|title)\b.*?</(?:style|script|svg|pre|code|title)>|<[^>]*>)",
@@ -96,8 +98,8 @@ def with_contents(page: str, contents: Sequence[tuple[str, str]]) -> str:
 
 
 def unbroken(text: str) -> str:
-    """A number and its unit stay on one line."""
-    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
+    """A number stays on one line with its error and its unit."""
+    return _NO_BREAK.sub("\N{NO-BREAK SPACE}", text)
 
 
 def embedded(name: str, drawn: Drawn, words: str) -> EmbeddedPicture:

@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import percent, quantity
-from bayeshaptic.report.headline import Headline, headline, rounded_down
+from bayeshaptic.report.headline import Headline, headline
 from bayeshaptic.report.numbers.cases import is_free
-from bayeshaptic.report.study.words import Z90, missing
+from bayeshaptic.report.numbers.rounded import rounded_down
+from bayeshaptic.report.study.words import missing
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:
@@ -55,18 +56,19 @@ def study_headline(study: StudyAnalysis) -> Headline:
 
 def _recommended(study: StudyAnalysis, risk: float, safe: float) -> Headline:
     assert study.limit is not None
-    low, high = study.limit.quantile([0.05, 0.95])
-    sd = (high - low) / Z90
-    stiffness, shown = rounded_down(safe, study.limit.unit, sd)
+    low, high = (float(end) for end in study.limit.quantile([0.05, 0.95]))
+    stated = rounded_down(safe, study.limit.unit, low, high)
     sentence = (
-        f"Render walls of at most {shown}: the risk that the loop is unstable there is "
+        f"Render walls of at most {stated.with_level}: the risk that the loop is unstable there is "
         f"{percent(risk)}, {_scope(study)}."
     )
     details = [what_binds(study)]
     lever = study.device.lever_m
     if lever and study.limit.unit == "N m/rad":
-        _, tip = rounded_down(stiffness / lever**2, "N/m", sd / lever**2)
-        details.append(f"At the tip, {quantity(lever, 'm')} from the axis, that is {tip}.")
+        tip = rounded_down(stated.value, "N/m", low, high, lever)
+        details.append(
+            f"At the tip, {quantity(lever, 'm')} from the axis, that is {tip.with_level}."
+        )
     lacking = missing(study)
     warned = [n.text for n in study.notices if n.level == "warning"]
     if warned:
@@ -74,7 +76,7 @@ def _recommended(study: StudyAnalysis, risk: float, safe: float) -> Headline:
     if lacking:
         details.append("What this study does not say: " + " ".join(lacking))
     status = "caution" if warned or study.failed else "safe"
-    return Headline(status, sentence, tuple(details), stiffness, risk)
+    return Headline(status, sentence, tuple(details), stated.value, risk)
 
 
 def untrusted(recordings: Iterable[Analysed]) -> tuple[Analysed, ...]:

@@ -11,6 +11,7 @@ from bayeshaptic.quantities import interval, percent, pure, quantity, scale
 from bayeshaptic.report.numbers.cases import has_draws, raw_limits
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel
 from bayeshaptic.report.numbers.hidden import amount
+from bayeshaptic.report.numbers.rounded import Rounded, rounded_down
 from bayeshaptic.report.numbers.rows import Rows
 from bayeshaptic.report.numbers.titles import title_of
 from bayeshaptic.report.study.words import spread_db
@@ -18,7 +19,8 @@ from bayeshaptic.stability.tail import ENOUGH_BELOW
 
 if TYPE_CHECKING:
     from bayeshaptic.inference.population.population import Population
-    from bayeshaptic.stability.cases import Case
+    from bayeshaptic.stability.cases import Case, DeviceLimit
+    from bayeshaptic.stability.critical import CriticalStiffness
     from bayeshaptic.study.analysed import Analysed
     from bayeshaptic.study.analysis import StudyAnalysis
 
@@ -105,17 +107,23 @@ def _recording(one: Analysed) -> tuple[str, ...]:
 def safe(study: StudyAnalysis) -> Rows:
     """The stiffness at each risk: (risk, over all cases, dB, a person not yet seen)."""
     assert study.limit is not None
-    unit = study.limit.unit
+    limits: list[DeviceLimit | CriticalStiffness] = [study.limit]
+    limits += [case.limit for case in study.new_person[:1]]
     rows = []
     for risk in RISKS:
-        value = study.limit.safe(risk)
-        row = [percent(risk), "not stated" if value is None else _four(value, unit)]
-        row.append(_DASH if not value else f"{decibel(value):.2f}")
-        if study.new_person:
-            person = study.new_person[0].limit.safe(risk)
-            row.append(_DASH if person is None else _four(person, unit))
-        rows.append(tuple(row))
+        found = [_stated(limit, risk) for limit in limits]
+        value = 0.0 if found[0] is None else found[0].value
+        level = f"{decibel(value):.2f}" if 0 < value < np.inf else _DASH
+        texts = ["not stated" if one is None else one.text for one in found]
+        rows.append((percent(risk), texts[0], level, *texts[1:]))
     return tuple(rows)
+
+
+def _stated(limit: DeviceLimit | CriticalStiffness, risk: float) -> Rounded | None:
+    """The stiffness at a risk, rounded down; None where the draws are too few."""
+    value = limit.safe(risk)
+    low, high = (float(end) for end in limit.quantile([0.05, 0.95]))
+    return None if value is None else rounded_down(value, limit.unit, low, high)
 
 
 def unstated(study: StudyAnalysis) -> str:
@@ -223,7 +231,3 @@ def provenance(study: StudyAnalysis) -> Rows:
     """Where this comes from: (what, value)."""
     seconds = sum(study.seconds.values())
     return (("Took", f"{seconds:.0f} s"),)
-
-
-def _four(value: float, unit: str) -> str:
-    return quantity(value, unit, digits=4)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import Scale, percent, percents, pure, quantity, scale
+from bayeshaptic.report.numbers.rounded import rounded_down
+from bayeshaptic.stability.tail import quantiles
 
 if TYPE_CHECKING:
     from bayeshaptic.report.numbers.rules import Rules
@@ -107,9 +109,10 @@ def _lead(table: LimitTable) -> tuple[str, ...]:
     if risk is None or stiffness is None:
         return ("The draws are too few to state a stiffness at a small risk.",)
     where = "" if len(table.cases) == 1 else f" in all {len(table.cases)} cases"
+    low, high = (float(end) for end in quantiles(table.samples, (0.05, 0.95)))
     first = (
         f"A wall without damping is stable{where} with a probability of {percent(1 - risk)} up to "
-        f"{quantity(stiffness, table.unit, digits=4)}."
+        f"{rounded_down(stiffness, table.unit, low, high).text}."
     )
     told = [(part, part.width(risk)) for part in table.filters]
     parts = [_gain(part, width, stiffness, table) for part, width in told if width is not None]

@@ -45,7 +45,7 @@ def labels(shares: VarianceShares) -> list[tuple[str, float]]:
     """Every bar: its name and share, what is beyond the parameters last."""
     rows = [(_together(share.names), share.share) for share in shares.shares[:SHOWN]]
     if shares.beyond > 0.005:
-        rows.append(("effects, unexplained", shares.beyond))
+        rows.append(("doubt about the model", shares.beyond))
     return rows
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import estimate
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.answer import level_rows
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
 
 if TYPE_CHECKING:
@@ -61,10 +62,10 @@ def draw(closed: Closed) -> Figure:
     return figure
 
 
-def draw_on(axes: Axes, closed: Closed) -> None:
-    """The same on axes that are there."""
+def draw_on(axes: Axes, closed: Closed, narrow: bool = False) -> None:
+    """The same on axes that are there; the numbers under the names where it is narrow."""
     shown, unit = rows(closed), closed.analysis.limit.unit
-    style.panel(axes, f"critical stiffness, dB re 1 {unit}")
+    style.panel(axes, f"dB re 1 {unit}" if narrow else f"critical stiffness, dB re 1 {unit}")
     axes.grid(False, axis="y")
     for place, row in enumerate(shown):
         middle = decibel(row.middle)
@@ -81,13 +82,7 @@ def draw_on(axes: Axes, closed: Closed) -> None:
             capsize=3,
         )
     numbers = [estimate(row.middle, row.low, row.high, unit) for row in shown]
-    style.rows(axes, [row.label for row in shown], numbers)
-    low, high = axes.get_xlim()
-    narrowest_db = 1.0
-    if high - low < narrowest_db:
-        centre = 0.5 * (low + high)
-        axes.set_xlim(centre - narrowest_db / 2, centre + narrowest_db / 2)
-    axes.ticklabel_format(axis="x", useOffset=False)
+    level_rows(axes, [row.label for row in shown], numbers, narrow)
 
 
 def _model(label: str, analysis: Analysis, colour: str) -> list[Row]:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from bayeshaptic.quantities import percent, scale
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.hover import Reading, note
+from bayeshaptic.report.numbers.rounded import rounded_down
+from bayeshaptic.stability.tail import quantiles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,6 +122,7 @@ def _percentages(axes: Axes) -> None:
 
 
 def _marks(axes: Axes, table: LimitTable, factor: float) -> None:
+    low, high = (float(end) for end in quantiles(table.samples, (0.05, 0.95)))
     for risk, stiffness in zip(table.risks, table.stiffness, strict=True):
         if stiffness is not None:
             axes.plot(
@@ -129,7 +132,7 @@ def _marks(axes: Axes, table: LimitTable, factor: float) -> None:
                 color=style.OTHER,
                 markersize=4.5,
                 zorder=6,
-                label=f"{stiffness * factor:.4g} at {percent(risk)}",
+                label=f"{rounded_down(stiffness, table.unit, low, high).text} at {percent(risk)}",
             )
     if any(value is not None for value in table.stiffness):
         style.legend(axes, loc="lower right", handlelength=1.0)
