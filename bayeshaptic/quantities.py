@@ -117,6 +117,55 @@ def estimate(middle: float, low: float, high: float, unit: str) -> str:
     return f"{numbers[0]} ({numbers[1]} to {numbers[2]}) {row.unit}".rstrip()
 
 
+@dataclass(frozen=True)
+class Rounded:
+    """A stiffness rounded down.
+
+    Attributes
+    ----------
+    value : float
+    text : str
+        With its unit: ``"11.3 N m/rad"``.
+    """
+
+    value: float
+    text: str
+
+    @property
+    def with_level(self) -> str:
+        """As in ``"11.3 N m/rad (21.1 dB)"``."""
+        level = 20 * math.log10(self.value) if self.value > 0 else -math.inf
+        return f"{self.text} ({level:.1f} dB)"
+
+
+def rounded_down(
+    stiffness: float, unit: str, low: float, high: float, lever_m: float = 1.0
+) -> Rounded:
+    """Three digits of a stiffness, or four where the limit is known to the fourth.
+
+    Parameters
+    ----------
+    stiffness : float
+        Infinite ones, and those that are not positive, stay as they are.
+    unit : str
+        Of what is written.
+    low, high : float
+        5 and 95 per cent quantile of the limit, whose standard deviation decides the digits.
+    lever_m : float
+        Of a rotational stiffness that is wanted at the tip.
+    """
+    stiffness, low, high = (value / lever_m**2 for value in (stiffness, low, high))
+    if not (math.isfinite(stiffness) and stiffness > 0):
+        return Rounded(stiffness, quantity(stiffness, unit))
+    width = 3.29  # of a normal 90 % interval, in standard deviations
+    sd = (high - low) / width
+    exponent = math.floor(math.log10(stiffness))
+    known = math.floor(math.log10(sd)) if 0 < sd < math.inf else exponent - 2
+    step = 10.0 ** max(min(exponent - 2, known), exponent - 3)
+    cut = math.floor(stiffness / step * (1 + 1e-12)) * step
+    return Rounded(cut, quantity(cut, unit, digits=exponent - round(math.log10(step)) + 1))
+
+
 def pure(value: float, digits: int = 3) -> str:
     """A number without a unit and without powers of ten: ``"10,400"``, ``"0.957"``."""
     if not math.isfinite(value):

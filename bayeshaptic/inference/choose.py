@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.hand import from_a_hand
 from bayeshaptic.numerics.gauss_newton import minimise
+from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.shown import Shown
+from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
 
@@ -88,8 +90,31 @@ class Choice(Shown):
         )
 
     def _lines(self) -> tuple[str, ...]:
-        others = ", ".join(name for name in self.candidates if name != self.fit.model.name)
-        return f"Chosen model: {self.fit.model.name}", self.reason, f"compared with: {others}"
+        chosen = self.fit.model.name
+        worse = ", ".join(
+            f"{name} {pure(other.score - self.candidates[chosen].score)}"
+            for name, other in self.candidates.items()
+            if name != chosen
+        )
+        return (
+            f"Chosen model: {chosen}",
+            f"reduced chi-square {pure(self.fit.reduced_chi_square)}, where 1 is pure noise",
+            f"an information criterion (BIC) is worse by: {worse or 'nothing else was tried'}",
+        )
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a model: parameters, reduced chi-square, score."""
+        rows = (
+            {
+                "model": name,
+                "held": one.held,
+                "parameters": one.fit.model.size,
+                "reduced_chi_square": one.fit.reduced_chi_square,
+                "score": one.score,
+            }
+            for name, one in self.candidates.items()
+        )
+        return data_frame(rows, "model")
 
 
 @at_the_door
@@ -233,9 +258,9 @@ def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: 
     chosen = candidates[best].fit
     said = ""
     if held is not None:
-        said = "The study says that somebody held it. " if held else "The study names no user. "
+        said = "Somebody holds it, as was said. " if held else "Nobody holds it, as was said. "
     text = (
-        f"{said}Chosen: {best} ({_WORDS[best]}, {chosen.model.size} parameters), "
+        f"{said}Best by itself: {best} ({_WORDS[best]}, {chosen.model.size} parameters), "
         f"reduced chi-square {_plain(chosen.reduced_chi_square)}."
     )
     for name, other in candidates.items():

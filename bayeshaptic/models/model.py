@@ -17,7 +17,7 @@ from bayeshaptic.models.parameter import Parameter, unit_of
 from bayeshaptic.models.prior import Prior
 from bayeshaptic.models.response.system import Complexes, Floats, LinearSystem
 from bayeshaptic.models.structures import Structure
-from bayeshaptic.quantities import quantity
+from bayeshaptic.quantities import pretty_unit, quantity
 from bayeshaptic.shown import Shown, listed
 
 if TYPE_CHECKING:
@@ -271,6 +271,6 @@ class Model(Shown):
         return (
             f"Model {self.name}{added}: {self.structure.title}",
             f"{self.size} parameters: {listed(self.names, 12)}",
-            f"force in {self.force_unit}, position in {self.position_unit}; period {period}, delay "
-            f"{known}",
+            f"force in {pretty_unit(self.force_unit)}, position in {self.position_unit}; "
+            f"period {period}, delay {known}",
         )

@@ -16,6 +16,7 @@ from scipy.special import ndtr, ndtri
 
 from bayeshaptic.arguments import check_fields
 from bayeshaptic.errors import InputError
+from bayeshaptic.quantities import quantity, scale
 from bayeshaptic.types import Floats
 
 _LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
@@ -113,7 +114,8 @@ class LogNormal(_ByTerms):
         return self.median * np.exp(self.log_sd * ndtri(np.asarray(p, float)))
 
     def describe(self, unit: str) -> str:
-        return f"log-normal, median {self.median:.4g} {unit}, factor {np.exp(self.log_sd):.3g} a sd"
+        factor = np.exp(self.log_sd)
+        return f"log-normal, median {quantity(self.median, unit)}, factor {factor:.3g} a sd"
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ class HalfNormal(_ByTerms):
         return self.scale * ndtri(0.5 + 0.5 * np.asarray(p, float))
 
     def describe(self, unit: str) -> str:
-        return f"half-normal from zero, scale {self.scale:.4g} {unit}"
+        return f"half-normal from zero, scale {quantity(self.scale, unit)}"
 
 
 @dataclass(frozen=True)
@@ -182,8 +184,8 @@ class NearZero(_ByTerms):
     def describe(self, unit: str) -> str:
         of = f"x^{self.rise - 1:.3g}" if self.rise else "log-uniform"
         return (
-            f"near zero: {of} from {self.floor:.3g} to {self.scale:.3g} {unit} with soft "
-            "ends, zero included"
+            f"near zero: {of} from {quantity(self.floor, unit)} to {quantity(self.scale, unit)} "
+            "with soft ends, zero included"
         )
 
 
@@ -230,8 +232,9 @@ class Normal(_ByTerms):
         return self.mean + self.sd * ndtri(below + np.asarray(p, float) * (1 - below))
 
     def describe(self, unit: str) -> str:
-        cut = f", not below {self.low:.4g}" if np.isfinite(self.low) else ""
-        return f"normal, {self.mean:.4g} ± {self.sd:.4g} {unit}{cut}"
+        row = scale((self.mean, self.sd), unit)
+        cut = f", not below {quantity(self.low, unit)}" if np.isfinite(self.low) else ""
+        return f"normal, {row.with_error(self.mean, self.sd)} {row.unit}".rstrip() + cut
 
 
 @dataclass(frozen=True)
@@ -259,7 +262,7 @@ class Uniform(_ByTerms):
         return self.low + (self.high - self.low) * np.asarray(p, float)
 
     def describe(self, unit: str) -> str:
-        return f"uniform from {self.low:.4g} to {self.high:.4g} {unit}"
+        return f"uniform from {quantity(self.low, unit)} to {quantity(self.high, unit)}"
 
 
 @dataclass(frozen=True)

@@ -84,6 +84,11 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
             "excitation is removed in each window; what is left over is independent from window to "
             "window."
         )
+    if etfe.through_reference:
+        scatter = (
+            "What the controller followed does not depend on the motion; the response is read "
+            f"through it alone. {scatter}"
+        )
     return (
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
         "extrapolates.",
@@ -107,7 +112,7 @@ def _constancy(closed: Closed | None) -> str:
 def _model(analysis: Analysis, closed: Closed | None) -> str:
     names = [effect.name for effect in analysis.model.effects]
     if closed is not None:
-        names = [effect.title for effect in closed.effects]
+        names = [effect.title for effect in closed.effects if effect.family != "measurement"]
     effects = f"with {' and with '.join(names)}" if names else "no effect has been added to it"
     return f"Model: {analysis.model.structure.title}; {effects}."
 

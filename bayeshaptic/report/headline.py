@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import estimate, percent, pure, quantity
+from bayeshaptic.quantities import estimate, percent, pure, quantity, rounded_down
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
@@ -18,8 +18,7 @@ from bayeshaptic.report.numbers.misfit import (
     misfit_is_faint,
     residual_is_noticed,
 )
-from bayeshaptic.report.numbers.result import tip_limit
-from bayeshaptic.report.numbers.rounded import rounded_down
+from bayeshaptic.report.numbers.result import may_be_held, tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
@@ -133,15 +132,14 @@ def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
             "something is left that is not noise, and what a force that is not linear does in "
             "closed loop is not simulated"
         )
-    choice = analysis.choice
     if analysis.model.held:
         found.append(
             "somebody holds the device, and in closed loop another hand on another device explains "
             "the motion as well"
         )
-    elif choice is not None and any(one.fit.model.held for one in choice.candidates.values()):
+    elif may_be_held(analysis):
         found.append("nobody said whether somebody holds the device, which closed loops hide")
-    if choice is not None and analysis.model.name == "rigid":
+    if analysis.choice is not None and analysis.model.name == "rigid":
         found.append(
             f"nothing moves the force above {quantity(analysis.etfe.band_hz[1], 'Hz')} but noise, "
             "and a vibration mode there may set a lower limit than that of one mass"

@@ -15,13 +15,13 @@ from bayeshaptic.quantities import (
     pretty_unit,
     pure,
     quantity,
+    rounded_down,
     scale,
     spread_of,
 )
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
-from bayeshaptic.report.numbers.rounded import rounded_down
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 
@@ -187,6 +187,8 @@ def measured(analysis: Analysis) -> Rows:
 def _excitation(analysis: Analysis) -> str:
     if has_feedback(analysis.notices):
         return "computed from the motion"
+    if analysis.etfe.through_reference:
+        return "of a controller, read through what it followed"
     lines = analysis.etfe.period_lines
     return "random" if lines is None else f"periodic, {lines} excited lines"
 

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
 
 _DELAY = "delay_s"
+_ALONG = (
+    "That alone is no contradiction: where the phase runs along \N{MINUS SIGN}180 degrees for "
+    "long, the measurement's interval misses the true limit in one recording of four."
+)
 _WIDER = 3.0  # times the model's interval, from which it is worth a word why
 
 
@@ -43,7 +47,7 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
     worst = int(np.argmax(bands.rms))
     hertz = quantity(float(bands.frequency_hz[worst]), "Hz")
     place = f"{pure(bands.rms[worst], 2)} times the noise around {hertz}"
-    chi = f"reduced chi-square {pure(fit.reduced_chi_square)}, where 1 is pure noise"
+    chi = f"reduced chi-square {quantity(fit.reduced_chi_square, '')}, where 1 is pure noise"
     if misfit_is_clear(analysis):
         then = (
             "What was tried stands above; the limit is widened for what is left."
@@ -162,6 +166,8 @@ def _apart(analysis: Analysis, own: Witness) -> str:
     low, high = limit.quantile(0.05), limit.quantile(0.95)
     if min(own.low, low) <= 0:
         return text
+    if not overlap:
+        text += f" {_ALONG}"
     wider = math.log(own.high / own.low) > _WIDER * math.log(high / low)
     return f"{text} {_why_wide(analysis)}" if wider else text
 

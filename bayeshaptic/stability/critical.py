@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.model import Model
-from bayeshaptic.quantities import estimate, percent, quantity
+from bayeshaptic.quantities import estimate, percent, quantity, rounded_down
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
 from bayeshaptic.stability.crossings import find_crossings, rational
@@ -163,7 +163,7 @@ class CriticalStiffness(Shown):
                 f"binds: {binds}",
             )
         safe = [
-            f"{quantity(found, self.unit, digits=4)} at {percent(risk)}"
+            f"{rounded_down(found, self.unit, low, high).text} at {percent(risk)}"
             for risk in (0.05, 0.01, 0.001)
             if (found := self.safe(risk)) is not None
         ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from bayeshaptic.inference.population.reweighting import Reweighted, inside
 from bayeshaptic.inference.population.sampler import LevelChains
 from bayeshaptic.models import Model
 from bayeshaptic.quantities import estimate
-from bayeshaptic.shown import Shown, listed
+from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Floats
 
 
@@ -75,6 +76,17 @@ class Population(Shown):
             f"typical person: {listed(typical, 3)}",
             f"people differ by {listed(spread)}",
         )
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame``, a row a parameter: the typical person, how much people differ."""
+        levels = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+        rows = (
+            {"parameter": name, "unit": self.model.unit(name)}
+            | {f"typical_{q}": np.exp(np.quantile(mean, p)) for q, p in levels.items()}
+            | {f"log_sd_{q}": np.quantile(sd, p) for q, p in levels.items()}
+            for name, mean, sd in zip(self.parameters, self.log_mean.T, self.log_sd.T, strict=True)
+        )
+        return data_frame(rows, "parameter")
 
     @property
     def device_parameters(self) -> tuple[str, ...]:

@@ -176,8 +176,9 @@ def plain(value: float, _: object = None) -> str:
 
 
 def short(name: str) -> str:
-    """A parameter's name on an axis: the delay carries its unit there anyway."""
-    return "delay" if name == "delay_s" else name
+    """A parameter's name in words: ``"delay"`` for delay_s, ``"mode frequency"`` for mode_hz."""
+    without_unit = re.sub(r"_s(?=_|$)", "", name).replace("_hz", "_frequency")
+    return without_unit.replace("_", " ")
 
 
 @dataclass(frozen=True)

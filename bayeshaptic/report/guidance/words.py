@@ -23,7 +23,7 @@ _DB = 20 / np.log(10)
 _NAMED = 0.05  # shares that a sentence names
 _HARDLY = 0.9  # of the width: a further recording that leaves more is not worth making
 _FLAT = 0.02  # relative change that is none
-_DOUBT = "The model is in doubt by what was found, what could hide, or what is unexplained."
+_DOUBT = "Doubt about the model: the error of what was found, what could hide, what is unexplained."
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,9 @@ def _sweep(one: Sweep) -> str:
         text = f"{what} leaves the limit where it is."
     else:
         step = f"{_DB * np.log(end / now):+.1f} dB".replace("-", "\N{MINUS SIGN}")
-        text = f"{what} makes the limit {pure(end / now, 2)} times what it is ({step})."
+        text = (
+            f"{what} makes the limit {quantity(end / now, '', digits=2)} times what it is ({step})."
+        )
     for jump in one.jumps[:2]:
         text += (
             f" Above {one.name} = {quantity(jump.value, one.unit)} the {jump.after} at "

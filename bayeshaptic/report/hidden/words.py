@@ -57,16 +57,15 @@ def largest(hidden: Hidden) -> str:
     return (
         f"What counts most: {first.title}. It is there with a probability of "
         f"{percent(first.probability)}, and then it is {size(first)} and moves the limit by "
-        f"{moves(first)}. To rule it out, "
-        f"{ruled_out(first)}. A longer recording, or one with more force, shrinks all of them."
+        f"{moves(first)}.{ruled_out(first)} A longer recording, or one with more force, "
+        "shrinks it as it does all the others."
     )
 
 
 def ruled_out(effect: HiddenEffect) -> str:
-    """The fact or the recording that would rule an effect out."""
-    if effect.name in _RULED_OUT:
-        return _RULED_OUT[effect.name]
-    return effect.told_apart_by or "record again with more force, and for longer"
+    """The fact or the recording that would rule an effect out; empty where more data would."""
+    how = _RULED_OUT.get(effect.name, effect.told_apart_by)
+    return f" To rule it out, {how}." if how else ""
 
 
 def rows(hidden: Hidden) -> Rows:

@@ -25,9 +25,9 @@ _UNITS = {
     "excess noise": ", dB",
     "quantisation": ", over the declared",
     "position_clipping": ", errors of the prediction",
-    "held_samples": ", samples",
-    "dropped_samples": ", rows",
-    "wild_samples": ", samples",
+    "held_samples": ", count",
+    "dropped_samples": ", count",
+    "wild_samples": ", count",
     "mains_tone": ", \N{MINUS SIGN}log10 of its chance",
 }
 
@@ -100,7 +100,10 @@ def candidates(closed: Closed) -> Rows:
                 fate = "predicts too, but less or with more parameters"
             else:
                 fate = "does not predict" if candidate.score <= 0 else "not accepted"
-            rows.append((str(number), candidate.title, _score(candidate.score), fate))
+            score = _score(candidate.score)
+            if candidate.accepted and number == 0:
+                score, fate = _DASH, "seen in the samples, and mended before the first round"
+            rows.append((str(number), candidate.title, score, fate))
     return tuple(rows)
 
 

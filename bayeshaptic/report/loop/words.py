@@ -69,13 +69,19 @@ def _rest(closed: Closed) -> str:
 
 def lacked(closed: Closed) -> str:
     """What was added and what it changed, in one paragraph."""
-    named = [f"{_with_article(e.title)}{_numbers(closed, e)}" for e in closed.effects]
-    count = sum(_count(effect) for effect in closed.effects)
-    it = "it" if len(named) == 1 else "them"
+    mended, added = _mended_and_added(closed)
+    parts = []
+    for what, effects in (("the recording has", mended), ("the model lacked", added)):
+        named = [f"{_with_article(e.title)}{_numbers(closed, e)}" for e in effects]
+        parts += [f"{what} {' and '.join(named)}"] if named else []
+    text = "; ".join(parts)
+    count = sum(_count(effect) for effect in added)
     size = f" ({count} parameter{'' if count == 1 else 's'})" if count else ""
+    adding = f"adding {'it' if len(added) == 1 else 'them'}{size}"
+    doing = " and ".join((["mending that"] if mended else []) + ([adding] if added else []))
     return (
-        f"The model lacked {' and '.join(named)}; adding {it}{size} {_error_change(closed)}"
-        f"{_noise_change(closed)}; {_limit_change(closed)}."
+        f"{text[0].upper()}{text[1:]}; {doing} {_error_change(closed)}{_noise_change(closed)}; "
+        f"{_limit_change(closed)}."
     )
 
 
@@ -91,9 +97,31 @@ def in_short(closed: Closed) -> str:
         return "The model as declared explains the recording to within its noise."
     if not closed.effects:
         return ""
-    names = " and ".join(_with_article(effect.title) for effect in closed.effects)
-    here = "it is" if len(closed.effects) == 1 else "they are"
-    return f"The model as declared lacked {names}; here {here} in the model. {_moved(closed)}."
+    mended, added = (
+        " and ".join(_with_article(effect.title) for effect in effects)
+        for effects in _mended_and_added(closed)
+    )
+    found = []
+    if mended:
+        found.append(f"The recording has {mended}; here that is mended.")
+    if added:
+        here = "it is" if len(_mended_and_added(closed)[1]) == 1 else "they are"
+        found.append(f"The model as declared lacked {added}; here {here} in the model.")
+    return f"{' '.join(found)} {_moved(closed)}."
+
+
+def _mended_and_added(closed: Closed) -> tuple[list[Accepted], list[Accepted]]:
+    """What was found in the measurement, and in the device."""
+    mended = [effect for effect in closed.effects if effect.family == "measurement"]
+    return mended, [effect for effect in closed.effects if effect not in mended]
+
+
+def subject(closed: Closed) -> str:
+    """What the numbers of a page are of, where something was found."""
+    mended, added = _mended_and_added(closed)
+    if not added:
+        return "the recording with what was found mended"
+    return f"the model with what was found{' in the mended recording' if mended else ''}"
 
 
 def names(closed: Closed) -> str:
@@ -130,7 +158,7 @@ def parameter_words(name: str) -> str:
     """What an estimate that is no parameter of the model is, from its name."""
     if name.endswith(_OVER):
         return f"{name.removesuffix(_OVER)}, last part of the recording over the first"
-    return " ".join(word for word in name.split("_") if word != "hz")
+    return " ".join(word for word in name.split("_") if word not in ("hz", "s"))
 
 
 def shown_estimates(effect: Accepted) -> tuple[str, ...]:
@@ -229,9 +257,10 @@ def _limit_change(closed: Closed) -> str:
     if abs(step) < same_db:
         return f"K_CR stayed at {estimate(new, after['q05'], after['q95'], unit)}"
     row = scale((old, new), unit)
-    gap = abs(new - old) / 20
+    gap = abs(new - old) / 5
+    old_text, new_text = (row.number(value, gap, least=3) for value in (old, new))
     change = f"{step:+.1f} dB".replace("-", "\N{MINUS SIGN}")
-    return f"K_CR moved from {row.number(old, gap)} to {row.number(new, gap)} {row.unit} ({change})"
+    return f"K_CR moved from {old_text} to {new_text} {row.unit} ({change})"
 
 
 def _moved(closed: Closed) -> str:

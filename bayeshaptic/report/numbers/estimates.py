@@ -94,10 +94,11 @@ def correction(result: Result) -> str:
         return ""
     if "time-varying" in families_of(result):
         return "in the worst part of the recording"
-    titles = [e.title for e in closed.effects if e.family in ("nonlinear", "measurement")]
-    if not titles:
+    found = [e for e in closed.effects if e.family in ("nonlinear", "measurement")]
+    if not found:
         return ""
-    return f"after {' and '.join(titles)} was taken off it with the model's help"
+    helped = " with the model's help" if any(e.family == "nonlinear" for e in found) else ""
+    return f"after {' and '.join(e.title for e in found)} was taken off it{helped}"
 
 
 def _measured(result: Result) -> tuple[Witness, ...]:
@@ -110,7 +111,7 @@ def _measured(result: Result) -> tuple[Witness, ...]:
         remark = "the crossing read from the response, no model"
         found.append(Witness("etfe", "measurement alone", remark, middle, low, high))
     mended = own_limit(result.analysis) if changed else None
-    if mended is not None:
+    if mended is not None and (own is None or not np.allclose(mended, own, rtol=1e-3)):
         low, middle, high = mended
         label = "measurement, worst part" if "part of" in changed else "measurement, corrected"
         remark = f"the crossing read from the response {changed}"

@@ -23,6 +23,12 @@ def is_unexplained(result: Result) -> bool:
     return result.closed is not None and result.closed.verdict == UNEXPLAINED
 
 
+def may_be_held(analysis: Analysis) -> bool:
+    """Whether somebody holds the device, or nobody said that nobody does."""
+    tried = {} if analysis.choice is None else analysis.choice.candidates
+    return analysis.model.held or any(one.held for one in tried.values())
+
+
 def tip_limit(analysis: Analysis) -> CriticalStiffness | None:
     """The limit at the tip in N/m; None without a lever arm or without a torque in N m."""
     if analysis.lever_m is None or analysis.limit.unit != "N m/rad":

@@ -36,11 +36,10 @@ def facts(result: Result) -> Rows:
     analysis = result.analysis
     limit, tip = analysis.limit, tip_limit(analysis)
     if (reason := unstated(analysis)) is not None:
-        return (
-            ("Critical stiffness", f"none is stated: {reason}"),
-            ("Model", _model(result)),
-            ("Speaks for", _holder(analysis)),
-        )
+        told = ("Critical stiffness", f"none is stated: {reason}")
+        if not analysis.sampled:
+            return (told,)
+        return (told, ("Model", _model(result)), ("Speaks for", _holder(analysis)))
     doubted = headline(result).status == "untrusted"
     name = "If the model were right" if doubted else "Critical stiffness"
     rows: list[tuple[str, ...]] = [(name, _interval(limit))]
@@ -98,8 +97,9 @@ def _model(result: Result) -> str:
     analysis, closed = result.analysis, result.closed
     structure = analysis.model.structure
     text = f"{structure.name}: {structure.title.partition(', equation')[0]}"
-    if closed is not None and closed.effects:
-        text += f"; with {' and '.join(effect.title for effect in closed.effects)}"
+    added = [] if closed is None else [e.title for e in closed.effects if e.family != "measurement"]
+    if added:
+        text += f"; with {' and '.join(added)}"
     return text
 
 

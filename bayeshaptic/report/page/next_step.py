@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.report.numbers.result import is_unexplained
+from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
 
 if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline
@@ -47,13 +47,16 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
         )
         return again, Step(rigid, f"{command} --model rigid")
     if analysis.etfe.through_reference:
+        again = f"bayeshaptic report NEW.csv{_device(result)}"
+        if analysis.model.held:
+            return (Step("Record in open loop: a force that comes from a table. Then:", again),)
         free = Step("Where nobody holds the device, say so:", f"{command} --held no")
         return (
-            *((free,) if analysis.choice is not None and not analysis.model.held else ()),
+            *((free,) if may_be_held(analysis) else ()),
             Step(
                 "Record again with a reference of white noise that keeps the device moving, or in "
                 "open loop, where friction can be told from the rest. Then:",
-                f"bayeshaptic report NEW.csv{_device(result)}",
+                again,
             ),
         )
     if not analysis.posterior.converged:

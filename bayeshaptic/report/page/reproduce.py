@@ -42,8 +42,10 @@ def reproduce(result: Result, origin: Mapping[str, Any] | None = None) -> Rows:
 def asked(origin: Mapping[str, Any] | None = None) -> Rows:
     """(option, value): everything that was asked for, defaults included."""
     options = (origin or {}).get("options") or {}
-    return tuple((name.replace("_", " "), _written(value)) for name, value in options.items())
+    return tuple((name, _written(value)) for name, value in options.items())
 
 
 def _written(value: Any) -> str:
-    return str(value) if value or value in (0, False) else "not given"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value) if value or value == 0 else "not given"

@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from bayeshaptic.quantities import percent, quantity
+from bayeshaptic.quantities import percent, quantity, rounded_down
 from bayeshaptic.report.headline import Headline, headline
 from bayeshaptic.report.numbers.cases import is_free
-from bayeshaptic.report.numbers.rounded import rounded_down
 from bayeshaptic.report.study.words import missing
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.quantities import interval, percent, pure, quantity, scale
+from bayeshaptic.quantities import Rounded, interval, percent, pure, quantity, rounded_down, scale
 from bayeshaptic.report.numbers.cases import has_draws, raw_limits
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel
 from bayeshaptic.report.numbers.hidden import amount
-from bayeshaptic.report.numbers.rounded import Rounded, rounded_down
 from bayeshaptic.report.numbers.rows import Rows
 from bayeshaptic.report.numbers.titles import title_of
 from bayeshaptic.report.study.words import spread_db

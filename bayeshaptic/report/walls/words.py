@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bayeshaptic.quantities import Scale, percent, percents, pure, quantity, scale
-from bayeshaptic.report.numbers.rounded import rounded_down
+from bayeshaptic.quantities import Scale, percent, percents, pure, quantity, rounded_down, scale
 from bayeshaptic.stability.tail import quantiles
 
 if TYPE_CHECKING:

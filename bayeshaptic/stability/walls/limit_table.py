@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.arguments import at_the_door
-from bayeshaptic.quantities import percent, quantity
+from bayeshaptic.quantities import percent, rounded_down
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.stability.tail import quantiles
 from bayeshaptic.stability.walls.damping import Damping
 from bayeshaptic.stability.walls.filter_limits import FilterLimits, filter_limits
 from bayeshaptic.stability.walls.joint import (
@@ -185,8 +186,9 @@ class LimitTable(Shown):
         )
 
     def _lines(self) -> tuple[str, ...]:
+        low, high = (float(end) for end in quantiles(self.samples, (0.05, 0.95)))
         stated = [
-            f"{quantity(value, self.unit, digits=4)} at {percent(risk)}"
+            f"{rounded_down(value, self.unit, low, high).text} at {percent(risk)}"
             for risk, value in zip(self.risks, self.stiffness, strict=True)
             if value is not None
         ]

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.quantities import percent, scale
+from bayeshaptic.quantities import percent, rounded_down, scale
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.hover import Reading, note
-from bayeshaptic.report.numbers.rounded import rounded_down
 from bayeshaptic.stability.tail import quantiles
 
 if TYPE_CHECKING:
