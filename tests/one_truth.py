@@ -14,7 +14,7 @@ import pytest
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.jobs.index import row_of
-from bayeshaptic.quantities import estimate
+from bayeshaptic.quantities import estimate, rounded_down
 from bayeshaptic.report import write
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, style
 from bayeshaptic.report.headline import headline
@@ -114,6 +114,9 @@ def _the_sentence_is_what_the_files_say(result: Any, page: str, found: Any, limi
         assert said["stiffness"] is None
     elif said["risk"] is not None:
         safe = found["critical_stiffness"]["safe"][f"{said['risk']:g}"]
+        low, high = (found["critical_stiffness"][q] for q in ("q05", "q95"))
+        shown = rounded_down(safe, result.analysis.limit.unit, low, high).text
+        assert shown in head.sentence and len(re.findall(rf"{re.escape(shown)}\b", page)) >= 3
         assert said["stiffness"] <= safe
         assert safe == pytest.approx(said["stiffness"], rel=0.02)
 

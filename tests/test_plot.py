@@ -44,6 +44,19 @@ def test_parameters_are_drawn_by_name() -> None:
         bh.plot.marginals(result(), "mass", ax=left)
 
 
+@pytest.mark.parametrize("name", ["limit", "response", "crossings", "residual"])
+def test_in_a_column_the_legend_stands_below_and_takes_no_width(name: str) -> None:
+    figure = Figure(figsize=(3.5, 4.5), layout="constrained")
+    count = 1 if name == "limit" else 2
+    panels = list(figure.subplots(count, 1, squeeze=False).ravel())
+    getattr(bh.plot, name)(result(), ax=panels[0] if count == 1 else panels)
+    figure.draw_without_rendering()
+    legend = panels[-1].get_legend()
+    assert legend.get_window_extent().y1 < panels[-1].get_window_extent().y0
+    assert panels[-1].get_position().width > 0.7
+    assert [axes.get_legend() for axes in panels[:-1]] == [None] * (count - 1)
+
+
 def test_walls_take_a_table_that_is_there() -> None:
     analysis = fake_analysis("rigid")
     axes = Figure().subplots()

@@ -29,7 +29,7 @@ from bayeshaptic.report.figures.style import Drawn, drawn
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import least_squares_limit, witnesses
 from bayeshaptic.report.numbers.octaves import third_octaves
-from bayeshaptic.report.page.answer import FARED
+from bayeshaptic.report.page.answer import FARED, FARED_HIDDEN
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.methods import bibtex, methods
 from bayeshaptic.report.page.next_step import next_steps
@@ -475,6 +475,8 @@ def test_the_figures_of_interval_coverage_are_those_of_the_benchmarks() -> None:
         assert FARED[verdict][:2] == (int(numbers[-1]), int(numbers[0]))
     clean = re.search(r"\| all \| (\d+) \|.*?\|.*?\| \*\*(\d+) %\*\*", readme)
     assert clean and FARED["consistent"][:2] == (int(clean[2]), int(clean[1]))
+    hidden = re.search(r"\| all \| (\d+) \|(?:[^|*]*\|){3} \*\*(\d+) %\*\*", readme)
+    assert hidden and FARED_HIDDEN == (int(hidden[2]), int(hidden[1]))
 
 
 @pytest.mark.parametrize("case", CASES)

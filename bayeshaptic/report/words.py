@@ -232,8 +232,13 @@ def response_caption(result: Result) -> str:
     """Under the frequency response."""
     text = (
         "Measured response (empirical transfer function estimate) with error bars of two standard "
-        "deviations, and the model's 90 % band. The band is often narrower than the line; the "
-        "third panel shows it enlarged."
+        "deviations"
+    )
+    if not result.analysis.sampled:
+        return f"{text}; feedback biases it."
+    text += (
+        ", and the model's 90 % band. The band is often narrower than the line; the third panel "
+        "shows it enlarged."
     )
     closed = result.closed
     if closed is not None and closed.effects and closed.force is None:

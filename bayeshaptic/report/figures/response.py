@@ -33,22 +33,25 @@ def draw(result: Result) -> Figure:
 
 
 def heights_of(result: Result) -> tuple[float, ...]:
-    """Heights of the panels in inches: the coherence has one where it is known."""
-    known = bool(np.isfinite(result.analysis.etfe.coherence).any())
-    return (2.8, 2.0, 1.7, 1.0) if known else (2.8, 2.0, 1.7)
+    """Heights of the panels in inches: gain, phase, their ratio to the model, the coherence."""
+    analysis = result.analysis
+    coherence = (1.0,) if np.isfinite(analysis.etfe.coherence).any() else ()
+    return (2.8, 2.0, *((1.7,) if analysis.sampled else ()), *coherence)
 
 
 def draw_on(panels: Sequence[Axes], result: Result) -> None:
     """The same on axes that are there: gain and phase, and on further ones the rest."""
     analysis = result.analysis
-    etfe, band = analysis.etfe, response_band(analysis)
+    etfe = analysis.etfe
+    band = response_band(analysis) if analysis.sampled else None
     force = pretty_unit(etfe.force_unit)
     unit = f"{etfe.position_unit}/({force})" if " " in force else f"{etfe.position_unit}/{force}"
     gain = style.panel(panels[0], y=f"gain, dB re 1 {unit}")
     phase = style.panel(panels[1], y="phase, degrees")
-    relative = etfe.relative_sd
-    modelled = np.interp(etfe.frequency_hz, band.frequency_hz, band.phase_deg[1])
-    measured = _near(etfe.phase_deg, modelled)
+    relative, measured = etfe.relative_sd, np.unwrap(etfe.phase_deg, period=360)
+    if band is not None:
+        modelled = np.interp(etfe.frequency_hz, band.frequency_hz, band.phase_deg[1])
+        measured = _near(etfe.phase_deg, modelled)
     # Beyond 100 % the noise has taken over, and a symmetric bar in dB says nothing.
     error = 2 * np.clip(relative / np.sqrt(2), 0.0, 1.0)
     gain_error, phase_error = 20 / np.log(10) * error, np.degrees(error)
@@ -56,10 +59,28 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     points += _points(phase, etfe, measured, phase_error)
     if correction(result):
         style.layer(points, "after")
-    _note(gain, etfe, etfe.gain_db, gain_error, band, band.gain_db, "dB")
-    _note(phase, etfe, measured, phase_error, band, band.phase_deg, "\N{DEGREE SIGN}")
-    for axes, quantiles in ((gain, band.gain_db), (phase, band.phase_deg)):
-        low, middle, high = quantiles
+    _note(gain, etfe, etfe.gain_db, gain_error, band and (band, band.gain_db), "dB")
+    _note(phase, etfe, measured, phase_error, band and (band, band.phase_deg), "\N{DEGREE SIGN}")
+    further = list(panels[2:])
+    if band is not None:
+        _model(gain, phase, band)
+        _before(gain, phase, result, modelled)
+        if further:
+            _difference(further.pop(0), etfe, band, 20 / np.log(10) * error)
+    style.legend(gain, loc="lower left")
+    if further:
+        coherence = style.panel(further[0], y="coherence")
+        coherence.plot(etfe.frequency_hz, etfe.coherence, ".", color=style.DATA, markersize=2.5)
+        coherence.set_ylim(-0.03, 1.05)
+    low_hz, high_hz = etfe.frequency_hz[0], etfe.frequency_hz[-1]
+    for axes in panels:
+        style.frequency_axis(axes, low_hz / 1.05, high_hz * 1.05)
+    panels[-1].set_xlabel("frequency, Hz", fontsize=style.FONT)
+
+
+def _model(gain: Axes, phase: Axes, band: ResponseBand) -> None:
+    """The posterior's response."""
+    for axes, (low, middle, high) in ((gain, band.gain_db), (phase, band.phase_deg)):
         shade = axes.fill_between(
             band.frequency_hz,
             low,
@@ -79,18 +100,6 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
             label="model, posterior median",
         )
         style.layer([shade, *line], "after")
-    _before(gain, phase, result, modelled)
-    style.legend(gain, loc="lower left")
-    if len(panels) > 2:
-        _difference(panels[2], etfe, band, 20 / np.log(10) * error)
-    if len(panels) > 3:
-        coherence = style.panel(panels[3], y="coherence")
-        coherence.plot(etfe.frequency_hz, etfe.coherence, ".", color=style.DATA, markersize=2.5)
-        coherence.set_ylim(-0.03, 1.05)
-    low_hz, high_hz = etfe.frequency_hz[0], etfe.frequency_hz[-1]
-    for axes in panels:
-        style.frequency_axis(axes, low_hz / 1.05, high_hz * 1.05)
-    panels[-1].set_xlabel("frequency, Hz", fontsize=style.FONT)
 
 
 def _before(gain: Axes, phase: Axes, result: Result, modelled: NDArray[Any]) -> None:
@@ -124,18 +133,15 @@ def _note(
     etfe: Etfe,
     value: NDArray[Any],
     error: NDArray[Any],
-    band: ResponseBand,
-    quantiles: tuple[NDArray[Any], ...],
+    model: tuple[ResponseBand, tuple[NDArray[Any], ...]] | None,
     unit: str,
 ) -> None:
     """What was measured at each line beside what the model says there."""
-    low, middle, high = (np.interp(etfe.frequency_hz, band.frequency_hz, q) for q in quantiles)
-    rows = {
-        "measured": (value, unit),
-        "± 2 sd": (error, unit),
-        "model": (middle, unit),
-        "90 %": (np.array([low, high]), unit),
-    }
+    rows = {"measured": (value, unit), "± 2 sd": (error, unit)}
+    if model is not None:
+        band, quantiles = model
+        low, middle, high = (np.interp(etfe.frequency_hz, band.frequency_hz, q) for q in quantiles)
+        rows |= {"model": (middle, unit), "90 %": (np.array([low, high]), unit)}
     note(axes, Reading("frequency", "Hz", etfe.frequency_hz, rows))
 
 

@@ -73,7 +73,7 @@ def _recording(analysis: Analysis) -> Light:
 def _fit(result: Result) -> Light:
     analysis = result.analysis
     if not analysis.sampled:
-        return Light("Fit", DOUBT, "for comparison only", "leftover")
+        return Light("Fit", DOUBT, "none was made", "leftover")
     if analysis.in_loop is not None:
         if analysis.in_loop.doubts:
             return Light("Fit", BAD, "halves disagree", "force")

@@ -59,7 +59,7 @@ def methods(result: Result) -> str:
     if analysis.in_loop is not None:
         return " ".join((_in_loop(analysis), _sampled(analysis), _limit()))
     if not analysis.sampled:
-        return " ".join((*_measured(analysis.etfe), _model(analysis), _sampled(analysis)))
+        return " ".join((*_measured(analysis.etfe), _sampled(analysis)))
     return " ".join(
         (*_measured(analysis.etfe), _model(analysis), _sampled(analysis), *_loop(result), _limit())
     )
