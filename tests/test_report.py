@@ -476,7 +476,7 @@ def test_the_figures_of_interval_coverage_are_those_of_the_benchmarks() -> None:
     clean = re.search(r"\| all \| (\d+) \|.*?\|.*?\| \*\*(\d+) %\*\*", readme)
     assert clean and FARED["consistent"][:2] == (int(clean[2]), int(clean[1]))
     hidden = re.search(r"\| all \| (\d+) \|(?:[^|*]*\|){3} \*\*(\d+) %\*\*", readme)
-    assert hidden and FARED_HIDDEN == (int(hidden[2]), int(hidden[1]))
+    assert hidden and (int(hidden[2]), int(hidden[1])) == FARED_HIDDEN
 
 
 @pytest.mark.parametrize("case", CASES)
