@@ -59,8 +59,16 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     points += _points(phase, etfe, measured, phase_error)
     if correction(result):
         style.layer(points, "after")
-    _note(gain, etfe, etfe.gain_db, gain_error, band and (band, band.gain_db), "dB")
-    _note(phase, etfe, measured, phase_error, band and (band, band.phase_deg), "\N{DEGREE SIGN}")
+    _note(gain, etfe, etfe.gain_db, gain_error, "dB", band, band.gain_db if band else ())
+    _note(
+        phase,
+        etfe,
+        measured,
+        phase_error,
+        "\N{DEGREE SIGN}",
+        band,
+        band.phase_deg if band else (),
+    )
     further = list(panels[2:])
     if band is not None:
         _model(gain, phase, band)
@@ -133,13 +141,13 @@ def _note(
     etfe: Etfe,
     value: NDArray[Any],
     error: NDArray[Any],
-    model: tuple[ResponseBand, tuple[NDArray[Any], ...]] | None,
     unit: str,
+    band: ResponseBand | None,
+    quantiles: tuple[NDArray[Any], ...],
 ) -> None:
     """What was measured at each line beside what the model says there."""
     rows = {"measured": (value, unit), "± 2 sd": (error, unit)}
-    if model is not None:
-        band, quantiles = model
+    if band is not None:
         low, middle, high = (np.interp(etfe.frequency_hz, band.frequency_hz, q) for q in quantiles)
         rows |= {"model": (middle, unit), "90 %": (np.array([low, high]), unit)}
     note(axes, Reading("frequency", "Hz", etfe.frequency_hz, rows))

@@ -47,16 +47,16 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
         )
         return again, Step(rigid, f"{command} --model rigid")
     if analysis.etfe.through_reference:
-        again = f"bayeshaptic report NEW.csv{_device(result)}"
+        new = f"bayeshaptic report NEW.csv{_device(result)}"
         if analysis.model.held:
-            return (Step("Record in open loop: a force that comes from a table. Then:", again),)
+            return (Step("Record in open loop: a force that comes from a table. Then:", new),)
         free = Step("Where nobody holds the device, say so:", f"{command} --held no")
         return (
             *((free,) if may_be_held(analysis) else ()),
             Step(
                 "Record again with a reference of white noise that keeps the device moving, or in "
                 "open loop, where friction can be told from the rest. Then:",
-                again,
+                new,
             ),
         )
     if not analysis.posterior.converged:
