@@ -1,10 +1,13 @@
 """What the rules of acceptance cost and find: each of them left out, and what then changes.
 
     python acceptance.py --clean 24 --each 2 --seconds 20
+    python acceptance.py --reach --each 8 --seconds 20
 
 Of every recording all candidates of all classes are fitted, whether or not a test raises them: so a
 clean recording shows what acceptance alone would let through.  Then the first round is decided with
 all rules, and with one of them left out at a time.  The table is that of docs/statistics.md.
+With --reach, of linear effects: what share of the best candidate's gain after a few steps the right
+one has, and how much of the work other shares than `thresholds.REACH` would save.
 """
 
 from __future__ import annotations
@@ -24,7 +27,9 @@ from blind_recordings import CASES, LISTED, SINGLE, cases_for
 from bayeshaptic.diagnosis import acceptance, thresholds
 from bayeshaptic.diagnosis.loop import trials_for
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.state import CHOOSE, State, Trial, held_out_rms
+from bayeshaptic.diagnosis.state import CHOOSE, FIT, State, Trial, held_out_rms, share
+from bayeshaptic.diagnosis.trials.linear import sieve
+from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import BUDGET_S, RATE, metered
 
 LEFT_OUT = {
@@ -121,6 +126,34 @@ def jobs(clean: int, each: int, seconds: float, seed: int) -> list[Job]:
     return made
 
 
+def reached(job: Job) -> tuple[float, list[float]]:
+    """Gain of the right candidate after a few steps, and of all, as shares of the best one's."""
+    begun = begun_of(job)
+    fit, etfe = begun.fit, begun.etfe
+    windows = fit.windows.part(share(fit.windows, FIT))
+    found = sieve(fit.model, etfe, windows, starting_bases(fit.model, fit.theta, fit.elsewhere))
+    shares = [one.gain / found[0].gain for one in found]
+    right = [s for s, one in zip(shares, found, strict=True) if one.effect.name in named(job)]
+    return max(right, default=0.0), shares
+
+
+def named(job: Job) -> set[str]:
+    """Names of the library that are right for the effect of a recording."""
+    return set(SINGLE[job.effect][1])
+
+
+def reach_table(found: list[tuple[Job, tuple[float, list[float]]]]) -> str:
+    """A row a share: how many of the right candidates are followed, and of all."""
+    lines = ["| followed from | right ones followed | of all candidates |", "| --- | --- | --- |"]
+    every = [share for _, (_, shares) in found for share in shares]
+    for least in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7):
+        right = sum(own >= least for _, (own, _) in found)
+        lines.append(
+            f"| {least} | {right} of {len(found)} | {np.mean(np.array(every) >= least):.0%} |"
+        )
+    return "\n".join(lines)
+
+
 def table(found: list[tuple[Job, dict[str, Decided]]]) -> str:
     """A row a rule: what changes where it is left out."""
     clean = [rounds for job, rounds in found if not job.effect]
@@ -149,10 +182,18 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0, help="of each recording")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seed", type=int, default=40_000)
+    parser.add_argument("--reach", action="store_true", help="of linear effects, what is followed")
     asked = parser.parse_args()
-    todo = jobs(asked.clean, asked.each, asked.seconds, asked.seed)
+    todo = jobs(0 if asked.reach else asked.clean, asked.each, asked.seconds, asked.seed)
     found = []
     with ProcessPoolExecutor(asked.workers) as pool:
+        if asked.reach:
+            linear = [job for job in todo if SINGLE[job.effect][0] == "linear"]
+            shares = list(zip(linear, pool.map(reached, linear), strict=True))
+            for job, (own, _) in shares:
+                print(job, f"{own:.2f}", file=sys.stderr)
+            print(reach_table(shares))
+            return
         for job, rounds in zip(todo, pool.map(decided, todo), strict=True):
             found.append((job, rounds))
             print(job, rounds[""], file=sys.stderr, flush=True)

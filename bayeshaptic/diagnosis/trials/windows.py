@@ -61,7 +61,7 @@ class WindowTrials:
         raised = {test.name for test in tests if test.flagged}
         families = {test.family for test in tests if test.flagged}
         if state.etfe.through_reference and families != {"linear"}:
-            return []  # a force is simulated under the command, which answers to it in closed loop
+            return []  # forces are simulated under a command that answers to them in closed loop
         found: list[Trial] = []
         if "linear" in families:
             found += linear_trials(state, meter, tick)
@@ -69,10 +69,6 @@ class WindowTrials:
             far_off = state.fit.reduced_chi_square > thresholds.LINEAR_FIRST
             if far_off and any(trial.convincing for trial in found):
                 return found
-        if (
-            state.etfe.through_reference
-        ):  # forces are simulated under a command that answers to them
-            return found
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
         if "nonlinear" in families:
