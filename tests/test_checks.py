@@ -17,6 +17,7 @@ from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
 from bayeshaptic.recordings.checks import FEWEST_SAMPLES
+from bayeshaptic.recordings.units_in_doubt import steps_of_a_turn
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -116,12 +117,32 @@ WARNED = {
         changed(force=np.round(100 * held().force), position=100 * held().position),
         "units",
     ),
+    "multiples of 0.0225, and 16,000 of that are 360: are they in degrees": (
+        changed(
+            force_unit="Nm",
+            position_unit="rad",
+            position=0.0225 * np.round(held().position / 3.14e-6),
+            force=1e4 * held().force,
+        ),
+        "units",
+    ),
     "hardly answers to the force": (changed(force=held().force[::-1]), "coherence"),
     "recorded one sample early": (
         changed(force=held().force[:-1], position=held().position[1:]),
         "alignment",
     ),
 }
+
+
+@pytest.mark.parametrize("turn", [1000, 16_000, 65_536, 400_000])
+def test_steps_of_a_turn(turn: int) -> None:
+    assert steps_of_a_turn(360 / turn) == turn
+    assert steps_of_a_turn(2 * np.pi / turn) is None  # radians
+
+
+def test_what_a_file_was_rounded_to_is_no_part_of_a_turn() -> None:
+    assert not any(steps_of_a_turn(digit * 10.0**-n) for digit in (1, 2, 5) for n in range(9))
+    assert steps_of_a_turn(None) is None
 
 
 @pytest.mark.parametrize("text", WARNED)

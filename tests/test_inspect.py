@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,9 @@ from test_readers import WRITERS, mapping_of
 
 from bayeshaptic import cli
 from bayeshaptic.commands.inspect import lines
+from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import read_recording, read_study
-from bayeshaptic.recordings.overview import overview
+from bayeshaptic.recordings.overview import doubts, overview
 
 N = 2000
 RNG = np.random.default_rng(0)
@@ -38,6 +40,42 @@ def test_columns_are_recognised(tmp_path: Path, header: str) -> None:
     recording = read_recording(path, found.mapping)
     assert recording.period_s == 1e-3  # a step of one is a millisecond: no loop runs at 1 Hz
     np.testing.assert_allclose(recording.position, POSITION, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("t,tau,theta,v", "perhaps [rad] or [deg]"),
+        ("t,dac_V,x,v", "volts? multiply by the force of one"),
+        ("t,F (V),x (mm),v", "in V: multiply by the force of one"),
+        ("t,F,x (counts),v", "in counts: multiply by the size of one"),
+    ],
+)
+def test_what_to_settle(tmp_path: Path, header: str, words: str) -> None:
+    assert words in "\n".join(lines(overview(write(tmp_path / "a.csv", header))))
+
+
+def test_a_velocity_is_no_position(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", "t,Controller/u/In1,Encoder/x/Out1 (mm),Encoder/dx/Out1 (m/s)")
+    assert overview(path).roles["position"] == "Encoder/x/Out1 (mm)"
+    path = write(tmp_path / "b.csv", "t,F_cmd,Encoder/x/Out1,Encoder/dx/Out1")
+    assert overview(path).roles["position"] == "Encoder/x/Out1"
+
+
+def test_degrees_gaps_and_rows_that_are_there_twice(tmp_path: Path) -> None:
+    angle = 0.0225 * np.round(POSITION / 3e-6)
+    rows = [f"{t / 1e3},{u},{q:.4f}" for t, u, q in zip(range(N), FORCE, angle, strict=True)]
+    rows[100] = rows[100].rpartition(",")[0] + ","
+    rows[180:180] = rows[179:180] * 30
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["t,torque,angle", *rows]), encoding="utf-8")
+    found = overview(path)
+    assert found.mapping == "force=torque,position=angle,time=t"
+    assert "angle: 1 rows without a number" in "\n".join(lines(found))
+    facts = replace(found.columns[2], missing=0)
+    assert doubts(facts, "position") == "16,000 steps to 360: degrees? Write [deg] after the name"
+    with pytest.raises(InputError, match="position is nan in row 101"):
+        read_recording(path, found.mapping)
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -301,6 +301,14 @@ DIALECTS = {
     "units": "Time (ms),Force [N],Position (mm)\n0,1.5,2000\n1,-2.5,3000\n2,1e1,4000\n",
     "unit row": "Setup 3\nt;load;Time;Force;Position\n-;Nm;ms;N;mm\n1;1;0;1,5;2000\n"
     "1;1;1;-2,5;3000\n1;1;2;1e1;4000\n",
+    "missing": "time_s,force_n,position_m,other\n0,1.5,2,\n0.001,-2.5,3,NA\n0.002,1e1,4,7\n",
+    "clock": "time_s,force_n,position_m\n20.11.2026 23:59:59.999,1.5,2\n"
+    "21.11.2026 0:00:00,-2.5,3\n21.11.2026 0:00:00.001,1e1,4\n",
+    "12 h": "time_s;force_n;position_m\n12:59:59,999 PM;1,5;2\n1:00:00,000 PM;-2,5;3\n"
+    "1:00:00,001 PM;10;4\n",
+    "waveform": "waveform,[0],[1]\ndelta t,0.001,0.001\n\ntime_s,force_n,position_m\n"
+    "2026-11-20T10:11:12.100Z,1.5,2\n2026-11-20T10:11:12.101Z,-2.5,3\n"
+    "2026-11-20T10:11:12.102Z,1e1,4\n",
     "text": "time_s,phase,force_n,position_m\n0,up,1.5,2\n0.001,up,-2.5,3\n0.002,,1e1,4\n",
 }
 
@@ -319,6 +327,10 @@ def test_dialects_of_csv(tmp_path: Path, name: str, packed: bool) -> None:
 
 
 def test_columns_without_a_header(tmp_path: Path) -> None:
+    (tmp_path / "y.csv").write_text("t,Y[0],Y[1]\n0,1.5,2\n1,-2.5,3\n2,1e1,4\n", encoding="utf-8")
+    recording = read_recording(tmp_path / "y.csv", "time=t,force=Y[0],position=Y[1][mm]")
+    assert recording.force.tolist() == [1.5, -2.5, 10.0]
+    np.testing.assert_allclose(recording.position, [2e-3, 3e-3, 4e-3])
     (tmp_path / "a.txt").write_text("0 1.5 2\n1 -2.5 3\n2 10 4\n", encoding="utf-8")
     recording = read_recording(tmp_path / "a.txt", "time=1[ms],force=2*2,position=3[mm]")
     assert recording.period_s == 1e-3
@@ -341,8 +353,9 @@ WRONG_CSV = {
     "\n\n# only a comment\n": "the file is empty",
     "time_s,force_n,position_m\n": "a header .* but no rows",
     "time_s,force_n,position_m\n0,1,2\n0.001,x,3\n": "'force_n': 'x' is not a number in row 2",
-    "time_s,force_n,position_m\n0,1,2\n0.001,,3\n": "'force_n': there is no number in row 2",
-    "time_s,force_n,position_m\n0,1,2\n0.001,1\n": "line 3 has 2 fields where 3 are expected",
+    "time_s,force_n,position_m\n0,1,2\n0.001,,3\n": "force is nan in row 2 .*fill them in",
+    "time_s,force_n,position_m\n0,1,2\n0.001,1\n0.002,1,2\n": "line 3 has 2 fields where 3 are",
+    "time_s,force_n,position_m\n0,1,2\n0.001,1,2\n0.002,2,1\n0": "line 5 has 1 field .*remove",
     "time_s,force_n\n0,1\n0.001,2\n": r"no column for the position \(position_m or angle_rad\)",
     "time_s,force_n,force_n\n0,1,2\n": "'force_n' more than once",
     "time_s,force_n,torque_nm,position_m\n0,1,2,3\n": "both force_n and torque_nm",
@@ -480,6 +493,12 @@ def test_units_and_what_they_are_taken_to_be(tmp_path: Path) -> None:
     assert units("time=t,force=u,position=q[deg]") == ("Nm", "rad")
     assert units("time=t,force=u[N m],position=q") == ("Nm", "rad")
     assert units("time=t,force=u[A],position=q") == ("A", "m")
+    write_csv(tmp_path / "a.csv", "t,tau_cmd,theta")
+    assert units("time=t,force=tau_cmd,position=theta") == ("Nm", "rad")
+    assert units("time=t,force=tau_cmd,position=theta", "translational") == ("N", "m")
+    write_csv(tmp_path / "a.csv", "t,force,theta")  # they contradict each other
+    assert units("time=t,force=force,position=theta") == ("N", "m")
+    write_csv(tmp_path / "a.csv")
     (note,) = read_recording(tmp_path / "a.csv", MAPPING).notices
     assert note.level == "note"
     assert "taken to be in N, the position in m" in note.text

@@ -63,6 +63,9 @@ WRONG = {
     ),
     "time does not advance from row 10 to row 11 .*1 such places": replaced(10, EVEN[9]),
     "time does not advance from row 5 to row 6": replaced(5, 0.001),
+    "4 rows have the time of the row before them, the first is row 9 .*twice": np.sort(
+        np.append(EVEN, EVEN[[7, 50, 51, 300]])
+    ),
     "the time in row 4 is nan": replaced(3, np.nan),
     "not even: they vary by 58 %": np.cumsum(1e-3 * RNG.uniform(1e-3, 2, size=N)),
     "they vary by 20 %": np.cumsum(1e-3 + 2e-4 * np.clip(RNG.normal(size=N), -4, 4)),

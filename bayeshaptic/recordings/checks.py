@@ -15,7 +15,12 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
 from bayeshaptic.recordings.sufficiency import LEAST_COHERENCE
-from bayeshaptic.recordings.units_in_doubt import implausible_mass, mixed_units, whole_numbers
+from bayeshaptic.recordings.units_in_doubt import (
+    degrees,
+    implausible_mass,
+    mixed_units,
+    whole_numbers,
+)
 
 # Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
 FEWEST_SAMPLES = 1000
@@ -65,6 +70,7 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *_period(recording, device),
         *mixed_units(recording),
         *whole_numbers(recording),
+        *degrees(recording),
         *_resolution(recording, device),
     )
     # A slip of units need not be found twice.

@@ -241,7 +241,9 @@ def pick(
         key = _find(arrays, name)
         if key is not None:
             values = as_numbers(arrays[key], f"{path}: '{key}'")
-            return values * factor, column.unit or _unit_times(key, factor, role, path)
+            # Of the whole term what stands in brackets belongs to the name: Y[0].
+            unit = None if key == column.text else column.unit
+            return values * factor, unit or _unit_times(key, factor, role, path)
     name = column.names[-1]
     raise InputError(
         f"{path}: no column '{name}' for the {role}{nearest(name, arrays)}; "

@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.columns import DEFAULT_HEADERS, name_and_unit, parse_columns, pick
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.units import base_unit
+from bayeshaptic.recordings.units import base_unit, is_of_another_role, says_volts, unit_by_name
+from bayeshaptic.recordings.units_in_doubt import steps_of_a_turn
 
 # Words that names of such signals have, in the order in which they are believed.
 _WORDS = {
@@ -26,13 +28,13 @@ _WORDS = {
     "force": r"force|torque|kraft|moment|current|strom|^u$|tau|^f$|^i$|iq|cmd|command|volt|^vir",
     "position": r"pos|angle|winkel|weg|theta|^q|^y$|^x$|enc|phi|displ",
 }
-# What they are measured in, by such words.
-_UNITS = {
-    "force": {"Nm": r"torque|moment", "A": r"current|strom|^i$|iq", "N": r"force|kraft|^f$"},
-    "position": {"rad": r"angle|winkel|theta|phi", "m": r"pos|weg|displ|^x$"},
+# What turns counts and volts into them.
+_FACTORS = {
+    "force": "multiply by the force of one, as in *0.01[N]",
+    "position": "multiply by the size of one, as in *3.1e-6[m]",
 }
 # Behind these a signal is not what was commanded, or not a position.
-_OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$"
+_OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$|(^|[/._ ])d(x|y|q|phi|theta)\b"
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class ColumnFacts:
         Root mean square of its steps over its standard deviation: 1.4 is white noise.
     unit : str or None
         From the header.
+    missing : int
+        How many are no number.
     """
 
     name: str
@@ -63,6 +67,7 @@ class ColumnFacts:
     period: float | None
     roughness: float
     unit: str | None
+    missing: int = 0
 
 
 @dataclass(frozen=True)
@@ -110,13 +115,14 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
         return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
     most_rows = 500_000  # that are looked at
     signal = np.asarray(values[:most_rows], dtype=float)
+    missing = int(np.sum(~np.isfinite(signal)))
     signal = signal[np.isfinite(signal)]
     if len(signal) < 3:
         return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
     steps = np.diff(signal)
     step = float(np.median(steps))
     even = 0.25  # of the period: what varies by more is time only by its name
-    advances = (steps > 0) if _says(name, "time") else np.abs(steps - step) < even * step
+    advances = (steps >= 0) if _says(name, "time") else np.abs(steps - step) < even * step
     is_time = step > 0 and np.mean(advances) > 0.99
     spread = float(np.std(signal))
     return ColumnFacts(
@@ -128,6 +134,7 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
         step if is_time else None,
         float(np.sqrt(np.mean(steps**2))) / spread if spread > 0 else np.nan,
         unit,
+        missing,
     )
 
 
@@ -147,7 +154,12 @@ def _roles(facts: list[ColumnFacts]) -> dict[str, str]:
         and not re.search(_OTHERS, one.name, re.I)
     ]
     for role, sign in (("force", -1), ("position", 1)):
-        free = [one for one in signals if one.name not in roles.values()]
+        free = [
+            one
+            for one in signals
+            if one.name not in roles.values()
+            and not (one.unit and is_of_another_role(role, one.unit))
+        ]
         other = "position" if role == "force" else "force"
         # By the name: of several the roughest, which is nearest to where the force acts. Without
         # one the roughest is the force, and the smoothest the position.
@@ -181,25 +193,36 @@ def _scale(role: str, column: ColumnFacts) -> str:
 
 def doubts(column: ColumnFacts, role: str) -> str:
     """What a person should settle about a column that plays a role; empty where nothing."""
-    if column.unit is not None or role == "time" or column.name in DEFAULT_HEADERS[role]:
+    if role == "time" or column.name in DEFAULT_HEADERS[role]:
         return ""
+    if column.missing:
+        return f"{column.missing} rows without a number: fill them in, or read a part without them"
+    if column.unit is not None:
+        return _factor_for(column.unit, role)
     whole = column.resolution is not None and column.resolution >= 1
     if role == "position" and whole:
-        return "whole numbers: encoder counts? multiply by the size of one, as in *3.1e-6[m]"
+        return f"whole numbers: encoder counts? {_FACTORS[role]}"
+    guess = unit_by_name(role, column.name)
+    if guess == "rad" and (turn := steps_of_a_turn(column.resolution)):
+        return f"{turn:,} steps to 360: degrees? Write [deg] after the name"
     if role == "position" and max(abs(column.low), abs(column.high)) > 10:
         return "large for metres or radians: write the unit, as in [mm] or [deg]"
     if role == "force" and whole:
-        return "whole numbers: converter counts? multiply by the force of one, as in *0.01[N]"
+        return f"whole numbers: converter counts? {_FACTORS[role]}"
+    if role == "force" and says_volts(column.name):
+        return f"volts? {_FACTORS[role]}"
     units = "[N], [Nm] or [A]" if role == "force" else "[m], [mm], [rad] or [deg]"
-    guess = _unit_by_name(column.name, role)
-    return f"unit not known{guess and f', perhaps {guess}'}: write it after the name, {units}"
+    guess = "rad] or [deg" if guess == "rad" else guess
+    perhaps = f", perhaps [{guess}]" if guess else ""
+    return f"unit not known{perhaps}: write it after the name, {units}"
 
 
-def _unit_by_name(name: str, role: str) -> str:
-    """The unit of what the name speaks of, empty where it does not say."""
-    for unit, words in _UNITS[role].items():
-        if re.search(words, re.split(r"[/.]", name)[-1], re.I):
-            return f"[{unit}]"
+def _factor_for(unit: str, role: str) -> str:
+    """What to write after a name whose header has a unit that is none of the role."""
+    try:
+        base_unit(role, unit)
+    except InputError:
+        return f"in {unit}: {_FACTORS[role]}"
     return ""
 
 

@@ -27,7 +27,7 @@ from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
 from bayeshaptic.recordings.signals.timing import sampling_period
-from bayeshaptic.recordings.units import base_unit, choose_units, says_volts
+from bayeshaptic.recordings.units import base_unit, choose_units, kind_by_names, says_volts
 
 Columns = str | Mapping[str, str] | None
 Span = tuple[float | None, float | None]
@@ -236,6 +236,8 @@ def recorded(
     if followed is not None:
         signals[REFERENCE] = followed[0]
     signals = cut.apply(signals, period_s, path)
+    if kind is None and force in mapping and position in mapping:
+        kind = kind_by_names(mapping[force].names[-1], mapping[position].names[-1])
     recording = recording_from_arrays(
         signals["force"],
         signals[position],
@@ -283,7 +285,8 @@ def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
     if len(bad):
         raise InputError(
             f"{where}: {what} is {signal[bad[0]]} in row {bad[0] + 1} ({len(bad)} such rows); "
-            "mend or cut them out"
+            "fill them in, or read a part without them, with --rows A:B",
+            topic="rows",
         )
     signal.setflags(write=False)
     return signal

@@ -50,6 +50,11 @@ _FOREIGN = """
     V mV kV Hz kHz K C degC % counts count cnt inc incr ticks tick lsb kg g kgf gf lb lbf oz in
     inch ft min h rev turns
 """
+# What is measured in them, by words that names of such signals have.
+_BY_NAME = {
+    "force": {"Nm": r"torque|moment|\btau", "A": r"current|strom|^i$|iq", "N": r"force|kraft|^f$"},
+    "position": {"rad": r"angle|winkel|theta|phi", "m": r"pos|weg|displ|^x$"},
+}
 _VOLTS = re.compile(r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$")
 _BY_ROLE = {
     "time": _TIME,
@@ -89,6 +94,26 @@ def is_unit(text: str) -> bool:
     """Whether a piece of a file is the name of a unit, of these roles or of something else."""
     plain = _plain(text)
     return plain in _FOREIGN.split() or any(plain in known for known in _BY_ROLE.values())
+
+
+def is_of_another_role(role: str, unit: str) -> bool:
+    """Whether a unit is known, and not one of this role: m/s is no position's, V anybody's."""
+    plain = _plain(unit)
+    return plain not in _BY_ROLE[role] and any(plain in known for known in _BY_ROLE.values())
+
+
+def unit_by_name(role: str, name: str) -> str | None:
+    """The base unit of what a name speaks of: ``theta`` is in rad; None where it does not say."""
+    for unit, words in _BY_NAME[role].items():
+        if re.search(words, re.split(r"[/.]", name)[-1], re.I):
+            return unit
+    return None
+
+
+def kind_by_names(force: str, position: str) -> str | None:
+    """ "rotational" where one name speaks of a turn and none of a way; None otherwise."""
+    said = {unit_by_name("force", force), unit_by_name("position", position)}
+    return "rotational" if said & {"Nm", "rad"} and not said & {"N", "m"} else None
 
 
 def says_volts(name: str) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 
 from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 from bayeshaptic.types import Floats
 
@@ -57,6 +58,36 @@ def _is_whole(signal: Floats) -> bool:
     return np.array_equal(signal, np.round(signal))
 
 
+def degrees(recording: Recording) -> list[Notice]:
+    """Angles in radians that are a round part of 360."""
+    turn = steps_of_a_turn(increment_unit(recording.position))
+    if recording.position_unit != "rad" or turn is None:
+        return []
+    text = (
+        f"The angles are multiples of {360 / turn:.6g}, and {turn:,} of that are 360: are they in "
+        "degrees? Write position=NAME[deg] in --columns."
+    )
+    return [Notice("warning", "units", text)]
+
+
+def steps_of_a_turn(step: float | None) -> int | None:
+    """How many steps are a turn of 360 degrees; None where it is no whole number of them.
+
+    Nor where a file may just have been rounded to such a step, or where they are a turn in radians.
+    """
+    if step is None or step <= 0:
+        return None
+    most = 1_000_000  # lines of an encoder, interpolated; beyond, any step is near a part of 360
+    digits = step / 10.0 ** np.floor(np.log10(step) + 1e-6)
+    if np.abs(digits - [1, 2, 5]).min() < 1e-4 or not 360 / most < step < 1:
+        return None
+
+    def whole(turn: float) -> bool:
+        return abs(turn / step - round(turn / step)) < 0.01
+
+    return round(360 / step) if whole(360.0) and not whole(2 * np.pi) else None
+
+
 def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]:
     """A device of milligrams or tons: a slip of units, with the factor that makes sense of it."""
     kind = (recording.force_unit, recording.position_unit)
@@ -72,10 +103,15 @@ def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]
     named = {1e3: "mm", 1e6: "um"}.get(factor) if recording.position_unit == "m" else None
     asked = f" (are they in {named}?)" if named else ""
     term = f"[{named}]" if named else f"*{1 / factor:g}[{recording.position_unit}]"
+    turns = ""
+    said_nothing = any(n.topic == "units" for n in recording.notices)
+    low, _, high, _ = _MASSES["Nm", "rad"]
+    if said_nothing and kind == ("N", "m") and low < mass < high:
+        turns = " If it turns: force=NAME[Nm],position=NAME[rad]."
     times = max(factor, 1 / factor)
     text = (
         f"The device answers as {mass:.2g} {unit} would: a slip of units? With positions {times:g} "
         f"times as {smaller}{asked}, or forces {times:g} times as {larger}, it would be "
         f"{mass * factor:.2g} {unit}. Give the units with --columns, as in position=NAME{term}."
     )
-    return [Notice("warning", "units", text)]
+    return [Notice("warning", "units", text + turns)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import csv
 import gzip
 import io
@@ -11,13 +12,20 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.readers.layout import NUMBER, find_layout
 from bayeshaptic.recordings.readers.reader import MOST_TEXT, Arrays, Reader
+from bayeshaptic.types import Floats
 
 Lines = list[tuple[int, str]]
 
+# Where a field was left empty, or something was written for nothing.
+_MISSING = ("", "-", "--", "na", "n/a", "#n/a", "null", "none")
+_CLOCK = re.compile(
+    r".*?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d*)?)\s*(?:[ap]\.?m\.?|z|[-+]\d\d:?\d\d)?", re.I
+)
 _DECLARED = re.compile(r'"?sep=(?P<separator>[^"])"?', re.I)
 
 
@@ -145,34 +153,67 @@ def _numbers(lines: Lines, separator: str | None, names: list[str]) -> Arrays | 
 
 def _mixed(path: Path, lines: Lines, separator: str | None, names: list[str]) -> Arrays:
     """The slow way, column by column; tells which line does not fit."""
-    rows = []
+    rows: list[list[str]] = []
     for number, line in lines:
         fields = _fields(line, separator)
         # Many programs end every row with a separator.
         if len(fields) == len(names) + 1 and fields[-1] == "":
             fields = fields[:-1]
         if len(fields) != len(names):
+            last = number == lines[-1][0] and len(rows) > 1
+            why = (
+                "it is the last one, where the file was cut off: remove it"
+                if last
+                else ("is the file cut off, or the separator another one?")
+            )
             raise InputError(
-                f"{path}: line {number} has {len(fields)} fields where {len(names)} are expected "
-                f"({', '.join(names)}); is the file cut off, or the separator another one?"
+                f"{path}: line {number} has {_counted(fields)} where {len(names)} are expected "
+                f"({', '.join(names)}); {why}"
             )
         rows.append(fields)
     return typed_columns(names, rows)
 
 
+def _counted(fields: list[str]) -> str:
+    return f"{len(fields)} field{'s' if len(fields) != 1 else ''}"
+
+
 def typed_columns(names: list[str], rows: list[list[str]]) -> Arrays:
-    """Columns of text as numbers where all of a column are, with a decimal point or comma."""
+    """Columns of text as numbers where all of a column are, with a decimal point or comma.
+
+    What is left empty among numbers is NaN, and clock times are seconds.
+    """
     columns: Arrays = {}
     for name, column in zip(names, zip(*rows, strict=True), strict=True):
         text = np.array(column)
-        try:
-            columns[name] = text.astype(float)
-        except ValueError:
-            try:
-                columns[name] = np.char.replace(text, ",", ".").astype(float)
-            except ValueError:
-                columns[name] = text
+        missing = np.isin(np.char.lower(text), _MISSING)
+        numbers = _numbers_of(text[~missing])
+        if numbers is None:
+            columns[name] = text
+        else:
+            columns[name] = np.full(len(text), np.nan)
+            columns[name][~missing] = numbers
     return columns
+
+
+def _numbers_of(text: NDArray[np.str_]) -> Floats | None:
+    """Numbers, or clock times; None where there is anything else, or nothing."""
+    if len(text) == 0:
+        return None
+    for written in (text, np.char.replace(text, ",", ".")):
+        with contextlib.suppress(ValueError):
+            return written.astype(float)
+    return _seconds(text)
+
+
+def _seconds(text: NDArray[np.str_]) -> Floats | None:
+    """Times of the day, with any date before them, in seconds since the first one's midnight."""
+    found = [one for one in map(_CLOCK.fullmatch, text) if one]
+    if len(found) < len(text):
+        return None
+    clock = np.array([[float(part.replace(",", ".")) for part in one.groups()] for one in found])
+    # Twelve hours and twenty-four begin anew; a recording takes less than half of either.
+    return np.unwrap(clock @ [3600.0, 60.0, 1.0], period=12 * 3600.0)
 
 
 _SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz", ".lvm")

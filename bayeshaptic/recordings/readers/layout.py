@@ -69,11 +69,18 @@ def find_layout(
     width = Counter(map(len, bulk)).most_common(1)[0][0]
     of_width = [fields for fields in bulk if len(fields) == width]
     usual = Counter(sum(map(_is_number, fields)) for fields in of_width).most_common(1)[0][0]
-    first = next(
-        row
-        for row in range(rows)
-        if len(fields := fields_of(row)) == width and 2 * sum(map(_is_number, fields)) > usual
-    )
+
+    def holds_numbers(row: int) -> bool:
+        return len(fields := fields_of(row)) == width and 2 * sum(map(_is_number, fields)) > usual
+
+    def above_a_header(row: int) -> bool:
+        near = 4  # rows, in which a preamble of as many fields as the table has comes to its end
+        below = map(fields_of, range(row + 1, min(row + 1 + near, rows)))
+        return any(
+            len(one) == width and all(one) and not any(map(_is_number, one)) for one in below
+        )
+
+    first = next(row for row in filter(holds_numbers, range(rows)) if not above_a_header(row))
     # Many programs end every row with a separator.
     closed = all(fields[-1] == "" for fields in of_width)
     names = _names(fields_of, first, width, closed, remarks, where)

@@ -105,6 +105,12 @@ def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
         # Gaps are in the standard deviation, too.
         raise InputError(_uneven(where, steps, min(usual, float(np.std(steps))) / period))
     back = np.flatnonzero(steps <= 0)
+    several = 3  # rows of the time of the row before: a logger that writes rows twice
+    if len(back) >= several and np.all(steps[back] == 0):
+        raise InputError(
+            f"{where}: {len(back)} rows have the time of the row before them, the first is row "
+            f"{back[0] + 2} ({time_s[back[0]]:.9g} s): are they in the file twice? Remove them"
+        )
     if len(back):
         raise InputError(
             f"{where}: time does not advance from row {back[0] + 1} to row {back[0] + 2} "
