@@ -98,7 +98,9 @@ def test_priors_around_the_device_file():
     # The file's b2 is zero: nothing was seen, and there may be as little as one pleases.
     assert values["b2"] == 0.0
     assert model.prior("b2") == NearZero(scale, 1e-6 * scale)
-    assert free("lhifam").prior("b1") == HalfNormal(2 * (0.1 + 6.8))
+    scale = 2 * (0.1 + 6.8)
+    assert free("lhifam").prior("b2") == HalfNormal(scale)
+    assert free("lhifam").prior("b1") == NearZero(scale, 1e-6 * scale, 0.5)  # little beside b2
     assert np.array_equal(model.values, [values[name] for name in model.names])
     centre = np.array([[model.prior(name).quantile(0.5) for name in model.names]])
     assert np.isfinite(model.log_prior(centre)).all()

@@ -34,6 +34,9 @@ DAMPER_FLOOR = 1e-6
 # Where nobody said zero, four times as much lies next to it as in a factor e above: between what
 # pushes away from a damper of zero (1) and what pulls a small one there (0).
 DAMPER_RISE = 0.25
+# One that a file gives as less than this share of the total is there, but may be too small to be
+# seen: between a half-normal, which is flat next to zero, and that.
+SMALL_DAMPER, SMALL_DAMPER_RISE = 0.1, 0.5
 # A free delay lies within a few periods.
 FREE_DELAY_PERIODS = 2.0
 
@@ -145,22 +148,27 @@ def build_model(
 def device_priors(structure: Structure, values: Mapping[str, float]) -> dict[str, Prior]:
     """Priors around a device file's `values`: log-normal, and half-normal for ground dampers.
 
-    A ground damper that the file gives as zero is `NearZero`. What the file does not give has no
-    prior here; it comes from the data.
+    A ground damper that the file gives as zero, or as little beside the others, is `NearZero`. What
+    the file does not give has no prior here; it comes from the data.
     """
     known = [name for name in structure.names if name in values]
     damping = sum(values[name] for name in known if name in GROUND_DAMPERS)
     priors: dict[str, Prior] = {}
     for name in known:
         if name in GROUND_DAMPERS and damping > 0:
-            scale = DAMPER_SCALE * damping
-            seen = values[name] > 0
-            priors[name] = HalfNormal(scale) if seen else NearZero(scale, DAMPER_FLOOR * scale)
+            priors[name] = _damper_prior(values[name], damping)
         elif values[name] > 0:
             priors[name] = LogNormal(values[name], HAND_LOG_SD if name in HAND else DEVICE_LOG_SD)
         elif name not in GROUND_DAMPERS:  # of those, zeros alone say nothing of the scale
             raise InputError(f"the device file gives {name} = {values[name]}; it must be positive.")
     return priors
+
+
+def _damper_prior(value: float, total: float) -> Prior:
+    scale = DAMPER_SCALE * total
+    if value >= SMALL_DAMPER * total:
+        return HalfNormal(scale)
+    return NearZero(scale, DAMPER_FLOOR * scale, SMALL_DAMPER_RISE if value > 0 else 0.0)
 
 
 def delay_prior(delay_s: float | None, delay_sd_s: float | None, period_s: float) -> Prior | None:
