@@ -124,3 +124,17 @@ def test_added_motion_is_that_of_the_bench(
     allowed = 1.2 * counting + 0.026 * added.std()
     assert np.std(found - added) < allowed, (np.std(found - added), counting, added.std())
     assert added.std() > 3 * counting  # or this would show nothing
+
+
+def test_a_force_with_which_the_mass_runs_away_explains_nothing() -> None:
+    """And leaves no trace in what is tried after it."""
+    recording = recorded(LHIFAM)
+    etfe = estimate_etfe(recording)
+    fit = least_squares(build_model("free", "lhifam"), etfe)
+    bench = ForceBench(State(etfe, fit), recording)
+    before = bench.added_motion(effect_class("coulomb_friction")(MOTOR, {}), 0.6, fit.theta)
+    softening = -1e3 * float(fit.theta[0]) * 1e4 / np.mean(recording.position**2)
+    found = bench.point(effect_class("hardening_spring")(MOTOR, {}), softening, fit.theta)
+    assert found.gain_fit == found.gain_choose == -np.inf
+    after = bench.added_motion(effect_class("coulomb_friction")(MOTOR, {}), 0.6, fit.theta)
+    assert np.array_equal(before, after)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -94,3 +95,20 @@ def test_of_two_springs_side_by_side_none_is_a_logarithm() -> None:
         at = model.names.index("kh")
         theta[at], sd[at] = 2.0, np.nan
         assert sampling_coordinates(model, theta, sd).log[at] == log
+
+
+def test_a_prior_that_rises_towards_its_wall_does_not_go_on_rising_beyond(on_a_ridge):
+    """Its slope at the wall, followed further, outweighed any likelihood and the peak was lost."""
+    fit, _, _ = on_a_ridge
+    model = fit.model.with_prior({"b1": bh.NearZero(0.1, 1e-7, 0.25)})
+    here = sampling_coordinates(model, fit.theta, fit.sd)
+    density, index = Density(replace(fit.likelihood, model=model), here), model.names.index("b1")
+    inside = np.tile(here.coordinate(fit.theta), (4, 1))
+    inside[:, index] = (1e-6, 1e-3, 0.1, 1.0)
+    behind = inside.copy()
+    behind[:, index] *= -1
+    theta = here.natural(inside)
+    prior = density.beyond_walls(behind) - density.likelihood(here.natural(behind))
+    assert prior == pytest.approx(model.log_prior(theta) + here.log_jacobian(inside), abs=1e-6)
+    peak, _ = laplace(density, here.coordinate(fit.theta))
+    assert density(peak[None])[0] > density(here.coordinate(fit.theta)[None])[0] - 20

@@ -111,14 +111,17 @@ class ForceBench:
         return drift_velocity(self.model.system(theta), besides, self.recording.period_s)
 
     def added_motion(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Floats:
-        """What the force adds to the motor's position at the samples, shape (N,)."""
+        """What the force adds to the motor's position at the samples, shape (N,).
+
+        nan where the mass runs away with it, as one does behind a spring that softens too much.
+        """
         system, period = self.model.system(theta), self.recording.period_s
         if isinstance(effect, CommandEffect):
             return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
         step = 4.0  # what a step costs, with the motion around it, in values of a rational model
         spend(step * SUBSTEPS * self.recording.samples)
         motion = self.motions(theta, (effect.place,))[effect.place]
-        return forced_motion(
+        added = forced_motion(
             system.mechanism,
             effect.place,
             effect.law(strength, self.model, theta),
@@ -127,6 +130,9 @@ class ForceBench:
             period / SUBSTEPS,
             SUBSTEPS,
         )
+        away = 1e3  # times the range of what was measured
+        stays = np.abs(added) < away * np.ptp(self.recording.position)
+        return added if np.all(stays) else np.full_like(added, np.nan)
 
     def remember(self, extra: Floats) -> None:
         """Take this for what the force adds, when the slow motion is read off the encoder."""
@@ -137,14 +143,15 @@ class ForceBench:
     ) -> Point:
         """Simulate, take off, fit; several times over, because the fit changes the motion."""
         for _ in range(rounds):
-            etfe, windows = self._simulated(effect, strength, theta)
-            theta = fit_part(self.model, windows, theta)
-        return self._valued(effect, strength, theta, etfe, windows)
+            found = self._simulated(effect, strength, theta)
+            if found is None:
+                break
+            theta = fit_part(self.model, found[1], theta)
+        return self._valued(effect, strength, theta, found)
 
     def as_it_is(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Point:
         """Simulate and take off, with the linear parameters as given."""
-        etfe, windows = self._simulated(effect, strength, theta)
-        return self._valued(effect, strength, theta, etfe, windows)
+        return self._valued(effect, strength, theta, self._simulated(effect, strength, theta))
 
     def without(self, effect: NonlinearEffect, strength: float, extra: Floats) -> Etfe:
         """The measurement without what a force does: the motion `extra`, or of the command less."""
@@ -167,9 +174,13 @@ class ForceBench:
 
     def _simulated(
         self, effect: NonlinearEffect, strength: float, theta: Floats
-    ) -> tuple[Etfe, Windows]:
+    ) -> tuple[Etfe, Windows] | None:
+        """The measurement without what the force adds, and its windows; None where it runs away."""
         if not isinstance(effect, CommandEffect):  # that adds no motion
-            self._extra = self.added_motion(effect, strength, theta)
+            added = self.added_motion(effect, strength, theta)
+            if np.isnan(added[0]):
+                return None
+            self._extra = added
         etfe = self.without(effect, strength, self._extra)
         return etfe, self.windows(etfe, theta)
 
@@ -178,11 +189,13 @@ class ForceBench:
         effect: NonlinearEffect,
         strength: float,
         theta: Floats,
-        etfe: Etfe,
-        windows: Windows,
+        found: tuple[Etfe, Windows] | None,
     ) -> Point:
-        gains = self._likelihoods(theta, windows) - self._base
-        return Point(effect, strength, theta, etfe, windows, float(gains[0]), float(gains[1]))
+        if found is None:  # nothing that runs away explains what was measured
+            state = self.state
+            return Point(effect, strength, theta, state.etfe, state.fit.windows, -np.inf, -np.inf)
+        gains = self._likelihoods(theta, found[1]) - self._base
+        return Point(effect, strength, theta, *found, float(gains[0]), float(gains[1]))
 
     def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
         return log_likelihoods(self.model, windows, theta)

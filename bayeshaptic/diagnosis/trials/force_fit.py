@@ -172,6 +172,7 @@ def _joint_step(
             (motion(logs, vector) - extra) / nudge
             for vector, nudge in zip(around, nudges, strict=True)
         ]
+    slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
     etfe = bench.without(*form.at(logs), extra)
     windows = bench.windows(etfe, theta, slopes)
     # The many slopes leave too little of a window to read its noise from.

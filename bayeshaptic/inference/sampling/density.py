@@ -37,20 +37,24 @@ class Density:
         """The density with the walls taken away: each prior there goes on as it begins.
 
         For Laplace's approximation, whose peak may lie behind a wall.  A half-normal goes on as
-        its mirror image, a cut-off normal as the normal, a uniform one as a constant.
+        its mirror image, a cut-off normal as the normal, a uniform one as a constant; one that
+        rises ever more steeply towards its wall as its mirror image, too, or the peak of the
+        density would be wherever the climb ends.
         """
         phi = np.atleast_2d(phi)
         low = self.coordinates.low
         walls = self.coordinates.walls
         own = self.coordinates.own(phi)
         behind = np.where(walls, np.minimum(own - low, 0.0), 0.0)
+        begin = {int(i): self._prior_at_wall(int(i)) for i in np.flatnonzero(behind.any(axis=0))}
+        steep = [index for index, (_, bend) in begin.items() if bend > 0]
         inner = phi - behind
+        inner[:, steep] -= behind[:, steep]
         wall = np.where(walls, low * self.coordinates.scale, -np.inf)
         theta = np.maximum(self.coordinates.natural(inner), wall)
         value = self.likelihood.model.log_prior(theta) + self.coordinates.log_jacobian(inner)
-        for index in np.flatnonzero(walls):
-            if np.any(behind[:, index] < 0):
-                slope, bend = self._prior_at_wall(int(index))
+        for index, (slope, bend) in begin.items():
+            if index not in steep:
                 value += slope * behind[:, index] + 0.5 * bend * behind[:, index] ** 2
         with np.errstate(all="ignore"):
             value += self.likelihood(self.coordinates.natural(phi))
