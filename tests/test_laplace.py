@@ -65,6 +65,11 @@ def test_walkers_start_inside_even_where_the_proposal_misses(on_a_ridge):
     assert np.isfinite(density(start)).all()
     assert np.linalg.matrix_rank(start - start.mean(axis=0), tol=1e-12) == fit.model.size
 
+    def nowhere(phi):
+        return np.full(len(phi), -np.inf)
+
+    assert (_spread_start(nowhere, far, peak, np.random.default_rng(3)) == peak).all()
+
 
 def test_a_fit_at_the_end_of_a_prior_still_finds_the_peak(on_a_ridge):
     """Following a wall's ridge must not lead out of another prior's support, into nothing."""

@@ -42,7 +42,8 @@ def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     together = np.ones(_TOGETHER)
     scatter = np.convolve(windows.scatter[driven], together, "valid")
     freedom = np.convolve(windows.lines[driven] - 3, together, "valid")
-    rise = 10 * np.log10(scatter / freedom / floor)
+    least = np.convolve(spectra.floor[driven], together / _TOGETHER, "valid")
+    rise = 10 * np.log10(scatter / freedom / np.maximum(floor, least))
     worst = int(np.argmax(rise))
     where = float(centre[driven][worst + _TOGETHER // 2])
     text = f"around {where:.3g} Hz the noise is {rise[worst]:.1f} dB louder than outside the band"

@@ -261,4 +261,6 @@ def _spread_start(
         start = np.concatenate([start, drawn[np.isfinite(density(drawn))]])
         if len(start) >= WALKERS:
             break
-    return start[:WALKERS]
+    # Where none is found the sampler says that it has not converged.
+    alike = np.broadcast_to(peak, (max(WALKERS - len(start), 0), len(peak)))
+    return np.concatenate([start[:WALKERS], alike])

@@ -57,6 +57,7 @@ def _lowest(spectra: RandomSpectra, count: int) -> RandomSpectra:
         force=spectra.force[:end],
         position=spectra.position[:end],
         edges=spectra.edges[: count + 1],
+        floor=spectra.floor[:count],
     )
 
 
@@ -80,7 +81,7 @@ def _restricted_likelihood(spectra: RandomSpectra, window: int) -> Floats:
     weighted = weight * position
     explained = np.einsum("pli,pl->pi", q.conj(), weighted)
     left = np.sum(np.abs(weighted) ** 2, axis=1) - np.sum(np.abs(explained) ** 2, axis=1)
-    left = np.maximum(left, len(position) * spectra.floor + np.finfo(float).tiny)
+    left = np.maximum(left, len(position) * spectra.floor[window] + np.finfo(float).tiny)
     size = np.sum(np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))), axis=1)
     freedom = len(position) - columns.shape[1]
     return np.asarray(log_weight.sum(axis=1) - 2 * size - freedom * np.log(left))

@@ -19,7 +19,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import responds_until
 from bayeshaptic.recordings.response.local_polynomial import LEAKAGE_TERMS, leakage_terms
 from bayeshaptic.recordings.response.points import Points
-from bayeshaptic.recordings.response.spectra import PeriodicSpectra
+from bayeshaptic.recordings.response.spectra import REPEATS_TO, PeriodicSpectra
 from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
 
@@ -163,11 +163,13 @@ def _spectra(
     # Leakage is known from the lines between only: its error adds to the noise of the line.
     shrink = 1 / np.sqrt(1 + leverage)
     freedom = width - LEAKAGE_TERMS + 1
-    floor = hidden_rounding(position, recording.encoder_resolution)
+    answer = (spectrum[line] - below) * shrink
+    rounding = hidden_rounding(position, recording.encoder_resolution)
+    floor = rounding + (REPEATS_TO * np.abs(answer)) ** 2
     return PeriodicSpectra(
         frequency_hz=harmonics / (samples * recording.period_s),
         force=np.fft.rfft(force)[harmonics] * np.sqrt(count / samples) * shrink,
-        position=(spectrum[line] - below) * shrink,
+        position=answer,
         scatter=np.sum(np.abs(residual) ** 2, axis=1) + (freedom - 1) * floor,
         freedom=np.full(len(line), float(freedom)),
         periods=count,

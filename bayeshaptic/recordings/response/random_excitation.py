@@ -16,7 +16,7 @@ from bayeshaptic.recordings.response.local_polynomial import window_edges
 from bayeshaptic.recordings.response.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
-from bayeshaptic.recordings.response.spectra import RandomSpectra
+from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.recordings.signals.raw_signals import clipping
 
@@ -190,12 +190,15 @@ def _spectra(
         raise InputError(_too_short(recording, band_hz, minimum, count, what))
     position = _detrended(recording.position)
     scale = 1 / np.sqrt(samples)
+    found = np.fft.rfft(position)[lines] * scale
+    power = np.add.reduceat(np.abs(found) ** 2, edges[:-1]) / np.diff(edges)
+    rounding = np.finfo(float).eps * np.max(np.abs(recording.position))
     return RandomSpectra(
         frequency_hz=frequency[lines],
         force=np.fft.rfft(recording.force - recording.force.mean())[lines] * scale,
-        position=np.fft.rfft(position)[lines] * scale,
+        position=found,
         edges=edges,
-        floor=float(np.finfo(float).eps * np.max(np.abs(recording.position))) ** 2,
+        floor=rounding**2 + REPEATS_TO**2 * power,
         reference=unit_mass,
     )
 
