@@ -44,6 +44,7 @@ LEFT_OUT = {
     "LAW_TIE": 0.0,
     "MENDED": 1.0,
     "LAW_ERROR": 0.0,
+    "LINEAR_FIRST": np.inf,
 }
 """Every rule, and the value with which it decides nothing."""
 
@@ -63,7 +64,7 @@ def decided(job: Job) -> dict[str, Decided]:
     kind = trials_for(begun.etfe, begun.fit)
     before = kind.tests(kind.first)
     raised = tuple(replace(test, threshold=-np.inf) for test in before)
-    with metered(10 * BUDGET_S * RATE) as meter:
+    with metered(10 * BUDGET_S * RATE) as meter, left_out("LINEAR_FIRST", np.inf):
         trials = kind.trials(kind.first, raised, meter, lambda _: None)
 
     @cache
@@ -83,6 +84,8 @@ def decided(job: Job) -> dict[str, Decided]:
             for trial, own in zip(trials, errors_of, strict=True)
             if trial.convincing and not any(map(acceptance.raises_error, errors, own))
         ]
+        if begun.fit.reduced_chi_square > thresholds.LINEAR_FIRST:
+            open_ = [one for one in open_ if one.accepted.family == "linear"] or open_
         chosen = acceptance.choose(open_, lambda trial: acceptance.excess(left(trial)))
         if chosen is None:
             return Decided("", (), acceptance.verdict_of((), before)[0])

@@ -1,6 +1,6 @@
 """Effective draws a CPU second beside other samplers, on the same density, in one run.
 
-    python benchmarks/peers_sampling.py [--case NAME ...] [--only SAMPLER ...]
+    python benchmarks/peers_sampling.py [--case NAME ...] [--only SAMPLER ...] [--old PATH]
 
 The others are emcee's stretch and differential-evolution moves, the adaptive sampler of PINTS, and
 NUTS by nutpie, NumPyro and BlackJAX (`pip install -e ".[bench]"`; what is not there is left out).
@@ -8,14 +8,18 @@ They begin at the fit and get coordinates in which the posterior's covariance th
 For NUTS a gradient costs one call of the compiled density with twice as many vectors as there are
 parameters, which is less than automatic differentiation of it would take.  Compilation of the
 density is left out, JAX's of a sampler (some 5 s) is not; tuning counts for everybody.  Effective
-draws are ArviZ's.  Limits whose medians differ by more than
-four Monte-Carlo errors are marked.
+draws are ArviZ's.  Limits whose medians differ by more than four Monte-Carlo errors are marked.
+--old adds the sampler of an older version of this package, on the posterior that it has of the same
+recording (its priors and its noise are its own).
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import subprocess
+import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Callable
@@ -46,6 +50,7 @@ class Target:
 
     Attributes
     ----------
+    recording : Recording
     fit : Fit
     etfe : Etfe
     density : Density
@@ -54,6 +59,7 @@ class Target:
         Square root of the covariance.
     """
 
+    recording: bh.Recording
     fit: bh.Fit
     etfe: bh.Etfe
     density: Density
@@ -98,7 +104,9 @@ def target(device: str, held: bool, with_file: bool) -> Target:
     covariance = np.linalg.inv(np.linalg.inv(covariance) + np.eye(len(stretch)) / 9)
     at = here.coordinate(fit.theta[None])[0]
     at = np.where(here.walls, np.maximum(at, here.low + 0.1), at)
-    return Target(fit, etfe, Density(fit.likelihood, here), at, np.linalg.cholesky(covariance))
+    return Target(
+        recording, fit, etfe, Density(fit.likelihood, here), at, np.linalg.cholesky(covariance)
+    )
 
 
 def ours(known: Target) -> np.ndarray:
@@ -217,6 +225,49 @@ def by_blackjax(known: Target) -> np.ndarray:
     return known.natural(np.array(chains))
 
 
+OLDER = """
+import sys, time
+import numpy as np
+import bayeshaptic as bh
+made, model, device, delay, out = np.load(sys.argv[1]), *sys.argv[2:]
+fields = ("period_s", "encoder_resolution")
+recording = bh.Recording(made["force"], made["position"], **{f: float(made[f]) for f in fields})
+known = {"device": device} if device else {"delay_s": float(delay)}
+etfe = bh.estimate_etfe(recording)
+fit = bh.least_squares(getattr(bh, model)(**known), etfe)
+bh.sample(fit.model, etfe, start=fit, seed=1)  # imports, and what is compiled
+began = time.process_time()
+chains = bh.sample(fit.model, etfe, start=fit).chains
+np.savez(out, seconds=time.process_time() - began, theta=chains)
+"""
+
+
+def by_older(path: str, known: Target) -> tuple[np.ndarray, float]:
+    """Natural values, shape (chains, draws, P), and CPU seconds of the version at `path`."""
+    one, model = known.recording, known.fit.model
+    with tempfile.TemporaryDirectory() as place:
+        made, out = os.path.join(place, "made.npz"), os.path.join(place, "out.npz")
+        np.savez(
+            made, force=one.force, position=one.position, period_s=one.period_s,
+            encoder_resolution=one.encoder_resolution,
+        )  # fmt: skip
+        device = "" if model.device is None else model.device.name
+        words = [
+            sys.executable,
+            "-c",
+            OLDER,
+            made,
+            model.name,
+            device,
+            str(model.fixed.get("delay_s", 0.0)),
+            out,
+        ]
+        subprocess.run(words, env=os.environ | {"PYTHONPATH": path}, cwd=place, check=True)
+        found = np.load(out)
+        theta = found["theta"]
+        return theta.reshape(len(theta), -1, theta.shape[-1]), float(found["seconds"])
+
+
 SAMPLERS: dict[str, tuple[str, Callable[[Target], np.ndarray]]] = {
     "bayeshaptic": ("bayeshaptic", ours),
     "emcee, stretch": ("emcee", partial(by_emcee, move="stretch")),
@@ -252,12 +303,15 @@ class Counted:
     rhat: float
 
 
-def count(known: Target, run: Callable[[Target], np.ndarray]) -> Counted:
-    import arviz as az
-
+def timed(known: Target, run: Callable[[Target], np.ndarray]) -> tuple[np.ndarray, float]:
     began = time.process_time()
     theta = run(known)
-    seconds = time.process_time() - began
+    return theta, time.process_time() - began
+
+
+def counted(known: Target, theta: np.ndarray, seconds: float) -> Counted:
+    import arviz as az
+
     kept = theta[:, :: max(1, theta.shape[0] * theta.shape[1] // 40_000)]
     flat = kept.reshape(-1, kept.shape[-1])
     limit = np.log(
@@ -279,6 +333,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--case", nargs="*", choices=CASES, default=list(CASES))
     parser.add_argument("--only", nargs="*", choices=SAMPLERS, default=list(SAMPLERS))
+    parser.add_argument("--old", help="checkout of an older version")
     asked = parser.parse_args()
     warnings.simplefilter("ignore")  # of the peers
     print("case | sampler | CPU s | ln K_CR, ESS/s | slowest, ESS/s | R-hat | K_CR, N/m")
@@ -288,11 +343,12 @@ def main() -> None:
             known = target(*CASES[name], with_file)
             known(np.zeros((64, len(known.centre))))  # compiled once
             reference: Counted | None = None
-            for sampler in asked.only:
-                module, run = SAMPLERS[sampler]
-                if find_spec(module) is None:
-                    continue
-                found = count(known, run)
+            runs = {n: partial(timed, run=run) for n, (module, run) in SAMPLERS.items()
+                    if n in asked.only and find_spec(module)}  # fmt: skip
+            if asked.old:
+                runs["the older version"] = partial(by_older, asked.old)
+            for sampler, run in runs.items():
+                found = counted(known, *run(known))
                 reference = reference or found
                 apart = abs(found.median - reference.median)
                 mark = " (apart)" if apart > 4 * np.hypot(found.error, reference.error) else ""

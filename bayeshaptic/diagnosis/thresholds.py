@@ -104,7 +104,10 @@ Without it nothing changes in one round."""
 # ---------------------------------------------------------------- what is worth trying
 
 REACH = 0.3
-"""Share of the best candidate's gain after a cheap fit below which none is fitted in full."""
+"""Share of the best candidate's gain after a cheap fit below which none is fitted in full.
+
+The right one of 62 of 64 recordings with a linear effect is followed, and a third of all; from a
+twentieth on it were 63, and half of all."""
 
 
 def convincing(gain_fit: float, gain_choose: float, size: int) -> bool:
