@@ -22,7 +22,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model
-from bayeshaptic.quantities import quantity
+from bayeshaptic.quantities import pure, quantity
 from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -279,8 +279,8 @@ def _misfit_notice(chi_square: float, scale: float) -> tuple[Notice, ...]:
     length = scale / chi_square
     alike = f", and {length:.2g} windows count as one, because their residuals are alike"
     text = (
-        f"The residual is {chi_square**0.5:.3g} times the noise (reduced chi-square "
-        f"{chi_square:.3g}): the model lacks something that this device has. The posterior takes "
+        f"The residual is {pure(chi_square**0.5, 2)} times the noise (reduced chi-square "
+        f"{pure(chi_square)}): the model lacks something that this device has. The posterior takes "
         f"that much noise{alike if length > 1.05 else ''}, so that its intervals are not narrower "
         "than the misfit allows, but the misfit is not noise: the critical stiffness may be wrong "
         "by more than its interval."

@@ -13,6 +13,7 @@ from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
 from bayeshaptic.report.numbers.misfit import (
+    is_far_off,
     misfit_factor,
     misfit_is_clear,
     misfit_is_faint,
@@ -29,8 +30,6 @@ HEADLINE_RISKS = (0.01, 0.05)
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001
-# Residual over noise from which a limit widened by what is unexplained is no advice either.
-_TOO_FAR = 3.0
 
 
 @dataclass(frozen=True)
@@ -84,8 +83,7 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
     """Why no stiffness can be recommended; empty where one can."""
     found = []
     verdict = (diagnosis or {}).get("verdict")
-    far_off = analysis.fit.reduced_chi_square > _TOO_FAR**2
-    if verdict == "unexplained" and far_off and not has_feedback(analysis.notices):
+    if verdict == "unexplained" and is_far_off(analysis) and not has_feedback(analysis.notices):
         found.append(
             f"what the model leaves over is {misfit_factor(analysis)} times the noise, and no "
             "effect that was tried explains it"

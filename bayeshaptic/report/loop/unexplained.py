@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import interval, pure, quantity
+from bayeshaptic.report.numbers.misfit import is_far_off
 from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
@@ -65,10 +66,12 @@ def _widened(closed: Closed) -> str:
     narrow = critical_stiffness(closed.analysis.posterior)
     before = interval(narrow.quantile(0.05), narrow.quantile(0.95), limit.unit)
     after = interval(limit.quantile(0.05), limit.quantile(0.95), limit.unit)
-    return (
-        f"The critical stiffness was widened for it: its 90 % interval was {before}, and is now "
-        f"{after}. Use its lower end."
+    text = (
+        f"Without that the 90 % interval of the critical stiffness would be {before}; it is {after}"
     )
+    if is_far_off(closed.analysis):
+        return f"{text}. Neither is of use: so much is left that nothing follows from it."
+    return f"{text}. Use its lower end."
 
 
 def worst(tests: tuple[Test, ...]) -> Test | None:

@@ -140,6 +140,12 @@ def scope(closed: Closed) -> str:
     return "".join(f"; {text}" for text in found)
 
 
+def part(closed: Closed) -> str:
+    """Which part of the recording the numbers after are of; empty where it is all of it."""
+    changes = any(effect.family == "time-varying" for effect in closed.effects)
+    return ", in the worst part alone, whose response scatters more" if changes else ""
+
+
 def force_caption(closed: Closed) -> str:
     """Under the curves of the force."""
     if any(effect.family == "nonlinear" for effect in closed.effects):
@@ -217,6 +223,8 @@ def _numbers(closed: Closed, effect: Accepted) -> str:
 
 def _error_change(closed: Closed) -> str:
     before, after = (e["held_out_weighted_rms"] for e in (closed.before, closed.after))
+    if part(closed):
+        return f"leaves {_times(after)} times the noise in the worst part"
     same = 0.005  # relative change of an error that is not worth a word
     if abs(after / before - 1) < same:
         return f"left the held-out error at {_times(after)} times the noise"

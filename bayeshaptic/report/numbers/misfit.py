@@ -16,6 +16,12 @@ def misfit_is_clear(analysis: Analysis) -> bool:
     return analysis.fit.misfits
 
 
+def is_far_off(analysis: Analysis) -> bool:
+    """Whether so much is left over that a limit widened for it is no advice either."""
+    too_far = 3.0  # residual over noise
+    return analysis.fit.reduced_chi_square > too_far**2
+
+
 def misfit_is_faint(analysis: Analysis) -> bool:
     """Whether the residual is a little above the noise, but more than chance makes it."""
     above = analysis.fit.reduced_chi_square > analysis.fit.by_chance

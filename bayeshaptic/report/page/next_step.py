@@ -70,10 +70,11 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
     if result.closed is None:
         return (Step("Let the loop look for what the model lacks (leave out --no-loop):", command),)
     if is_unexplained(result):
+        alone = ", and with nobody holding the device" if may_be_held(analysis) else ""
         return (
             Step(
-                "Record at half and at twice the force, and with nobody holding the device. What "
-                "changes tells which part of it the model lacks. Compare the reports:",
+                f"Record at half and at twice the force{alone}. What changes tells which part of "
+                "it the model lacks. Compare the reports:",
                 "bayeshaptic batch FOLDER -o reports",
             ),
         )

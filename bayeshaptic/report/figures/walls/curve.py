@@ -134,4 +134,4 @@ def _marks(axes: Axes, table: LimitTable, factor: float) -> None:
                 label=f"{rounded_down(stiffness, table.unit, low, high).text} at {percent(risk)}",
             )
     if any(value is not None for value in table.stiffness):
-        style.legend(axes, loc="lower right", handlelength=1.0)
+        style.legend(axes, loc="upper left", handlelength=1.0)
