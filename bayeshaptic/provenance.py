@@ -32,7 +32,7 @@ def provenance(
         What was asked for, defaults included.
     seed : int or None
     source : Path or None
-        The file, for its SHA-256.
+        The file, for its name and SHA-256.
     seconds : mapping of str to float, or None
         What each stage took.
     """
@@ -41,6 +41,7 @@ def provenance(
         "options": None if options is None else dict(options),
         "versions": versions(),
         "seed": seed,
+        "file": None if source is None else source.as_posix(),
         "sha256": None if source is None else sha256(source),
         "seconds": None if seconds is None else dict(seconds),
     }

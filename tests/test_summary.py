@@ -73,7 +73,7 @@ KEYS: dict[str, set[str]] = {
     "critical_stiffness.safe": {"0.05", "0.01", "0.001"},
     "diagnosis": {"verdict", "residual_class", "effects", "candidates", "not_tried"},
     "error": {"before", "after"},
-    "provenance": {"command", "options", "versions", "seed", "sha256", "seconds"},
+    "provenance": {"command", "options", "versions", "seed", "file", "sha256", "seconds"},
     "error.before": ERROR,
     "error.after": ERROR,
     "error.before.critical_stiffness": QUANTILES,

@@ -172,7 +172,8 @@ def _untrusted(
         low, middle, high = own
         details.append(
             "The measured response itself, without a model, puts the limit at "
-            f"{estimate(middle, low, high, limit.unit)}."
+            f"{estimate(middle, low, high, limit.unit)}. What misleads the model may mislead that, "
+            "too."
         )
     if closed is not None and closed.force is not None:
         details.append(in_short(closed))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import unique
+from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.report import tables, words
 from bayeshaptic.report.assumptions import assumptions, priors
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
@@ -65,7 +67,7 @@ def render(
     head = headline(result)
     page = template("report.jinja").render(
         **frame(),
-        title=title(analysis),
+        title=title(analysis, (origin or {}).get("file")),
         contents=(),
         result=result,
         analysis=analysis,
@@ -99,12 +101,13 @@ def render(
     return finished(page, _CONTENTS)
 
 
-def title(analysis: Analysis) -> str:
-    """What the report is about: the device, who held it, and the recording's name."""
+def title(analysis: Analysis, file: str | None = None) -> str:
+    """What the report is about: the device, who held it, and the recording's or the file's name."""
     recording = analysis.recording
     device = None if analysis.device is None else analysis.device.name
     if recording is None:
-        return device or "a frequency response"
+        table = recording_name(Path(file)) if file else "a frequency response"
+        return f"{device}: {table}" if device else table
     name = recording.device or device
     if name is None:
         return recording.name

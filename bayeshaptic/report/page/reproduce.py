@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
@@ -27,9 +28,10 @@ def reproduce(result: Result, origin: Mapping[str, Any] | None = None) -> Rows:
         rows.append(("Command", str(told["command"])))
     recording = result.measured.recording
     source = None if recording is None else recording.source
-    if source is not None:
-        rows.append(("File", source.as_posix()))
-        digest = told.get("sha256") or sha256(source)
+    file = told.get("file") or (None if source is None else source.as_posix())
+    if file is not None:
+        rows.append(("File", str(file)))
+        digest = told.get("sha256") or sha256(Path(file))
         if digest:
             rows.append(("SHA-256", str(digest)))
     rows.append(("Seed", str(result.analysis.posterior.seed)))
