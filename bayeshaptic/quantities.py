@@ -156,7 +156,7 @@ def rounded_down(
     """
     stiffness, low, high = (value / lever_m**2 for value in (stiffness, low, high))
     if not (math.isfinite(stiffness) and stiffness > 0):
-        return Rounded(stiffness, quantity(stiffness, unit))
+        return Rounded(stiffness, "any" if stiffness == math.inf else quantity(stiffness, unit))
     width = 3.29  # of a normal 90 % interval, in standard deviations
     sd = (high - low) / width
     exponent = math.floor(math.log10(stiffness))

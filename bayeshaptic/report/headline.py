@@ -65,9 +65,6 @@ def headline(result: Result) -> Headline:
     if objections:
         return _untrusted(analysis, objections, result.closed)
     limit = analysis.limit
-    if limit.quantile(0.05) == math.inf:
-        unlimited = "Nothing limits the stiffness: the model is stable with any."
-        return Headline("caution", unlimited, ())
     risk = next((r for r in HEADLINE_RISKS if limit.safe(r) is not None), None)
     if risk is None:
         few = (
@@ -75,6 +72,10 @@ def headline(result: Result) -> Headline:
             f"{percent(HEADLINE_RISKS[-1])} (fewer than 20 of them lie below any such stiffness)"
         )
         return _untrusted(analysis, (few,))
+    if limit.safe(risk) == math.inf:
+        sure = percent(1 - risk)
+        unlimited = f"Nothing limits the stiffness: any is stable with a probability of {sure}."
+        return Headline("caution", unlimited, ())
     diagnosis = result.closed.diagnosis if result.closed else {}
     return _recommended(analysis, risk, diagnosis, result.closed)
 

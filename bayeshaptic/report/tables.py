@@ -202,7 +202,10 @@ def _scaled(
     row = scale(known, unit)
     if spread is None and known:
         spread = spread_of(min(known), max(known))
-    return tuple(_DASH if v is None else row.quantity(v, spread) for v in values)
+    return tuple(
+        _DASH if v is None else "no limit" if v == np.inf else row.quantity(v, spread)
+        for v in values
+    )
 
 
 def _db(stiffness: float) -> str:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 WIDEST = 4.0  # times the histogram's own width, to show the measurement's interval beside it
+_NARROWEST = 5e-4  # of the stiffness, to either side: ticks further in would all read alike
 LOG_BEYOND = 8.0  # a distribution wider than this factor is drawn on a logarithmic axis
 
 
@@ -48,6 +49,7 @@ def _histogram(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...]) -> Non
             transform=axes.transAxes,
             ha="center",
         )
+        axes.set_xticks([])
         return
     row = scale(float(np.median(samples)), limit.unit)
     low, high = (float(v) for v in np.quantile(samples[samples > 0], (0.0005, 0.9995)))
@@ -60,6 +62,8 @@ def _histogram(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...]) -> Non
     _lines(axes, analysis, rows, row)
     if logarithmic:
         style.log_scale(axes.xaxis, (1, 2, 5))
+    else:
+        axes.ticklabel_format(axis="x", useOffset=False)
     axes.set_xlabel(f"critical stiffness, {row.unit}", fontsize=style.FONT)
     _decibel_axis(axes, row, limit.unit)
     style.legend(axes, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4)
@@ -68,7 +72,7 @@ def _histogram(axes: Axes, analysis: Analysis, rows: tuple[Witness, ...]) -> Non
 def _edges(low: float, high: float, logarithmic: bool) -> NDArray[Any]:
     if logarithmic:
         return np.geomspace(low / 1.1, high * 1.1, BINS + 1)
-    margin = 0.12 * (high - low) or 0.01 * high
+    margin = max(0.12 * (high - low), _NARROWEST * high)
     return np.linspace(max(low - margin, 0.0), high + margin, BINS + 1)
 
 

@@ -67,7 +67,8 @@ def _widened(closed: Closed) -> str:
     before = interval(narrow.quantile(0.05), narrow.quantile(0.95), limit.unit)
     after = interval(limit.quantile(0.05), limit.quantile(0.95), limit.unit)
     text = (
-        f"Without that the 90 % interval of the critical stiffness would be {before}; it is {after}"
+        f"The critical stiffness was widened for it: without that its 90 % interval would be "
+        f"{before}; it is {after}"
     )
     if is_far_off(closed.analysis):
         return f"{text}. Neither is of use: so much is left that nothing follows from it."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -108,6 +109,8 @@ def _lead(table: LimitTable) -> tuple[str, ...]:
     if risk is None or stiffness is None:
         return ("The draws are too few to state a stiffness at a small risk.",)
     where = "" if len(table.cases) == 1 else f" in all {len(table.cases)} cases"
+    if stiffness == math.inf:
+        return (f"Any wall is stable with a probability of {percent(1 - risk)}.",)
     low, high = (float(end) for end in quantiles(table.samples, (0.05, 0.95)))
     first = (
         f"A wall without damping is stable{where} with a probability of {percent(1 - risk)} up to "

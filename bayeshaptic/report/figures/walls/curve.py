@@ -47,7 +47,10 @@ def draw(table: LimitTable) -> Figure:
                 note(axes, Reading("K", row.unit, stiffness * row.factor, rows))
     for axes, name in ((left, "probability of being stable"), (right, "risk of instability")):
         style.panel(axes, f"stiffness K, {row.unit}", name)
-    right.set_yscale("log")
+    if np.isfinite(table.samples).any():
+        right.set_yscale("log")
+    else:
+        right.text(0.5, 0.5, "stable at every stiffness", ha="center", transform=right.transAxes)
     right.set_ylim(LOWEST_RISK, 1.0)
     _percentages(right)
     _marks(right, table, row.factor)
@@ -102,14 +105,16 @@ def _reach(left: Axes, right: Axes, curves: list[NDArray[Any]], factor: float) -
     low, high = ends[:, 0].min() * factor, ends[0, 2] * factor
     for axes in (left, right):
         axes.xaxis.set_major_locator(MaxNLocator(5))
-    margin = 0.06 * (high - low) or 0.01 * high or 1.0
-    right.set_xlim(max(low - margin, 0.0), max(ends[0, 1] * factor, low) + margin)
-    high = ends[:, 2].max() * factor
-    if low > 0 and high > LOG_BEYOND * low:
-        style.log_scale(left.xaxis, (1, 2, 5))
-        left.set_xlim(low / 1.1, high * 1.1)
-    else:
-        left.set_xlim(max(low - margin, 0.0), high + margin)
+    narrowest = 5e-4  # of the stiffness, to either side: ticks further in would all read alike
+    margin = max(0.06 * (high - low), narrowest * high) or 1.0
+    middle, high = max(ends[0, 1] * factor, low), ends[:, 2].max() * factor
+    for axes, end in ((right, middle), (left, high)):
+        if low > 0 and end > LOG_BEYOND * low:
+            style.log_scale(axes.xaxis, (1, 2, 5))
+            axes.set_xlim(low / 1.1, end * 1.1)
+        else:
+            axes.ticklabel_format(axis="x", useOffset=False)
+            axes.set_xlim(max(low - margin, 0.0), end + margin)
 
 
 def _percentages(axes: Axes) -> None:
@@ -123,7 +128,7 @@ def _percentages(axes: Axes) -> None:
 def _marks(axes: Axes, table: LimitTable, factor: float) -> None:
     low, high = (float(end) for end in quantiles(table.samples, (0.05, 0.95)))
     for risk, stiffness in zip(table.risks, table.stiffness, strict=True):
-        if stiffness is not None:
+        if stiffness is not None and np.isfinite(stiffness):
             axes.plot(
                 [stiffness * factor],
                 [risk],
@@ -133,5 +138,5 @@ def _marks(axes: Axes, table: LimitTable, factor: float) -> None:
                 zorder=6,
                 label=f"{rounded_down(stiffness, table.unit, low, high).text} at {percent(risk)}",
             )
-    if any(value is not None for value in table.stiffness):
+    if axes.get_legend_handles_labels()[0]:
         style.legend(axes, loc="upper left", handlelength=1.0)
