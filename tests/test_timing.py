@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.signals.timing import sampling_period
 
 RNG = np.random.default_rng(3)
@@ -57,9 +58,11 @@ def replaced(index: int, value: float) -> np.ndarray:
 
 
 WRONG = {
-    "about 1 samples are missing after row 7 .*1 such places": drop(EVEN, 7),
-    "about 3 samples are missing after row 100 .*to 4997: read it alone with --rows 101:4997": drop(
-        EVEN, 100, 101, 102
+    "about 9 samples are missing after row 100 .*to 4991: read it alone with --rows 101:4991": drop(
+        EVEN, *range(100, 109)
+    ),
+    "about 2 samples are missing after row 7 .*40 such places": drop(
+        EVEN, *range(7, 4687, 117), *range(8, 4688, 117)
     ),
     "time does not advance from row 10 to row 11 .*1 such places": replaced(10, EVEN[9]),
     "time does not advance from row 5 to row 6": replaced(5, 0.001),
@@ -95,3 +98,24 @@ def test_a_period_beside_stamps() -> None:
     for period in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(InputError, match="above 0"):
             sampling_period(EVEN, period)
+
+
+def test_rows_that_a_logger_lost_are_put_back() -> None:
+    """White force on a mass: nothing is known of a lost force, and the position almost exactly."""
+    force = RNG.normal(size=N)
+    velocity = np.cumsum(force)
+    position = np.cumsum(velocity - velocity.mean())
+    lost = np.sort(RNG.choice(np.arange(100, N - 100), 20, replace=False))
+    lost = np.append(lost, lost[-1] + 1)
+    kept = np.setdiff1d(np.arange(N), lost)
+    found = recording_from_arrays(force[kept], position[kept], time=EVEN[kept])
+    assert found.samples == N
+    assert found.period_s == pytest.approx(1e-3, rel=1e-5)
+    assert np.array_equal(found.force[kept], force[kept])
+    assert np.array_equal(found.position[kept], position[kept])
+    # What is put in for a white force is next to its mean: of 48 coefficients none is sure.
+    assert np.std(found.force[lost]) < 0.5
+    assert np.max(np.abs(found.position[lost] - position[lost])) < 3
+    (note,) = (n for n in found.notices if n.topic == "time stamps")
+    assert note.level == "note"
+    assert "are missing by their time stamps, 2 at most" in note.text

@@ -150,6 +150,6 @@ def prior_dominated(model: Model, draws: Floats) -> list[bool]:
         own = np.quantile(column, [0.16, 0.84])
         believed = prior.quantile([0.16, 0.84])
         if prior.coordinate == "log":
-            own, believed = np.log(own), np.log(believed)
+            own, believed = np.log(np.maximum(own, np.finfo(float).tiny)), np.log(believed)
         out.append(bool(np.ptp(own) > dominated * np.ptp(believed)))
     return out

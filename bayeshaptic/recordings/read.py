@@ -156,6 +156,10 @@ def recording_from_arrays(
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
     timing = sampling_period(stamps, period_s, where)
+    if timing.rows is not None:
+        from bayeshaptic.recordings.signals.gaps import put_back
+
+        force, position, followed = put_back(force, position, followed, timing.rows, where)
     unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind)
     notices = timing.notices
     if force_unit is None and position_unit is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ _USUAL = (
 )
 # Seconds; a later stamp is damage, even in nanoseconds since 1970, and its square is no number.
 _LATEST = 1e100
+# Rows that are missing in one place, and the share of all that are, up to which they are put back:
+# of a force that nobody knows for longer than this its own past says nothing.
+LONGEST_GAP, MOST_MISSING = 8, 0.01
 # From here on the stamps' jitter is worth a warning.
 NOTABLE_JITTER = 0.005
 
@@ -34,11 +37,14 @@ class Timing:
         Standard deviation of the time steps over the period; zero where the stamps are those of an
         even clock, rounded; None without stamps.
     notices : tuple of Notice
+    rows : ndarray of int, shape (N,), or None
+        The place of each sample on the clock, where a few in between are missing.
     """
 
     period_s: float
     jitter: float | None = None
     notices: tuple[Notice, ...] = ()
+    rows: NDArray[np.intp] | None = None
 
 
 def sampling_period(
@@ -47,7 +53,7 @@ def sampling_period(
     """The period that the time stamps show, or the one that was given.
 
     A given period is believed: what contradicts it in the stamps becomes a warning. Without one,
-    stamps that are missing, run back, leave gaps or are uneven are errors.
+    stamps that run back, leave long gaps or many, or are uneven are errors.
 
     Parameters
     ----------
@@ -118,7 +124,9 @@ def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
             "cut the recording there, or give the period with --period-s if only the stamps are "
             "wrong"
         )
-    _refuse_gaps(time_s, period, where)
+    gaps = _gaps(time_s, period)
+    if len(gaps):
+        return _with_gaps(time_s, gaps, period, where)
     jitter = float(np.std(steps)) / period
     if jitter > MOST_JITTER:
         raise InputError(_uneven(where, steps, jitter))
@@ -155,13 +163,26 @@ def _rounding(time_s: NDArray[np.float64]) -> float:
     return 0.0
 
 
-def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None:
-    """Refuse missing samples; a late stamp that the next step makes up for is no gap."""
+def _gaps(time_s: NDArray[np.float64], period: float) -> NDArray[np.intp]:
+    """Samples after which some are missing; a late stamp that the next step makes up for is no gap.
+
+    Where many steps are long it is uneven sampling and no gap.
+    """
     steps = np.diff(time_s)
     pairs = np.append(time_s[2:] - time_s[:-2], np.inf)
     gaps = np.flatnonzero((steps > 1.5 * period) & (pairs > 2.5 * period))
-    # Where many are long it is uneven sampling and no gap.
-    if 0 < len(gaps) <= max(3, len(steps) // 100):
+    return gaps if len(gaps) <= max(3, len(steps) // 100) else gaps[:0]
+
+
+def _with_gaps(
+    time_s: NDArray[np.float64], gaps: NDArray[np.intp], period: float, where: str
+) -> Timing:
+    """The period of stamps with short gaps, and which rows there are; long gaps are refused."""
+    steps = np.diff(time_s)
+    lost = np.zeros(len(time_s), dtype=np.intp)
+    lost[gaps + 1] = np.maximum(np.rint(steps[gaps] / period) - 1, 1)
+    count = int(lost.sum())
+    if lost.max() > LONGEST_GAP or count > MOST_MISSING * len(time_s):
         first = gaps[0]
         edges = np.concatenate([[0], gaps + 1, [len(time_s)]])
         longest = int(np.argmax(np.diff(edges)))
@@ -172,3 +193,12 @@ def _refuse_gaps(time_s: NDArray[np.float64], period: float, where: str) -> None
             f"{edges[longest] + 1} to {edges[longest + 1]}: read it alone with --rows "
             f"{edges[longest] + 1}:{edges[longest + 1]}"
         )
+    rows = np.arange(len(time_s)) + np.cumsum(lost)
+    even = _from_stamps(np.interp(np.arange(rows[-1] + 1), rows, time_s), where)
+    text = (
+        f"{count} rows ({100 * count / len(time_s):.2g} %) are missing by their time stamps, "
+        f"{int(lost.max())} at most in one place, the first after row {gaps[0] + 1}: they were put "
+        "back as the rows around them lead to expect."
+    )
+    notices = (*even.notices, Notice("note", "time stamps", text))
+    return replace(even, notices=notices, rows=rows)
