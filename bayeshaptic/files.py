@@ -52,7 +52,7 @@ def remove_dead_drafts(folder: Path) -> None:
         return
     for path in folder.iterdir():
         match = _DRAFT.fullmatch(path.name)
-        if match and match["host"] == _host() and not _is_alive(int(match["pid"])):
+        if match and match["host"] == host() and not is_alive(int(match["pid"])):
             if path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)
             else:
@@ -61,14 +61,16 @@ def remove_dead_drafts(folder: Path) -> None:
 
 def owner() -> str:
     """A part of a draft's name, by which others know whether its process is alive."""
-    return f"{_host()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
+    return f"{host()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
 
 
-def _host() -> str:
+def host() -> str:
+    """This machine's name, as drafts have it."""
     return re.sub(r"[^\w]", "_", socket.gethostname())
 
 
-def _is_alive(pid: int) -> bool:
+def is_alive(pid: int) -> bool:
+    """Whether this machine has such a process."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import pickle
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -139,4 +140,11 @@ def test_the_commands(
     assert [line["state"] for line in lines] == ["done", "failed", "done"]
     assert cli.main(["status", str(out)]) == 1
     assert "2 of 3 done, 1 failed, 0 left" in capsys.readouterr().out
+    killed = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    killed["entries"][0]["state"] = "waiting"
+    for pid, ended in ((os.getpid(), False), (2**22 + 1, True), ("?", False)):
+        text = json.dumps(killed | {"pid": pid})
+        (out / "manifest.json").write_text(text, encoding="utf-8")
+        assert cli.main(["status", str(out)]) == 1
+        assert ("has ended" in capsys.readouterr().out) == ended
     assert cli.main(["status", str(tmp_path)]) == 2

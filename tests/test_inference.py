@@ -120,6 +120,10 @@ def test_a_saved_posterior_is_as_good(held_phantom, tmp_path):
     wanted = {"posterior", "prior", "log_likelihood", "observed_data", "posterior_predictive"}
     wanted |= {"prior_predictive"}
     assert wanted <= groups
+    # ArviZ weighs the one by the other (plot_loo_pit).
+    weighed, predicted = (data[name].sizes for name in ("log_likelihood", "posterior_predictive"))
+    assert weighed["chain"] == predicted["chain"] and weighed["draw"] == predicted["draw"]
+    assert weighed["window"] == predicted["frequency"]
     import arviz as az
 
     assert float(az.ess(data["posterior"]["kc"].values)) > 1000

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print it."""
-    from bayeshaptic.jobs.manifest import read_manifest
+    from bayeshaptic.jobs.manifest import has_ended, read_manifest
 
     entries = read_manifest(arguments.folder).values()
     if not entries:
@@ -34,6 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
         f"{arguments.folder}: {count['done']} of {len(entries)} done, {count['failed']} failed, "
         f"{count['waiting']} left"
     )
+    if count["waiting"] and has_ended(arguments.folder):
+        print("  its process has ended; the command of the batch, given again, goes on from here")
     for entry in entries:
         if entry.error:
             print(f"  {one_line(entry.error)}")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.files import write_whole
+from bayeshaptic.files import host, is_alive, write_whole
 from bayeshaptic.jobs.job import Job
 from bayeshaptic.provenance import sha256, versions
 from bayeshaptic.recordings.study_file import read_study
@@ -78,6 +78,15 @@ def read_manifest(folder: Path) -> dict[str, ManifestEntry]:
     return {entry.source: entry for entry in entries}
 
 
+def has_ended(folder: Path) -> bool:
+    """Whether the process that wrote the manifest was one of this machine, and lives no more."""
+    try:
+        content = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        return bool(content["host"] == host()) and not is_alive(int(content["pid"]))
+    except (OSError, ValueError, TypeError, KeyError):
+        return False
+
+
 def write_manifest(
     folder: Path,
     entries: Mapping[str, ManifestEntry],
@@ -90,6 +99,7 @@ def write_manifest(
         "command": command,
         "options": dict(options),
         "versions": versions(),
+        "host": host(),
         "pid": os.getpid(),
         "entries": [asdict(entry) for entry in entries.values()],
     }

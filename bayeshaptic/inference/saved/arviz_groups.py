@@ -182,8 +182,12 @@ def _about(posterior: Sampled) -> dict[str, Any]:
     return {MARK: json.dumps(about), "inference_library": "emcee"}
 
 
-def _thinned(posterior: Sampled, count: int) -> Floats:
-    """At most `count` draws of each walker, shape (chain, draw, P)."""
+def _thinned(posterior: Sampled) -> Floats:
+    """The draws of which there is a likelihood and a prediction, shape (chain, draw, P).
+
+    The same of both: ArviZ weighs the one by the other (``plot_loo_pit``).
+    """
+    count = 8  # of each walker: each is a whole response
     step = max(1, posterior.chains.shape[1] // count)
     return as_chains(posterior.chains[:, step - 1 :: step][:, :count])
 
@@ -191,8 +195,7 @@ def _thinned(posterior: Sampled, count: int) -> Floats:
 def _pointwise(posterior: Sampled) -> Group:
     windows = posterior.windows
     assert windows is not None
-    likelihood_draws = 20  # a walker
-    some = _thinned(posterior, likelihood_draws)
+    some = _thinned(posterior)
     values = Likelihood(posterior.model, windows).pointwise(some.reshape(-1, some.shape[2]))
     values = values.reshape(*some.shape[:2], -1)
     along = {
@@ -207,7 +210,7 @@ def _predictive(posterior: Sampled, prior: Floats, rng: np.random.Generator) -> 
     """The measured response, and what posterior and prior predict of it with its noise."""
     etfe = posterior.etfe
     assert etfe is not None
-    after, before = 4, 200  # draws a walker, and of the prior: each is a whole response
+    before = 200  # draws of the prior: each is a whole response
     unit = {"units": f"{etfe.position_unit}/{etfe.force_unit}"}
     where = {"frequency": Variable(("frequency",), etfe.frequency_hz)}
 
@@ -228,7 +231,7 @@ def _predictive(posterior: Sampled, prior: Floats, rng: np.random.Generator) -> 
     }
     sd = Variable(("frequency",), np.sqrt(etfe.variance), unit)
     return {
-        "posterior_predictive": predicted(_thinned(posterior, after)),
+        "posterior_predictive": predicted(_thinned(posterior)),
         "prior_predictive": predicted(prior[:, :before]),
         "observed_data": Group(observed, where),
         "constant_data": Group({"response_sd": sd}, where),
