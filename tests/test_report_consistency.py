@@ -79,6 +79,8 @@ def test_a_study_says_which_way_its_limit_goes(tmp_path: Path) -> None:
     found, limits = numbers_of(tmp_path, "population.json"), numbers_of(tmp_path, "limits.json")
     for risk, stiffness in found["device_limit"]["safe"].items():
         same(limits["stiffness"][risk], stiffness)
+    stated = re.search(r"Render walls of at most ([^(]+) \(", page)
+    assert stated and page.count(stated[1]) >= 3  # the sentence, the table, the walls
     for sentence, held in zip(configurations(study), (False, True), strict=True):
         rows = [c for c in found["configurations"] if c["held"] is held]
         first, last = (row["critical_stiffness"]["q50"] for row in (rows[0], rows[-1]))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.files import write_whole
-from bayeshaptic.quantities import quantity
+from bayeshaptic.quantities import quantity, rounded_down, spread_of
 from bayeshaptic.report.page.frame import finished, frame, template
 from bayeshaptic.report.page.lights import BAD, DOUBT, GOOD, SIGNS
 
@@ -49,7 +49,7 @@ def row_of(name: str, folder: Path, status: str | None, error: str | None) -> di
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return row | _of_study(folder)
+        return row | _of_study(folder, status)
     limit, recording = summary["critical_stiffness"], summary["recording"]
     return row | {
         "device": recording["device"],
@@ -73,13 +73,15 @@ def _safe(summary: Mapping[str, Any]) -> float | None:
     return stiffness
 
 
-def _of_study(folder: Path) -> dict[str, Any]:
+def _of_study(folder: Path, status: str | None) -> dict[str, Any]:
     try:
         population = json.loads((folder / "population.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     limit = population.get("device_limit") or {}
-    return {"device": population.get("device"), "safe": (limit.get("safe") or {}).get("0.01")}
+    safe = None if status == "untrusted" else (limit.get("safe") or {}).get("0.01")
+    known = {key: limit.get(key) for key in ("q05", "q50", "q95", "unit")}
+    return {"device": population.get("device"), "safe": safe, **known}
 
 
 def write_index(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -116,6 +118,17 @@ def _table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
     return text.getvalue()
 
 
+def _number(row: Mapping[str, Any], key: str) -> str:
+    """With the digits of the report's own page."""
+    value, unit = float(row[key]), row["unit"] or ""
+    if key == "frequency_hz":
+        return quantity(value, "Hz", digits=4)
+    low, high = (value if row[end] is None else float(row[end]) for end in ("q05", "q95"))
+    if key == "safe":
+        return rounded_down(value, unit, low, high).text
+    return quantity(value, unit, spread_of(low, high))
+
+
 def _shown(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """A row as the page shows it: (text, what to sort by) of each column, its light, its report."""
     cells = {}
@@ -123,8 +136,7 @@ def _shown(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         value = row[key]
         text = "" if value is None else str(value)
         if key in _NUMBERS:
-            unit = "Hz" if key == "frequency_hz" else row["unit"] or ""
-            text = "" if value is None else quantity(value, unit, digits=4)
+            text = "" if value is None else _number(row, key)
         cells[key] = (text, "" if value is None else value)
     page = None
     if row["error"] is None:

@@ -47,7 +47,8 @@ def facts(result: Result) -> Rows:
         rows.append(("At the tip", _interval(tip)))
     if analysis.hidden is not None:
         rows.append(("What could hide", in_short(analysis)))
-    rows.append(("What limits it", _binding(analysis)))
+    if doubted:  # a recommendation says it above
+        rows.append(("What limits it", _binding(analysis)))
     rows.append(("Model", _model(result)))
     rows.append(("Speaks for", _holder(analysis)))
     return tuple(rows)
