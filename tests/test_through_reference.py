@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.begun import begin
+from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.least_squares import least_squares
@@ -145,3 +146,31 @@ def test_a_reference_is_read_cut_and_joined(tmp_path: Path) -> None:
     joined = join_recordings([whole, part])
     assert joined.reference is not None and len(joined.reference) == joined.samples
     assert join_recordings([whole, replace(part, reference=None)]).reference is None
+
+
+def test_one_mass_that_rubs_is_followed_in_time_although_its_reference_was_written_down() -> None:
+    """Through the reference its dry friction was a damper, four times the true one."""
+    force = Bench.from_device("lhifam", False, "rigid").force_rms
+    bench = Bench.from_device("lhifam", False, "rigid").with_effect(
+        "coulomb_friction", force=0.3 * force
+    )
+    mass, rng = bench.values["m"], np.random.default_rng(3)
+    law = Feedback(mass * 20.0**2, 0.5 * mass * 20.0)
+    time_s = np.arange(round(SECONDS / bench.period_s)) * bench.period_s
+    tones = zip(rng.uniform(0.3, 4, 12), rng.uniform(0, 6, 12), strict=True)
+    target = sum(np.sin(2 * np.pi * f * time_s + p) for f, p in tones)
+    target += 0.02 * np.std(target) * rng.standard_normal(len(time_s))
+    target *= 0.57 * force / law.proportional
+    last = [0.0]
+
+    def control(k: int, position: float) -> float:
+        rate, last[0] = (position - last[0]) / bench.period_s if k else 0.0, position
+        return float(law.proportional * (target[k] - position) - law.derivative * rate)
+
+    done = run_loop(bench, control, SECONDS, seed=1)
+    made = recording_from_arrays(done.force, done.position, bench.period_s, reference=target)
+    closed = close_loop(made, hidden=False, held=False, ess=200)
+    assert closed.effect_names == ("coulomb_friction",)
+    found = closed.analysis.posterior.summary()
+    for name, truth in (("m", mass), ("b", bench.values["b"]), ("coulomb", 0.3 * force)):
+        assert abs(found[name]["mean"] - truth) < 4 * found[name]["sd"], name

@@ -146,6 +146,10 @@ def close_loop(
     began = time.perf_counter()
     begun, traced = traced_from_best_base(begun, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
+    if traced.verdict == UNEXPLAINED and begun.etfe.through_reference:
+        one_mass = _one_mass_instead(measurement, begun, model, chosen)
+        if one_mass is not None:
+            return one_mass
     changed = bool(traced.state.accepted)
     state = traced.state
     base = finish(
@@ -185,6 +189,22 @@ def _in_loop(
     traced = in_the_loop(trace_force(analysis.etfe, analysis.fit, force), analysis)
     error = _limit_alone(analysis)
     return Closed(analysis, analysis, traced, error, error, force)
+
+
+def _one_mass_instead(
+    measurement: Recording | Etfe | str | Path, begun: Begun, model: str | Model, options: Options
+) -> Closed | None:
+    """By the motion in its loop, where one mass and no linear effect is what a reference shows.
+
+    Through a reference the response is linear, and dry friction comes out as damping.  A mass that
+    is followed in time rubs; the result stands only where nothing speaks against it.
+    """
+    if begun.fit.model.name != "rigid":
+        return None
+    found = opened(measurement_of(measurement, model, options), "rigid", options)
+    force = explain_force(found.etfe.recording)
+    closed = None if force is None else _in_loop(found, force, model, options)
+    return None if closed is None or closed.verdict == UNEXPLAINED else closed
 
 
 def _refused(begun: Begun, force: ForceExplained | None, options: Options) -> Closed:
