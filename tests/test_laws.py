@@ -102,3 +102,23 @@ def test_names_in_the_table_mean_one_thing_each() -> None:
     shapes = [shape for _, shape in laws.fitted(MOTOR, usual)] + laws.corrections(usual)
     terms = [shape.name for shape in shapes]
     assert len(terms) == len(set(terms))
+
+
+def test_a_lag_that_nobody_knows_is_in_the_errors_of_inverse_dynamics() -> None:
+    """A mass in a clean loop that follows tones: its damping was 13 standard errors off."""
+    mass, damping, step_s = 0.5, 2.0, 1e-4
+    t = 1e-3 * np.arange(3000)
+    target = 0.02 * sum(np.sin(2 * np.pi * f * t + f) for f in (0.9, 1.7, 2.9, 4.3, 5.7))
+    x = v = 0.0
+    position, force = np.zeros((2, len(t)))
+    for k in range(len(t)):
+        position[k] = 1e-5 * np.round(x / 1e-5)
+        rate = (position[k] - position[k - 1]) / 1e-3
+        force[k] = 1500.0 * (target[k] - position[k]) - 30.0 * rate
+        for _ in range(10):  # the command of the sample before: a delay of one
+            v += step_s * (force[k - 1] - damping * v) / mass
+            x += step_s * v
+    found = inverse_dynamics(recording_from_arrays(force, position, 1e-3), terms=())
+    for name, truth in (("mass", mass), ("damping", damping)):
+        value, sd = found[name]
+        assert abs(value - truth) < 2 * sd < truth, name

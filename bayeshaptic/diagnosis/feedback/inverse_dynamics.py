@@ -23,6 +23,10 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
+# Samples by which the force acts later than it is written down, root mean square: the hold, the
+# loop's delay and the sensor's filter make anything from none to two.
+_LAG = float(np.sqrt(4 / 3))
+
 
 @dataclass(frozen=True)
 class Addition:
@@ -40,7 +44,9 @@ class InverseDynamics:
     ----------
     terms : tuple of Term
     value, sd : ndarray, shape (J,)
-        Coefficients; standard deviations allow for the residual's correlation within a second.
+        Coefficients; standard deviations allow for the residual's correlation within a second, and
+        for a lag between force and motion that nobody knows: of mass and damping in a short or a
+        clean recording that is nearly all.
     steps : tuple of Addition
         From the linear model on, each error that of one half with the coefficients of the other.
     tried : tuple of Addition
@@ -141,6 +147,8 @@ def inverse_dynamics(
     design = np.stack([columns[name] for name in chosen], axis=1)
     block_s = 1.0  # residuals further apart are taken to be independent
     value, sd = _solve(design, force, max(int(block_s / (every * recording.period_s)), 1))
+    late = thin(np.concatenate([recording.force[:1], recording.force[:-1]]))
+    sd = np.hypot(sd, _LAG * (np.linalg.lstsq(design, late, rcond=None)[0] - value))
     left = force - design @ value
     return InverseDynamics(
         tuple(Term(name, known[name].title, known[name].unit) for name in chosen),
