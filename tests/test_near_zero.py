@@ -9,9 +9,15 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.inference.coordinates import sampling_coordinates
+from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.laplace import _possible
-from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
+from bayeshaptic.inference.sampling.near_zero import (
+    _inside,
+    redrawing,
+    start_of,
+    with_near_zero,
+)
 from bayeshaptic.rig import Bench, simulate
 
 
@@ -85,6 +91,22 @@ def test_a_start_beside_what_follows_lies_in_the_support(fitted):
     there = replace(here, follow=follow)
     density = Density(fit.likelihood, there)
     assert np.isfinite(density(start_of(there, replace(fit, theta=theta))[None])[0])
+
+
+def test_a_start_is_no_further_from_zero_than_precise_data_allow(fitted):
+    _, _, fit, _, here = fitted
+    g = fit.response(fit.windows.frequency_hz.ravel()).reshape(fit.windows.frequency_hz.shape)
+    target = np.einsum("wij,wj->wi", fit.windows.design, g)
+    exact = replace(fit.windows, target=target, scatter=1e-7 * fit.windows.scatter)
+    precise = summarise(fit.model, exact, fit.theta)
+
+    def lost(phi):
+        likelihood = precise.likelihood(here.natural(phi[None]))[0]
+        return precise.log_likelihood - likelihood
+
+    assert lost(_inside(here, precise, 0.3)) > 10 * fit.model.size
+    assert lost(start_of(here, precise)) < fit.model.size
+    assert (start_of(here, fit) == _inside(here, fit, 0.3)).all()  # usual data let it
 
 
 def test_coordinates_go_there_and_back_and_know_their_jacobian(fitted):

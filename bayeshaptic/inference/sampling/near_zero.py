@@ -74,9 +74,22 @@ def _followed(slope: Floats, small: list[int]) -> Floats:
 
 
 def start_of(here: Coordinates, fit: Fit) -> Floats:
-    """The fit in the coordinates `here`, shape (P,), inside the support."""
+    """The fit in the coordinates `here`, shape (P,), inside the support.
+
+    The small ones begin at a quantile of their priors, because zero is an end: at one where the
+    data are not yet against it by more than they are against draws of the posterior.
+    """
+    lost = len(fit.theta)  # log likelihood; half of it is what draws lose
+    for begin in (0.3, 0.1, 0.03, 0.01):
+        phi = _inside(here, fit, begin)
+        if fit.likelihood(here.natural(phi[None]))[0] > fit.log_likelihood - lost:
+            break
+    return phi
+
+
+def _inside(here: Coordinates, fit: Fit, begin: float) -> Floats:
+    """The fit, the small parameters at a quantile of their priors at least."""
     phi = here.coordinate(fit.theta)
-    begin = 0.3  # quantile of the prior at which to begin: zero is an end
     for index in here.near_zero:  # the others follow
         inner = fit.theta.copy()
         inner[index] = float(fit.model.prior(fit.model.names[index]).quantile(begin))
