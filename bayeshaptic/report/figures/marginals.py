@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import Scale, scale
+from bayeshaptic.quantities import scale
 from bayeshaptic.report.figures import style
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
         linestyle="-.",
         label="least squares",
     )
-    style.panel(axes, grid=False, title=_title(name, row), size=style.FONT - 0.5)
+    style.panel(axes, grid=False, title=style.named(name, row.unit), size=style.FONT - 0.5)
     axes.set_xlim(low * row.factor, high * row.factor)
     axes.set_ylim(0, 1.12 * max(float(density.max()), float(prior[np.isfinite(prior)].max())))
     axes.set_yticks([])
@@ -79,10 +79,6 @@ def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
     _ticks(axes)
     if analysis.stated.prior_dominated.get(name):
         axes.set_xlabel("the prior decides this one", fontsize=style.SMALL, style="italic")
-
-
-def _title(name: str, row: Scale) -> str:
-    return f"{style.short(name)} [{row.unit}]" if row.unit else name
 
 
 def _range(

@@ -57,7 +57,7 @@ def draw(result: Result) -> Figure:
     middles = np.median(draws[:, chosen], axis=0)
     units = [analysis.model.unit(name) for name in names]
     rows = [scale(float(m), unit) for m, unit in zip(middles, units, strict=True)]
-    label = [f"{style.short(n)}\n[{row.unit}]" for n, row in zip(names, rows, strict=True)]
+    label = [style.named(n, row.unit, "\n") for n, row in zip(names, rows, strict=True)]
     scaled = draws[:, chosen] * [row.factor for row in rows]
     for (i, j), axes in panels.items():
         _pair(axes, scaled[:, j], scaled[:, i + 1], matrix[chosen[j], chosen[i + 1]])
@@ -98,8 +98,8 @@ def draw_on(axes: Axes, result: Result, x: str, y: str) -> None:
     ]
     across, up = (chosen * [row.factor for row in rows]).T
     _pair(axes, across, up, correlation(chosen)[0, 1])
-    axes.set_xlabel(f"{style.short(x)} [{rows[0].unit}]", fontsize=style.FONT)
-    axes.set_ylabel(f"{style.short(y)} [{rows[1].unit}]", fontsize=style.FONT)
+    axes.set_xlabel(style.named(x, rows[0].unit), fontsize=style.FONT)
+    axes.set_ylabel(style.named(y, rows[1].unit), fontsize=style.FONT)
 
 
 def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float) -> None:

@@ -181,6 +181,11 @@ def short(name: str) -> str:
     return without_unit.replace("_", " ")
 
 
+def named(name: str, unit: str, between: str = " ") -> str:
+    """A parameter's name in words, and its unit where it has one."""
+    return f"{short(name)}{between}[{unit}]" if unit else short(name)
+
+
 @dataclass(frozen=True)
 class Drawn:
     """A figure that is drawn.
