@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
+from bayeshaptic.inference import sampler
 from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.laplace import _possible
 from bayeshaptic.inference.sampling.near_zero import (
-    _inside,
+    inside,
     redrawing,
     start_of,
     with_near_zero,
 )
-from bayeshaptic.rig import Bench, simulate
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 
 def measured(seed: int) -> tuple[bh.Etfe, Bench]:
@@ -104,9 +105,9 @@ def test_a_start_is_no_further_from_zero_than_precise_data_allow(fitted):
         likelihood = precise.likelihood(here.natural(phi[None]))[0]
         return precise.log_likelihood - likelihood
 
-    assert lost(_inside(here, precise, 0.3)) > 10 * fit.model.size
+    assert lost(inside(here, precise, 0.3)) > 10 * fit.model.size
     assert lost(start_of(here, precise)) < fit.model.size
-    assert (start_of(here, fit) == _inside(here, fit, 0.3)).all()  # usual data let it
+    assert (start_of(here, fit) == inside(here, fit, 0.3)).all()  # usual data let it
 
 
 def test_coordinates_go_there_and_back_and_know_their_jacobian(fitted):
@@ -199,3 +200,31 @@ def test_the_limit_of_a_published_zero_is_not_pushed_up():
         ranks.append(np.mean(limit.samples < bench.true_critical_stiffness()))
     assert min(ranks) > 0.05 and max(ranks) < 0.95
     assert np.mean(ranks) > 0.25
+
+
+# Light on its bearings: what one damper has, the other could not give it.
+LIGHT = {"m1": 0.05, "b1": 0.23, "bc": 22.6, "kc": 111e3, "m2": 3.1, "b2": 0.0}
+
+
+@pytest.fixture(scope="module")
+def light() -> tuple[bh.Etfe, bh.Fit, float]:
+    bench = Bench.from_device("lhifam", values=LIGHT)
+    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 30.0)
+    etfe = bh.estimate_etfe(bh.recording_from_arrays(**simulate(bench, noise, seed=3).signals))
+    fit = bh.least_squares(bh.free(delay_s=bench.delay_s, period_s=bench.period_s), etfe)
+    return etfe, fit, bench.true_critical_stiffness()
+
+
+def test_a_light_device_without_a_file_has_its_limit(light):
+    etfe, fit, truth = light
+    posterior = bh.sample(fit.model, etfe, start=fit, ess=200, seed=1)
+    low, high = bh.critical_stiffness(posterior).quantile([0.001, 0.999])
+    assert posterior.converged and low < truth < high
+
+
+def test_chains_that_agree_in_a_wrong_valley_have_not_converged(light, monkeypatch):
+    etfe, fit, _ = light
+    # As far up as the prior would have it, where the other damper cannot follow.
+    monkeypatch.setattr(sampler, "start_of", lambda here, fit: inside(here, fit, 0.3))
+    posterior = bh.sample(fit.model, etfe, start=fit, ess=200, seed=1, most_evaluations=100_000)
+    assert not posterior.converged and "best fit" in posterior.message

@@ -18,7 +18,7 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.inference.sampling.laplace import laplace
-from bayeshaptic.inference.sampling.near_zero import redrawing, start_of, with_near_zero
+from bayeshaptic.inference.sampling.near_zero import inside, redrawing, start_of, with_near_zero
 from bayeshaptic.inference.sampling.run import Run, run_until_done
 from bayeshaptic.inference.saved.checkpoint import Checkpoint, Stored, key_of
 from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
@@ -32,6 +32,13 @@ from bayeshaptic.version import __version__
 
 DEFAULT_ESS = 2000
 MOST_EVALUATIONS = 1_500_000
+# Log density of the best fit over that of the best draw, beside one a parameter, from which on the
+# chains have not found it: they agree with each other in a valley that is none.
+LOST = 10.0
+_LOST = (
+    "Not converged: the chains agree with each other, but none of them comes near the best fit. "
+    "Record again, or give a device file or priors of your own."
+)
 
 
 @dataclass
@@ -141,13 +148,15 @@ def sample(
         report,
         keep,
     )
+    best = density(inside(here, fit))[0]
+    lost = best - run.values.max() > LOST + len(origin)
     return Posterior(
         fit.model,
         here.natural(run.chains),
         _log_likelihoods(density, run.chains, run.values),
         verdict.diagnostics,
-        verdict.done,
-        _message(verdict, counted.count),
+        verdict.done and not lost,
+        _LOST if lost else _message(verdict, counted.count),
         time.perf_counter() - began,
         seed,
         fit.windows,

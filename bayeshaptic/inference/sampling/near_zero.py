@@ -81,14 +81,14 @@ def start_of(here: Coordinates, fit: Fit) -> Floats:
     """
     lost = len(fit.theta)  # log likelihood; half of it is what draws lose
     for begin in (0.3, 0.1, 0.03, 0.01):
-        phi = _inside(here, fit, begin)
+        phi = inside(here, fit, begin)
         if fit.likelihood(here.natural(phi[None]))[0] > fit.log_likelihood - lost:
             break
     return phi
 
 
-def _inside(here: Coordinates, fit: Fit, begin: float) -> Floats:
-    """The fit, the small parameters at a quantile of their priors at least."""
+def inside(here: Coordinates, fit: Fit, begin: float = 0.0) -> Floats:
+    """The fit inside the support, the small parameters at a quantile of their priors at least."""
     phi = here.coordinate(fit.theta)
     for index in here.near_zero:  # the others follow
         inner = fit.theta.copy()
@@ -96,8 +96,8 @@ def _inside(here: Coordinates, fit: Fit, begin: float) -> Floats:
         phi[index] = max(phi[index], here.coordinate(inner)[index])
     # One that follows to beyond its own end, a delay of nothing say, stays at that.
     own = here.own(phi)
-    inside = 1e-6  # of a prior's width, or of a logarithm
-    return phi + np.clip(own, here.low + inside, here.high - inside) - own
+    margin = 1e-6  # of a prior's width, or of a logarithm
+    return phi + np.clip(own, here.low + margin, here.high - margin) - own
 
 
 def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:
