@@ -18,7 +18,7 @@ from bayeshaptic.inference import choose
 from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
 from bayeshaptic.models.hand import from_a_hand
 
-SIZES = {"rigid": 2, "free": 6, "grasped": 11}
+SIZES = {"rigid": 2, "free": 6, "chain-2": 10, "grasped": 11}
 
 
 def fit(name: str, chi_square: float, further: int = 0) -> Any:
@@ -115,6 +115,14 @@ def test_a_hand_that_is_like_none_is_compared_with_what_nobody_holds(monkeypatch
     misfits = {"free": 90.0, "grasped": 1.0}
     assert chosen_of(monkeypatch, "grasped", misfits, found, 4.0) == ("grasped", ["grasped"])
     assert chosen_of(monkeypatch, "grasped", misfits, found, 60.0) == ("free", ["grasped", "free"])
+
+
+def test_beside_a_chain_that_misfits_a_mode_may_be_on_the_motor(monkeypatch) -> None:
+    """A free device with a mode on its motor is no chain, and a chain with a mode more fits it."""
+    found = {name: traced(name, EXPLAINED, 1.0, 3) for name in ("chain-2", "grasped", "free")}
+    misfits = {"free": 3e4, "chain-2": 3700.0, "grasped": 3900.0}
+    tried = ["chain-2", "grasped", "free"]
+    assert chosen_of(monkeypatch, "chain-2", misfits, found) == ("free", tried)
 
 
 def test_hands_are_near_what_hands_are_like() -> None:

@@ -59,7 +59,8 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
     """The base models that could be instead: none where the chosen one was asked for, or fits.
 
     A hand that is like none is no better than a misfit.  A rigid device with a mode is a free one,
-    and a free one with a mode a chain: of those that nobody holds the best is enough.
+    and a free one with a mode on its body a chain; one with a mode on its motor is none, so that
+    beside a chain that misfits the free device is tried, too.
     """
     choice = begun.choice
     if choice is None:
@@ -72,7 +73,9 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
     if begun.fit.model.name == "rigid":
         return tuple(name for name in others if name != "chain-2")
     there = [name for name, one in others.items() if one.held != chosen.held]
-    return tuple(sorted(there, key=lambda name: others[name].score)[:1])
+    best = sorted(there, key=lambda name: others[name].score)[:1]
+    beside = ["free"] if begun.fit.model.name == "chain-2" and "free" in others else []
+    return (*best, *beside)
 
 
 def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
