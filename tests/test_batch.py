@@ -14,6 +14,7 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic import cli
+from bayeshaptic.commands.talk import Talk
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs import batch, executors
 from bayeshaptic.jobs.job import Job
@@ -131,7 +132,11 @@ def test_any_executor(folder: Path, tmp_path: Path, reports: Reports) -> None:
 
 
 def test_the_commands(
-    folder: Path, tmp_path: Path, reports: Reports, capsys: pytest.CaptureFixture[str]
+    folder: Path,
+    tmp_path: Path,
+    reports: Reports,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out = tmp_path / "out"
     command = ["batch", str(folder), "-o", str(out), "--workers", "1", "--log", "json"]
@@ -140,6 +145,12 @@ def test_the_commands(
     assert [line["state"] for line in lines] == ["done", "failed", "done"]
     assert cli.main(["status", str(out)]) == 1
     assert "2 of 3 done, 1 failed, 0 left" in capsys.readouterr().out
+    # What was done before is no part of the forecast.
+    shares: list[float] = []
+    monkeypatch.setattr(Talk, "progress", lambda self, share, word: shares.append(share))
+    assert cli.main(command[:-2]) == 1
+    assert shares == [0.0, 0.0, 1.0]
+    capsys.readouterr()
     killed = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
     killed["entries"][0]["state"] = "waiting"
     for pid, ended in ((os.getpid(), False), (2**22 + 1, True), ("?", False)):

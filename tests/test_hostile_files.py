@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from test_readers import WRITERS, mapping_of
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import read_recording, read_study
-from bayeshaptic.recordings.readers import reader_for
+from bayeshaptic.recordings.readers import read_arrays, reader_for
 
 few = settings(
     max_examples=25,
@@ -55,6 +56,27 @@ def test_a_table_is_read_as_it_was_written(
     _, force, position = np.array(rows).T
     np.testing.assert_array_equal(recording.force, force)
     np.testing.assert_allclose(recording.position, position * (1e-3 if units else 1), rtol=1e-14)
+
+
+@few
+@given(
+    start=st.datetimes(datetime(2000, 1, 1), datetime(2060, 1, 1)),
+    form=st.sampled_from(["%d.%m.%Y %H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%fZ", "%I:%M:%S.%f %p"]),
+    missing=st.sets(st.integers(0, 19), max_size=5),
+    empty=st.sampled_from(["", "NA", "n/a", "-", "null", "NaN"]),
+)
+def test_clock_times_and_empty_fields(
+    tmp_path: Path, start: datetime, form: str, missing: set[int], empty: str
+) -> None:
+    """Over midnight and noon, too."""
+    stamps = [(start + timedelta(milliseconds=10 * i)).strftime(form) for i in range(20)]
+    rows = [f"{t},{i + 0.5},{empty if i in missing else i}" for i, t in enumerate(stamps)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["t,u,q", *rows, ""]), encoding="utf-8")
+    found = read_arrays(path)
+    np.testing.assert_allclose(np.diff(found["t"]), 0.01, atol=1e-9)
+    assert found["u"].tolist() == [i + 0.5 for i in range(20)]
+    assert set(np.flatnonzero(np.isnan(found["q"]))) == missing
 
 
 def damaged(content: bytes, damage: list[tuple[float, int]], cut: float) -> bytes:

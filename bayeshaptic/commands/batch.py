@@ -91,11 +91,13 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         execute = executors.processes(arguments.workers or executors.usable_cores())
     as_json = arguments.log == "json"
+    before = 0  # done by an earlier run, which says nothing of how long the others take
     with Talk(arguments.quiet or as_json) as talk:
 
         def tell(
             entry: ManifestEntry, reports: tuple[Reported, ...], done: int, count: int
         ) -> None:
+            nonlocal before
             if as_json:
                 facts = {"source": entry.source, "state": entry.state, "error": entry.error}
                 more = {"seconds": entry.seconds, "done": done, "of": count}
@@ -107,7 +109,9 @@ def run(arguments: argparse.Namespace) -> int:
                 talk.complain(entry.error if named else f"{entry.source}: {entry.error}")
             else:
                 talk.say(f"{entry.source}: done before, unchanged")
-            talk.progress(done / count, f"{done} of {count}")
+                before += 1
+            left = count - before
+            talk.progress((done - before) / left if left else 1.0, f"{done} of {count}")
 
         entries = run_batch(
             arguments.sources,
