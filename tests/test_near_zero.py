@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from bayeshaptic.inference import sampler
 from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.sampling.density import Density
-from bayeshaptic.inference.sampling.laplace import _possible
+from bayeshaptic.inference.sampling.laplace import _possible, laplace
 from bayeshaptic.inference.sampling.near_zero import (
     inside,
     redrawing,
@@ -228,3 +229,20 @@ def test_chains_that_agree_in_a_wrong_valley_have_not_converged(light, monkeypat
     monkeypatch.setattr(sampler, "start_of", lambda here, fit: inside(here, fit, 0.3))
     posterior = bh.sample(fit.model, etfe, start=fit, ess=200, seed=1, most_evaluations=100_000)
     assert not posterior.converged and "best fit" in posterior.message
+
+
+def test_what_follows_a_small_damper_leans_on_a_wall_only_where_it_is_there_itself():
+    """Its coordinate, what is left beside the small one, may be below zero all the same."""
+    etfe = bh.estimate_etfe(Path(__file__).parent.parent / "data/recordings/lhifam-free.csv.gz")
+    fit = bh.least_squares(bh.free(), etfe)
+    here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
+    index = fit.model.names.index("delay_s")
+    follow = here.follow.copy()
+    small = fit.theta[list(here.near_zero)]
+    follow[index] = 20 * fit.theta[index] / here.scale[index] / small / len(small)
+    there = replace(here, follow=follow)
+    start = there.coordinate(fit.theta)
+    assert start[index] < 0 < there.own(start)[index]
+    density = Density(fit.likelihood, there)
+    peak, _ = laplace(density, start)
+    assert density(peak[None])[0] > density(start[None])[0] - 5

@@ -43,17 +43,19 @@ def laplace(density: Density, phi: Floats) -> tuple[Floats, StudentMixture]:
     peak = _climb(density, phi, everything, widths)
     covariance = _inverse(-_hessian(density, peak, widths))
     sd = np.sqrt(np.diag(covariance))
-    leaning = here.walls & ((peak - here.low) < sd)
+    # Walls are of parameters by themselves, and a coordinate may be what is left beside another.
+    low = here.low - (here.own(peak) - peak)
+    leaning = here.walls & ((peak - low) < sd)
     if not leaning.any():
         return _possible(density, peak, phi), student(peak, covariance)
 
     block = covariance[np.ix_(leaning, leaning)]
     draws = 2000  # for the moments of a truncated normal
-    mean, spread = moments_above(here.low[leaning], peak[leaning], block, draws)
+    mean, spread = moments_above(low[leaning], peak[leaning], block, draws)
     # Along the ridge: across it, the others would not find their way back.
     along = np.linalg.solve(block, mean - peak[leaning])
     inside = peak + covariance[:, leaning] @ along
-    inside = np.where(here.walls, np.maximum(inside, here.low), inside)
+    inside = np.where(here.walls, np.maximum(inside, low), inside)
     inside[leaning] = mean
     inside = _within(density, inside, widths)
     inside = _climb(density, inside, ~leaning, widths)
