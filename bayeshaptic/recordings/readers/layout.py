@@ -80,7 +80,9 @@ def find_layout(
             len(one) == width and all(one) and not any(map(_is_number, one)) for one in below
         )
 
-    first = next(row for row in filter(holds_numbers, range(rows)) if not above_a_header(row))
+    top = next(filter(holds_numbers, range(rows)))
+    below = (row for row in range(top, rows) if holds_numbers(row) and not above_a_header(row))
+    first = next(below, top)  # the top where words stand below every row
     # Many programs end every row with a separator.
     closed = all(fields[-1] == "" for fields in of_width)
     names = _names(fields_of, first, width, closed, remarks, where)
