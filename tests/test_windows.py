@@ -108,6 +108,19 @@ def test_leakage_and_a_parabola_are_represented_exactly():
     assert np.all(windows.scatter < 1e-12 * np.sum(np.abs(windows.target) ** 2, axis=1))
 
 
+def test_more_columns_than_lines_leave_rows_of_zeros():
+    """Slopes of a motion in all parameters of a chain are more than a short window has lines."""
+    rng = np.random.default_rng(5)
+    spectra = estimate_etfe(record(Device(RIGID), rng, 8000)).spectra
+    widest = int(np.diff(spectra.edges).max())
+    inputs = rng.normal(size=(widest, len(spectra.frequency_hz), 2)) @ [1, 1j]
+    few, many = spectra.windows(), spectra.windows(inputs=inputs)
+    assert many.design.shape[1:] == (widest + 3, widest + 3)
+    left = (np.sum(np.abs(w.target) ** 2, axis=1) + w.scatter for w in (few, many))
+    assert next(left) == pytest.approx(next(left), rel=1e-9)
+    assert not many.design[:, widest:].any() and not many.target[:, widest:].any()
+
+
 @pytest.mark.parametrize("seconds", [2.0, 30.0, 300.0])
 @pytest.mark.parametrize("minimum", [12, 24])
 def test_window_edges(seconds, minimum):

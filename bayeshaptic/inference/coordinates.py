@@ -59,7 +59,8 @@ class Coordinates:
 
     def natural(self, phi: Floats) -> Floats:
         own = self.own(phi)
-        theta = np.where(self.log, np.exp(np.where(self.log, own, 0.0)), own * self.scale)
+        with np.errstate(over="ignore"):  # far outside, where the density is none
+            theta = np.where(self.log, np.exp(np.where(self.log, own, 0.0)), own * self.scale)
         if self.near_zero:
             theta[..., self.near_zero] = self._small(phi)
         return theta

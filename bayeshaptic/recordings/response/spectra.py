@@ -142,21 +142,23 @@ class RandomSpectra:
         Returns
         -------
         Windows
-            With k = 3 nodes a window.
+            With k = 3 nodes a window, and J more columns; where that is more than a window has
+            lines, rows of zeros.
         """
         reference = reference or self.reference
         columns = regressors(self.frequency_hz, self.nodes_hz, reference, inputs)
         count, k = len(self.nodes_hz), columns.count
-        design = np.empty((count, k, k), dtype=complex)
-        target = np.empty((count, k), dtype=complex)
+        design = np.zeros((count, k, k), dtype=complex)
+        target = np.zeros((count, k), dtype=complex)
         scatter = np.empty(count)
         for block in self._blocks:
             moved = [block.force[..., None] * columns.response(block), *columns.known(block)]
             column = project_out(block.leakage, np.concatenate(moved, axis=-1))
-            q, design[block.window] = np.linalg.qr(column)
+            q, triangle = np.linalg.qr(column)
             z = np.einsum("wlk,wl->wk", q.conj(), block.position)
             rest = block.position - np.einsum("wlk,wk->wl", q, z)
-            target[block.window] = z
+            rows = z.shape[1]
+            design[block.window, :rows], target[block.window, :rows] = triangle, z
             scatter[block.window] = np.sum(np.abs(rest) ** 2, axis=1)
         lines = np.diff(self.edges) - LEAKAGE_TERMS
         return Windows(
