@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
+from bayeshaptic.diagnosis.begun import begin
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.days import between_pieces
@@ -158,3 +160,18 @@ def test_a_study_joins_what_nothing_tells_apart(tmp_path: Path) -> None:
     assert read("pool = true\n") == [2]  # one that cannot be read takes none with it
     joined = bh.read_study(path).read_all()[0]
     assert any(n.level == "warning" and "1.csv" in n.text for n in joined.notices)
+
+
+def test_pieces_in_open_loop_say_what_is_not_looked_for_in_them() -> None:
+    rng = np.random.default_rng(4)
+    force = rng.standard_normal((2, 4000))
+    position = np.cumsum(np.cumsum(force, axis=1), axis=1) * 1e-6
+    pieces = [bh.recording_from_arrays(u, x, 1e-3) for u, x in zip(force, position, strict=True)]
+    (notice,) = (
+        n
+        for n in begin(bh.join_recordings(pieces), "rigid", Options()).notices
+        if (n.level, n.topic) == ("warning", "pieces")
+    )
+    assert "friction" in notice.text
+    alone = begin(pieces[0], "rigid", Options()).notices
+    assert not any(n.topic == "pieces" for n in alone)

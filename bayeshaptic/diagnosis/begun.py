@@ -151,6 +151,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
             etfe, notices = _response(measurement, options.band_hz, notices)
+            notices += _not_looked_for(measurement, notices)
     else:
         etfe = measurement
     lever_m = options.lever_m
@@ -199,6 +200,18 @@ def _opened(
     if (model.name if isinstance(model, Model) else model) == "rigid":
         return replace(recording, reference=None), notices
     return through_reference(recording, notices)
+
+
+def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+    """What no test looks for in pieces: the motion of one says nothing of how the next began."""
+    if not recording.joints or has_feedback(notices):
+        return ()
+    text = (
+        "In several pieces taken as one neither dry friction (nor any other force that is not "
+        "linear), drift, nor faults of samples are looked for, and friction makes the limit too "
+        "high: report on the longest piece by itself, too, and believe the lower limit."
+    )
+    return (Notice("warning", "pieces", text),)
 
 
 def _response(
