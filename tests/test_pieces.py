@@ -10,6 +10,7 @@ import pytest
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.begun import begin
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.days import between_pieces
@@ -175,3 +176,18 @@ def test_pieces_in_open_loop_say_what_is_not_looked_for_in_them() -> None:
     assert "friction" in notice.text
     alone = begin(pieces[0], "rigid", Options()).notices
     assert not any(n.topic == "pieces" for n in alone)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_friction_shows_in_the_longest_piece(friction: float) -> None:
+    bench = Bench.from_device("lhifam", False, "free")
+    if friction:
+        bench = bench.with_effect("coulomb_friction", force=friction * bench.force_rms)
+    played = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 5.0)
+    made = [simulate(bench, played, seed=seed) for seed in (1, 2)]
+    etfe = estimate_etfe(
+        bh.join_recordings([bh.recording_from_arrays(**one.signals) for one in made])
+    )
+    fit = least_squares(build_model("free", period_s=bench.period_s), etfe)
+    found = [test.name for test in nonlinear_tests(fit, etfe) if test.flagged]
+    assert ("sign(v)" in found) == bool(friction)

@@ -207,9 +207,9 @@ def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[
     if not recording.joints or has_feedback(notices):
         return ()
     text = (
-        "In several pieces taken as one neither dry friction (nor any other force that is not "
-        "linear), drift, nor faults of samples are looked for, and friction makes the limit too "
-        "high: report on the longest piece by itself, too, and believe the lower limit."
+        "In several pieces taken as one neither drift nor faults of samples are looked for, and "
+        "dry friction (or any other force that is not linear) in the longest alone; it is not "
+        "taken off, and makes the limit too high: report on the longest piece by itself, too."
     )
     return (Notice("warning", "pieces", text),)
 

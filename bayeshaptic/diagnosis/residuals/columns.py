@@ -15,19 +15,29 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import COMMAND, LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
+from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
-    """One test for each nonlinear function of command and motion; none without a recording."""
+    """One test for each nonlinear function of command and motion; none without a recording.
+
+    Of several pieces the longest is looked at: what holds there is of the device.
+    """
     recording = etfe.unbroken
+    if etfe.recording is not None and etfe.recording.joints:
+        recording = max(etfe.recording.pieces, key=lambda piece: piece.samples)
+        try:
+            etfe = estimate_etfe(recording)
+        except InputError:
+            return ()
     if recording is None or etfe.period_lines is not None:
         return ()
     tests = []

@@ -50,7 +50,7 @@ def nonlinear_trials(
     tick : callable, optional
         Called with the title of each candidate.
     """
-    recording = state.etfe.recording
+    recording = state.etfe.unbroken
     if recording is None:
         return []
     bench = ForceBench(state, recording)
