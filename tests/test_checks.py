@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from tiny_bench import PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
 from bayeshaptic.recordings.checks import FEWEST_SAMPLES
+from bayeshaptic.recordings.read import recording_from_arrays
 from bayeshaptic.recordings.units_in_doubt import steps_of_a_turn
 
 MEASURED = Path(
@@ -216,3 +218,18 @@ def test_the_measured_recordings() -> None:
             pytest.skip(f"measured recording not found: {path} (set BAYESHAPTIC_MEASURED)")
         notices = check_recording(read_recording(path, columns))
         assert [notice.topic for notice in notices] == expected
+
+
+@pytest.mark.parametrize(("units", "doubted"), [(None, True), (("N", "m"), False)])
+def test_a_mass_of_170_kg_is_doubted_where_nobody_said_the_units(
+    units: tuple[str, str] | None, doubted: bool
+) -> None:
+    """A sixth of a kilogram whose positions are in a unit a thousand times too large."""
+    rng = np.random.default_rng(5)
+    force, mass, pole = rng.standard_normal(4000), 170.0, 0.99
+    velocity = lfilter([0.0, PERIOD / mass], [1.0, -pole], force)
+    position = lfilter([0.0, PERIOD], [1.0, -0.995], velocity)
+    said = {} if units is None else {"force_unit": units[0], "position_unit": units[1]}
+    recording = recording_from_arrays(force=force, position=position, period_s=PERIOD, **said)
+    texts = [notice.text for notice in check_recording(recording)]
+    assert any("slip of units" in text for text in texts) == doubted

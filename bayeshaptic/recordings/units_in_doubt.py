@@ -10,10 +10,12 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 from bayeshaptic.types import Floats
 
-# Mass of a device as its motor feels it: the lightest, a usual and the heaviest one.
+# Mass of a device as its motor feels it: the lightest, a usual and the heaviest one; and from where
+# on it is doubted if nobody said the units, since what is a thousand times too heavy gets a limit
+# that is a thousand times too high.
 _MASSES = {
-    ("N", "m"): (3e-3, 0.5, 500.0, "kg"),
-    ("Nm", "rad"): (1e-7, 1e-3, 10.0, "kg m^2"),
+    ("N", "m"): (3e-3, 0.5, 500.0, 50.0, "kg"),
+    ("Nm", "rad"): (1e-7, 1e-3, 10.0, 0.3, "kg m^2"),
 }
 
 
@@ -93,10 +95,11 @@ def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]
     kind = (recording.force_unit, recording.position_unit)
     if kind not in _MASSES:
         return []
-    lightest, usual, heaviest, unit = _MASSES[kind]
+    lightest, usual, heaviest, doubted, unit = _MASSES[kind]
+    said_nothing = any(n.topic == "units" for n in recording.notices)
     s = 2j * np.pi * clear.frequency_hz
     mass = float(np.median(np.abs(1 / (s**2 * clear.response))))
-    if lightest < mass < heaviest:
+    if lightest < mass < (doubted if said_nothing else heaviest):
         return []
     factor = min((1e-6, 1e-3, 1e3, 1e6), key=lambda f: abs(np.log(mass * f / usual)))
     smaller, larger = ("small", "large") if factor > 1 else ("large", "small")
@@ -104,8 +107,7 @@ def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]
     asked = f" (are they in {named}?)" if named else ""
     term = f"[{named}]" if named else f"*{1 / factor:g}[{recording.position_unit}]"
     turns = ""
-    said_nothing = any(n.topic == "units" for n in recording.notices)
-    low, _, high, _ = _MASSES["Nm", "rad"]
+    low, _, high, _, _ = _MASSES["Nm", "rad"]
     if said_nothing and kind == ("N", "m") and low < mass < high:
         turns = " If it turns: force=NAME[Nm],position=NAME[rad]."
     times = max(factor, 1 / factor)
