@@ -167,8 +167,20 @@ class _Both(RendererBase):
         for raster in self._rasters():
             raster.draw_text(gc, x, y, s, prop, angle, ismath, mtext)
         if not self._in_pixels_only:
-            place = x * self._factor, y * self._factor
+            place = x * self._factor + self._wider(s, prop, angle, ismath, mtext), y * self._factor
             self._vector.draw_text(self._in_points(gc), *place, s, prop, angle, ismath)
+
+    def _wider(self, text: str, font: Any, angle: float, ismath: Any, artist: Any) -> float:
+        """What the layout has too much before a text, in points: letters of whole pixels are wider.
+
+        So that labels end at their axis, and titles stand in the middle.
+        """
+        share = {"right": 1.0, "center": 0.5}.get(artist.get_ha() if artist else "left", 0.0)
+        if angle or not share:
+            return 0.0
+        laid_out = self.get_text_width_height_descent(text, font, ismath)[0] * self._factor
+        drawn = self._vector.get_text_width_height_descent(text, font, ismath)[0]
+        return float(share * (laid_out - drawn))
 
     def start_rasterizing(self) -> None:
         self._layer = RendererAgg(*self._size, self.dpi)
