@@ -237,7 +237,7 @@ def spoil(recording: Path, target: Path, how: str) -> None:
         ("50 samples", "too few"),
         ("swapped columns", "swapped"),
         ("zero variance", "never changes"),
-        ("cut off", "fields"),
+        ("cut off", "it is the last one, where the file was cut off"),
     ],
 )
 def test_bad_recordings_are_one_line_and_leave_nothing(
