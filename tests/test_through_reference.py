@@ -37,6 +37,18 @@ def wanted(kind: str, bench: Bench, size: float) -> Floats:
     return np.repeat(size * rng.standard_normal(count // 200 + 1), 200)[:count]
 
 
+def following(bench: Bench, law: Feedback, target: Floats) -> Recording:
+    """The bench under a PD controller that answers to every count."""
+    last = [0.0]
+
+    def control(k: int, position: float) -> float:
+        rate, last[0] = (position - last[0]) / bench.period_s if k else 0.0, position
+        return float(law.proportional * (target[k] - position) - law.derivative * rate)
+
+    done = run_loop(bench, control, SECONDS, seed=1)
+    return recording_from_arrays(done.force, done.position, bench.period_s, reference=target)
+
+
 def in_loop(
     kind: str = "noise", held: bool = False, counts: float = 1.0
 ) -> tuple[Recording, Bench, Feedback]:
@@ -46,15 +58,7 @@ def in_loop(
     mass = bench.values["m1"] + bench.values["m2"]
     law = Feedback(mass * 20.0**2, 0.5 * mass * 20.0)
     target = wanted(kind, bench, 2 * bench.force_rms / law.proportional)
-    last = [0.0]
-
-    def control(k: int, position: float) -> float:
-        rate, last[0] = (position - last[0]) / bench.period_s if k else 0.0, position
-        return float(law.proportional * (target[k] - position) - law.derivative * rate)
-
-    done = run_loop(bench, control, SECONDS, seed=1)
-    made = recording_from_arrays(done.force, done.position, bench.period_s, reference=target)
-    return made, bench, law
+    return following(bench, law, target), bench, law
 
 
 def excess(recording: Recording, bench: Bench) -> float:
@@ -158,17 +162,10 @@ def test_one_mass_that_rubs_is_followed_in_time_although_its_reference_was_writt
     law = Feedback(mass * 20.0**2, 0.5 * mass * 20.0)
     time_s = np.arange(round(SECONDS / bench.period_s)) * bench.period_s
     tones = zip(rng.uniform(0.3, 4, 12), rng.uniform(0, 6, 12), strict=True)
-    target = sum(np.sin(2 * np.pi * f * time_s + p) for f, p in tones)
+    target = np.sum([np.sin(2 * np.pi * f * time_s + p) for f, p in tones], axis=0)
     target += 0.02 * np.std(target) * rng.standard_normal(len(time_s))
     target *= 0.57 * force / law.proportional
-    last = [0.0]
-
-    def control(k: int, position: float) -> float:
-        rate, last[0] = (position - last[0]) / bench.period_s if k else 0.0, position
-        return float(law.proportional * (target[k] - position) - law.derivative * rate)
-
-    done = run_loop(bench, control, SECONDS, seed=1)
-    made = recording_from_arrays(done.force, done.position, bench.period_s, reference=target)
+    made = following(bench, law, target)
     closed = close_loop(made, hidden=False, held=False, ess=200)
     assert closed.effect_names == ("coulomb_friction",)
     found = closed.analysis.posterior.summary()

@@ -33,7 +33,8 @@ from bayeshaptic.version import __version__
 DEFAULT_ESS = 2000
 MOST_EVALUATIONS = 1_500_000
 # Log density of the best fit over that of the best draw, beside one a parameter, from which on the
-# chains have not found it: they agree with each other in a valley that is none.
+# chains have not found it: they agree with each other in a valley that is none. It was -1.2 to 0.4
+# in eight posteriors of both devices, free and held, with and without a device file.
 LOST = 10.0
 _LOST = (
     "Not converged: the chains agree with each other, but none of them comes near the best fit. "
