@@ -7,10 +7,14 @@ the number of cores.
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections.abc import Callable
-from functools import wraps
-from typing import ParamSpec, TypeVar
+from functools import lru_cache, wraps
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -29,16 +33,22 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
         if getattr(_here, "limited", False):
             return function(*args, **kwargs)
-        from threadpoolctl import threadpool_limits
-
         _here.limited = True
         try:
-            with threadpool_limits(limits=1, user_api="blas"):
+            with _libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
                 return function(*args, **kwargs)
         finally:
             _here.limited = False
 
     return limited
+
+
+@lru_cache(maxsize=1)
+def _libraries(modules: int) -> ThreadpoolController:
+    """The BLAS libraries; they are looked for again (2 ms) where modules have been loaded since."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def one_thread_from_the_start() -> None:

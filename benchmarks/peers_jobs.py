@@ -106,18 +106,37 @@ def etfe(seconds: float) -> Callable[[], Any]:
     return lambda: bh.estimate_etfe(made)
 
 
-def internal_force() -> Callable[[], Any]:
-    """The motion under Coulomb friction of one parameter vector, 30 s."""
+# Law: its module, class, place, the law's own shape and its strength.
+LAWS: dict[str, tuple[str, str, str, dict[str, float], float]] = {
+    "coulomb": ("friction", "CoulombFriction", "MOTOR", {}, 0.3),
+    "stribeck": (
+        "friction",
+        "StribeckFriction",
+        "MOTOR",
+        {"static_excess": 0.8, "stribeck_velocity": 0.01},
+        0.3,
+    ),
+    "dahl": ("friction", "DahlFriction", "MOTOR", {"presliding_distance": 1e-5}, 0.3),
+    "drag": ("friction", "Drag", "MOTOR", {}, 10.0),
+    "hardening": ("springs", "HardeningSpring", "MOTOR", {}, 1e9),
+    "gap": ("springs", "Backlash", "CONNECTION", {"damping_in_gap": 0.9}, 1e-5),
+}
+
+
+def internal_force(name: str) -> Callable[[], Any]:
+    """The motion under a law of one parameter vector, 30 s."""
+    room, kind, at, shape, strength = LAWS[name]
     force = moved("effects.nonlinear.internal_force", "effects.internal_force")
-    friction = moved("effects.nonlinear.friction", "effects.friction").CoulombFriction(force.MOTOR)
+    place = getattr(force, at)
+    known = moved(f"effects.nonlinear.{room}", f"effects.{room}")
+    effect = getattr(known, kind)(place, shape) if shape else getattr(known, kind)(place)
     model, made = bh.free(device="lhifam"), recording(30.0)
     system = model.system(model.values)
-    motion = moved("models.response.motion", "models.motion").linear_motion(
-        system, made.force, made.period_s, 0, SUBSTEPS
-    )
-    law = friction.law(0.3, model, model.values)
+    linear_motion = moved("models.response.motion", "models.motion").linear_motion
+    motion = linear_motion(system, made.force, made.period_s, 0, SUBSTEPS)
+    law = effect.law(strength, model, model.values)
     step = made.period_s / SUBSTEPS
-    return lambda: force.forced_motion(system.mechanism, force.MOTOR, law, *motion, step, SUBSTEPS)
+    return lambda: force.forced_motion(system.mechanism, place, law, *motion, step, SUBSTEPS)
 
 
 def simulation() -> Callable[[], Any]:
@@ -133,6 +152,6 @@ JOBS: dict[str, Callable[[], Callable[[], Any]]] = {
     "fit": fit,
     "etfe 30 s": lambda: etfe(30.0),
     "etfe 3600 s": lambda: etfe(3600.0),
-    "internal force": internal_force,
+    **{f"internal force, {name}": lambda name=name: internal_force(name) for name in LAWS},
     "simulate with friction": simulation,
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -86,7 +87,7 @@ class Fit(Shown):
         """Standard deviations, shape (P,); nan for parameters at a bound."""
         return np.sqrt(np.diag(self.covariance))
 
-    @property
+    @cached_property
     def likelihood(self) -> Likelihood:
         return Likelihood(self.model, self.windows)
 

@@ -113,8 +113,10 @@ def _grid(loops: Poles, row: int, grid: Floats, around: Floats) -> int:
             # A pole beyond the Nyquist frequency shows at its alias.
             angle = abs(pole.imag - 2 * math.pi * np.rint(pole.imag / (2 * math.pi)))
             for tangent in TANGENTS:
-                around[count] = min(max(angle + width * tangent, low), TOP)
-                count += 1
+                place = angle + width * tangent
+                if low < place < TOP:  # both ends are there already
+                    around[count] = place
+                    count += 1
     around[:count].sort()
     linear = int(math.ceil(PER_TURN * (loops.delay[row] + 1.5) / 2))
     ratio = math.exp(math.log(TOP / low) / (loops.log_points - 1))
@@ -163,13 +165,15 @@ def _sines(loops: Poles, row: int, theta: Floats, space: Space) -> None:
             re[k] += size * (above_re * below_re + above_im * below_im)
             im[k] += size * (above_im * below_re - above_re * below_im)
     delay = loops.delay[row]
+    if delay != 0.0:
+        for k in range(count):
+            c, s = cos_sin(theta[k] * delay)
+            value_re = re[k] * c + im[k] * s
+            im[k] = im[k] * c - re[k] * s
+            re[k] = value_re
     for k in range(count):
-        c, s = cos_sin(theta[k] * delay)
-        value_re = re[k] * c + im[k] * s
-        value_im = im[k] * c - re[k] * s
-        size = math.sqrt(value_re * value_re + value_im * value_im)
-        re[k] = value_re
-        sine[k] = -value_im / size if size > 0 else 0.0
+        size = math.sqrt(re[k] * re[k] + im[k] * im[k])
+        sine[k] = -im[k] / size if size > 0 else 0.0
 
 
 @kernel(inline=True)
@@ -184,6 +188,8 @@ def _value(loops: Poles, row: int, theta: float) -> complex:
         below = point - loops.centre[row, pole]
         size = 1.0 / (below.real * below.real + below.imag * below.imag)
         total += above * below.conjugate() * size
+    if loops.delay[row] == 0.0:
+        return total
     c, s = cos_sin(theta * loops.delay[row])
     return total * complex(c, -s)
 

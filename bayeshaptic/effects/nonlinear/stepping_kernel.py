@@ -52,9 +52,9 @@ def step_through(
     -------
     ndarray, shape (N,)
     """
-    rows, states = matrix.shape
+    states = matrix.shape[1]
     motor = np.empty(len(position) // substeps)
-    z, ahead = np.zeros(states), np.empty(rows)
+    z, ahead = np.zeros(states), np.empty(states)
     force = 0.0
     for sample in range(len(motor)):
         read = 0.0
@@ -62,15 +62,20 @@ def step_through(
             read += reading[i] * z[i]
         motor[sample] = read
         for k in range(sample * substeps, (sample + 1) * substeps):
-            for j in range(rows):
+            x, v, last = 0.0, 0.0, 0.0  # first, and in registers: the law waits for them
+            for i in range(states):
+                x += matrix[states, i] * z[i]
+                v += matrix[states + 1, i] * z[i]
+                last += matrix[states + 2, i] * z[i]
+            for j in range(states):
                 total = 0.0
                 for i in range(states):
                     total += matrix[j, i] * z[i]
                 ahead[j] = total
             after = min(k + 1, len(position) - 1)
-            x = ahead[states] + 0.5 * (position[k] + position[after])
-            v = ahead[states + 1] + 0.5 * (velocity[k] + velocity[after])
-            last = ahead[states + 2] + velocity[after]
+            x += 0.5 * (position[k] + position[after])
+            v += 0.5 * (velocity[k] + velocity[after])
+            last += velocity[after]
             force = law(x, v, last, gain, force, step_s, constants)
             for i in range(states):
                 z[i] = ahead[i] + drive[i] * force
