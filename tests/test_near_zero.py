@@ -207,13 +207,17 @@ def test_the_limit_of_a_published_zero_is_not_pushed_up():
 LIGHT = {"m1": 0.05, "b1": 0.23, "bc": 22.6, "kc": 111e3, "m2": 3.1, "b2": 0.0}
 
 
-@pytest.fixture(scope="module")
-def light() -> tuple[bh.Etfe, bh.Fit, float]:
-    bench = Bench.from_device("lhifam", values=LIGHT)
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 30.0)
+def without_file(values: dict[str, float], seconds: float) -> tuple[bh.Etfe, bh.Fit, float]:
+    bench = Bench.from_device("lhifam", values=values)
+    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds)
     etfe = bh.estimate_etfe(bh.recording_from_arrays(**simulate(bench, noise, seed=3).signals))
     fit = bh.least_squares(bh.free(delay_s=bench.delay_s, period_s=bench.period_s), etfe)
     return etfe, fit, bench.true_critical_stiffness()
+
+
+@pytest.fixture(scope="module")
+def light() -> tuple[bh.Etfe, bh.Fit, float]:
+    return without_file(LIGHT, 30.0)
 
 
 def test_a_light_device_without_a_file_has_its_limit(light):
@@ -246,3 +250,32 @@ def test_what_follows_a_small_damper_leans_on_a_wall_only_where_it_is_there_itse
     density = Density(fit.likelihood, there)
     peak, _ = laplace(density, start)
     assert density(peak[None])[0] > density(start[None])[0] - 5
+
+
+def test_two_small_dampers_whose_sum_is_known_are_sampled_over_all_of_it():
+    """By the logarithm of their ratio; in logarithms of their own chains stay at one end."""
+    etfe, fit, _ = without_file({**LIGHT, "b1": 0.1, "b2": 0.2}, 10.0)
+    here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
+    b1, b2 = fit.model.names.index("b1"), fit.model.names.index("b2")
+    assert {here.beside, *here.near_zero} == {b1, b2}
+    phi = np.tile(start_of(here, fit), (5, 1))
+    phi[:, here.near_zero] = np.array([[-3.0], [-1.0], [0.0], [1.0], [3.0]])
+    theta = here.natural(phi)
+    assert here.inside(phi).all()
+    assert here.coordinate(theta) == pytest.approx(phi, abs=1e-9)
+    assert np.ptp(fit.likelihood(theta)) < 3
+    logs = []
+    for point in phi:
+        step = np.diag(np.full(len(point), 1e-6))
+        slope = (here.natural(point + step) - here.natural(point - step)) / 2e-6
+        logs.append(np.linalg.slogdet(slope)[1])
+    assert logs - here.log_jacobian(phi) == pytest.approx(
+        logs[0] - here.log_jacobian(phi[:1]), abs=1e-5
+    )
+    beyond = phi.copy()
+    beyond[:, here.near_zero] = 40.0
+    assert not here.inside(beyond).any()
+    posterior = bh.sample(fit.model, etfe, start=fit, ess=200, seed=1)
+    assert posterior.converged
+    low, high = np.quantile(posterior.draws[:, b1], [0.1, 0.9])
+    assert low < 0.01 and high > 0.23  # 0.04 and 0.15 in logarithms of each

@@ -38,6 +38,10 @@ class Coordinates:
     near_zero : tuple of int
         Which of those in logarithms may be zero: phi = log(1 + theta / floor).
     floor : ndarray, shape (len(near_zero),)
+    beside : int or None
+        One that may be zero as well, but not at once with these, because their sum is known: phi of
+        these is less by log(1 + theta / floor) of that one, a log ratio of shares with both ends.
+    beside_floor : float
     follow : ndarray, shape (P, len(near_zero))
         How far the others move for each unit of these, along ridges that are straight in natural
         values and would not be in logarithms: phi of the others is what is left.
@@ -51,6 +55,8 @@ class Coordinates:
     near_zero: tuple[int, ...] = ()
     floor: Floats = field(default_factory=lambda: np.zeros(0))
     follow: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    beside: int | None = None
+    beside_floor: float = 1.0
 
     @property
     def lowest(self) -> Floats:
@@ -71,22 +77,50 @@ class Coordinates:
         if self.near_zero:
             small = theta[..., self.near_zero]
             phi[..., self.near_zero] = np.log1p(small / self.floor)
+            if self.beside is not None:
+                other = np.log1p(theta[..., [self.beside]] / self.beside_floor)
+                phi[..., self.near_zero] -= other
             phi -= small @ self.follow.T
         return phi
 
     def _small(self, phi: Floats) -> Floats:
         largest = 100.0  # logarithm: what follows something as large as that is far outside anyway
-        return self.floor * np.expm1(np.minimum(phi[..., self.near_zero], largest))
+        logarithm = np.minimum(phi[..., self.near_zero], largest)
+        if self.beside is None:
+            return self.floor * np.expm1(logarithm)
+        factor = np.exp(logarithm)
+        # Both the sum with the other one and the ratios to it are known: a linear equation.
+        left = self.scale[self.beside] * phi[..., [self.beside]]
+        grown = (self.floor * factor) @ self._given_up[:, None]
+        whole = left + self.beside_floor + self.floor @ self._given_up
+        return self.floor * (factor * whole / (self.beside_floor + grown) - 1)
+
+    @property
+    def _given_up(self) -> Floats:
+        """What the one beside has less for each unit of the small ones, (len(near_zero),)."""
+        assert self.beside is not None
+        return -self.scale[self.beside] * self.follow[self.beside]
 
     def own(self, phi: Floats) -> Floats:
         """Of each parameter by itself: its logarithm, or its value over the scale."""
         if not self.near_zero:
             return phi
-        return phi + self._small(phi) @ self.follow.T
+        small = self._small(phi)
+        own = phi + small @ self.follow.T
+        if self.beside is not None:
+            with np.errstate(invalid="ignore", divide="ignore"):  # nan outside of the support
+                own[..., self.near_zero] = np.log1p(small / self.floor)
+        return own
 
     def log_jacobian(self, phi: Floats) -> Floats:
         """log |d theta / d phi| up to a constant, shape (B,)."""
-        return np.sum(np.where(self.log, self.own(phi), 0.0), axis=-1)
+        own = self.own(phi)
+        total = np.sum(np.where(self.log, own, 0.0), axis=-1)
+        if self.beside is None:
+            return total
+        other = own[..., self.beside] * self.scale[self.beside] + self.beside_floor
+        given = (self.floor * np.exp(own[..., self.near_zero])) @ self._given_up
+        return total - np.log1p(given / other)
 
     def inside(self, phi: Floats) -> NDArray[np.bool_]:
         """Which vectors lie in the support of the priors, shape (B,)."""

@@ -30,26 +30,26 @@ _LONGEST = 10.0
 def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
     """`here` with logarithms for the `NearZero` parameters that `fit` does not see.
 
-    How the others follow them is the direction in which the fit suffers least.
+    How the others follow them is the direction in which the fit suffers least.  Of several whose
+    sum is seen, these are measured by their ratios to the largest.
     """
     priors = [fit.model.prior(name) for name in fit.model.names]
-    # At the lower bound nothing is seen, at the upper one (a misfit's) too much.
-    middle = np.array([float(prior.quantile(0.5)) for prior in priors])
-    seen = np.where(np.isnan(fit.sd), fit.theta > middle, fit.theta > _SEEN * fit.sd)
-    found = {i: p for i, p in enumerate(priors) if isinstance(p, NearZero) and not seen[i]}
-    if not found:
+    if not any(isinstance(prior, NearZero) for prior in priors):
         return here
     slope = jacobian(weighted_residuals(fit.likelihood, here), here.coordinate(fit.theta)[None])[0]
-    small = sorted(found, key=lambda index: fit.theta[index])
-    follow = _followed(slope, small)
-    # Of several whose sum is known, the largest may be far from zero.
-    while small and np.abs(follow @ (fit.theta / here.scale)[small]).max() > _LONGEST:
+    slope = slope / np.sqrt(max(1.0, fit.reduced_chi_square))
+    values = fit.theta / here.scale
+    seen = values > _SEEN * _errors(slope)
+    found = {i: p for i, p in enumerate(priors) if isinstance(p, NearZero) and not seen[i]}
+    small = sorted(found, key=lambda index: values[index])
+    beside = _beside(slope, values, small)
+    small = [index for index in small if index != beside]
+    # What follows further than makes sense; then the largest may be far from zero.
+    while small and np.abs(_followed(slope, small) @ values[small]).max() > _LONGEST:
         small = small[:-1]
-        follow = _followed(slope, small)
     if not small:
         return here
     small = sorted(small)
-    follow = _followed(slope, small)
     chosen = np.isin(np.arange(len(priors)), small)
     return replace(
         here,
@@ -57,11 +57,31 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
         scale=np.where(chosen, 1.0, here.scale),
         low=np.where(chosen, 0.0, here.low),
         high=np.where(chosen, np.inf, here.high),
-        walls=here.walls & ~chosen,
+        walls=here.walls & ~chosen & (np.arange(len(priors)) != beside),
         near_zero=tuple(small),
         floor=np.array([found[index].floor for index in small]),
-        follow=follow / here.scale[small],
+        follow=_followed(slope, small) / here.scale[small],
+        beside=beside,
+        beside_floor=1.0 if beside is None else found[beside].floor,
     )
+
+
+def _beside(slope: Floats, values: Floats, small: list[int]) -> int | None:
+    """The largest of the `small` ones, in rising order, where none is seen but their sum is."""
+    if len(small) < 2:
+        return None
+    *smaller, largest = small
+    follow = _followed(slope, smaller)[largest]
+    known = slope.copy()
+    known[:, smaller] = 0.0
+    whole = values[largest] - follow @ values[smaller]
+    return largest if (follow < 0).all() and whole > _SEEN * _errors(known)[largest] else None
+
+
+def _errors(slope: Floats) -> Floats:
+    """Standard deviations of coordinates, shape (P,), those without a slope aside."""
+    known = slope.T @ slope + np.eye(slope.shape[1])
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(known))))
 
 
 def _followed(slope: Floats, small: list[int]) -> Floats:
@@ -90,10 +110,12 @@ def start_of(here: Coordinates, fit: Fit) -> Floats:
 def inside(here: Coordinates, fit: Fit, begin: float = 0.0) -> Floats:
     """The fit inside the support, the small parameters at a quantile of their priors at least."""
     phi = here.coordinate(fit.theta)
-    for index in here.near_zero:  # the others follow
-        inner = fit.theta.copy()
-        inner[index] = float(fit.model.prior(fit.model.names[index]).quantile(begin))
-        phi[index] = max(phi[index], here.coordinate(inner)[index])
+    inner = fit.theta.copy()
+    for index in (*here.near_zero, *(() if here.beside is None else (here.beside,))):
+        least = float(fit.model.prior(fit.model.names[index]).quantile(begin))
+        inner[index] = max(inner[index], least)
+    small = list(here.near_zero)
+    phi[small] = here.coordinate(inner)[small]  # the others follow
     # One that follows to beyond its own end, a delay of nothing say, stays at that.
     own = here.own(phi)
     margin = 1e-6  # of a prior's width, or of a logarithm
@@ -104,9 +126,10 @@ def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:
     """A proposal of small parameters from their priors, the others held where they are.
 
     Where the data prefer a little to nothing, there is a hump beside the plateau next to zero, and
-    mixtures of a few components leave out corners of the plateau.
+    mixtures of a few components leave out corners of the plateau.  None where their sum is known:
+    most draws would be beyond it.
     """
-    if not here.near_zero:
+    if not here.near_zero or here.beside is not None:
         return None
     priors = [fit.model.prior(fit.model.names[index]) for index in here.near_zero]
 
