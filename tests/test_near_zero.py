@@ -269,9 +269,8 @@ def test_two_small_dampers_whose_sum_is_known_are_sampled_over_all_of_it():
         step = np.diag(np.full(len(point), 1e-6))
         slope = (here.natural(point + step) - here.natural(point - step)) / 2e-6
         logs.append(np.linalg.slogdet(slope)[1])
-    assert logs - here.log_jacobian(phi) == pytest.approx(
-        logs[0] - here.log_jacobian(phi[:1]), abs=1e-5
-    )
+    change = here.log_jacobian(phi)
+    assert logs - logs[0] == pytest.approx(change - change[0], abs=1e-5)
     beyond = phi.copy()
     beyond[:, here.near_zero] = 40.0
     assert not here.inside(beyond).any()
