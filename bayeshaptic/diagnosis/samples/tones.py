@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.stats import f
 
@@ -125,45 +125,62 @@ class _Lines:
         return np.arange(first, min(first + 2 * _HALF + 1, len(self.number)))
 
     def explained(self, lines: Indices) -> Complexes:
-        """Orthonormal basis of response and leakage in a window, shape (w, c)."""
+        """Orthonormal basis of response and leakage in windows of lines, shape (..., w, c)."""
         frequency = self.frequency_hz[lines]
-        middle = 0.5 * (frequency[0] + frequency[-1])
-        x = (frequency - middle) / (frequency[-1] - middle)
-        response = self.response[lines, None]
+        first, last = frequency[..., :1], frequency[..., -1:]
+        middle = 0.5 * (first + last)
+        x = (frequency - middle) / (last - middle)
+        response = self.response[lines][..., None]
         columns = [
-            leakage_terms(x, frequency, np.array(middle)),
+            leakage_terms(x, frequency, middle),
             # What rings on at a resonance when the recording ends is as narrow as the resonance.
-            response * x[:, None] ** np.arange(2),
+            response * x[..., None] ** np.arange(2),
         ]
         if not self.periods:
-            columns.append(self.force[lines, None] * response * x[:, None] ** np.arange(3))
-        basis = np.concatenate(columns, axis=1)
-        return np.linalg.qr(basis / np.linalg.norm(basis, axis=0))[0]
+            columns.append(self.force[lines][..., None] * response * x[..., None] ** np.arange(3))
+        basis = np.concatenate(columns, axis=-1)
+        return np.linalg.qr(basis / np.linalg.norm(basis, axis=-2, keepdims=True))[0]
 
-    def of(self, frequency_hz: ArrayLike, lines: Indices | slice) -> Complexes:
-        """DFT of e^(2 pi i f t), t from the first sample of the recording, at w lines.
+    def of(self, frequency_hz: float, lines: Indices | slice) -> Complexes:
+        """DFT of e^(2 pi i f t), t from the first sample of the recording, at w lines."""
+        apart = frequency_hz * self.period_s * self.count - self.number[lines]
+        turned = 2 * np.pi * frequency_hz * self.period_s * self.start
+        return self.off_by(apart) * np.exp(1j * turned)
 
-        Shape (w,) for one frequency, (w, F) for F of them.
-        """
-        frequency = np.asarray(frequency_hz)
-        number = self.number[lines].reshape(-1, *[1] * frequency.ndim)
-        apart = frequency * self.period_s * self.count - number
+    def off_by(self, apart: Floats) -> Complexes:
+        """DFT at a line of a tone so many lines above it, t from the first sample of the DFT."""
         apart = np.where(np.abs(apart) < 1e-9, 1e-9, apart)
         half = np.pi * apart / self.count
         kernel = np.sin(np.pi * apart) / np.sin(half) / np.sqrt(self.count)
-        turned = 2 * np.pi * frequency * self.period_s * self.start
-        return np.asarray(kernel * np.exp(1j * (half * (self.count - 1) + turned)))
+        return np.asarray(kernel * np.exp(1j * half * (self.count - 1)))
 
 
-class _Window(NamedTuple):
-    """Neighbouring lines, which of them are judged, and what is explained among them."""
+class _Windows(NamedTuple):
+    """G windows of w neighbouring lines, and the F tones that each is searched for.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (G, w)
+    basis : ndarray, shape (G, w, c)
+        What is explained among them.
+    frequency_hz : ndarray, shape (G, F)
+        Of the tones.
+    tones : ndarray, shape (w, F)
+        Their spectra, the same in every window.
+    size : ndarray, shape (G, F)
+        Power of what is not explained of them.
+    """
 
     lines: Indices
-    judged: NDArray[np.bool_]
     basis: Complexes
+    frequency_hz: Floats
+    tones: Complexes
+    size: Floats
 
     def unexplained(self, values: Complexes) -> Complexes:
-        return np.asarray(values - self.basis @ (self.basis.conj().T @ values))
+        """What response and leakage leave of values at the lines, shape (G, w)."""
+        along = self.basis.conj().swapaxes(1, 2) @ values[..., None]
+        return np.asarray(values - (self.basis @ along)[..., 0])
 
 
 def find_tones(recording: Recording, band_hz: tuple[float, float], reference: Reference) -> Tones:
@@ -193,52 +210,66 @@ def find_tones(recording: Recording, band_hz: tuple[float, float], reference: Re
     return Tones(tuple(found), strongest[0])
 
 
-def _windows(lines: _Lines) -> list[_Window]:
-    """Overlapping windows that together judge every line once."""
-    found, last = [], int(lines.searched[-1])
+def _windows(lines: _Lines) -> list[_Windows]:
+    """Overlapping windows that together judge every line once, alike ones together."""
+    at_once, last = 2000, int(lines.searched[-1])
+    alike: dict[tuple[int, int, bytes], list[Indices]] = {}
     for first in range(int(lines.searched[0]), last + 1, _HALF):
-        judged = np.arange(first, min(first + _HALF, last + 1))
-        around = lines.around(int(judged[len(judged) // 2]))
-        found.append(_Window(around, np.isin(around, judged), lines.explained(around)))
-    return found
+        judged = min(_HALF, last + 1 - first)
+        around = lines.around(first + judged // 2)
+        apart = lines.number[around] - lines.number[around[0]]
+        alike.setdefault((first - int(around[0]), judged, apart.tobytes()), []).append(around)
+    return [
+        _searched(lines, np.stack(around[i : i + at_once]), slice(first, first + judged))
+        for (first, judged, _), around in alike.items()
+        for i in range(0, len(around), at_once)
+    ]
 
 
-def _strongest(lines: _Lines, windows: list[_Window]) -> tuple[float, float]:
-    """The score of the tone that stands out most from the lines beside it, and its frequency.
+def _searched(lines: _Lines, around: Indices, judged: slice) -> _Windows:
+    """Tones on the judged lines and halfway between them: no other one loses more than a tenth."""
+    number, basis = lines.number[around[0]], lines.explained(around)
+    wanted = np.concatenate([number[judged], number[judged] + 0.5])
+    tones = lines.off_by(wanted - number[:, None])
+    explained = np.sum(np.abs(basis.conj().swapaxes(1, 2) @ tones) ** 2, axis=1)
+    size = np.sum(np.abs(tones) ** 2, axis=0) - explained
+    on, spacing = lines.frequency_hz[around[:, judged]], 1 / (lines.count * lines.period_s)
+    frequency_hz = np.concatenate([on, on + 0.5 * spacing], axis=1)
+    return _Windows(around, basis, frequency_hz, tones, size)
 
-    Tones on the lines and halfway between them: no other one loses more than a tenth.
-    """
+
+def _strongest(lines: _Lines, windows: list[_Windows]) -> tuple[float, float]:
+    """The score of the tone that stands out most from the lines beside it, and its frequency."""
     best, where = 0.0, 0.0
-    spacing = 1 / (lines.count * lines.period_s)
     own = 0.05  # of a tone, what response and leakage must leave
     for window in windows:
-        judged = lines.frequency_hz[window.lines[window.judged]]
-        candidates = np.concatenate([judged, judged + 0.5 * spacing])
-        columns = window.unexplained(lines.of(candidates, window.lines))
         left = window.unexplained(lines.position[window.lines])
-        total = np.sum(np.abs(left) ** 2)
-        size = np.sum(np.abs(columns) ** 2, axis=0)
+        total = np.sum(np.abs(left) ** 2, axis=1, keepdims=True)
         # A tone that response and leakage can imitate is none to be seen.
-        size = np.maximum(size, own * np.max(size))
-        power = np.abs(columns.conj().T @ left) ** 2 / size
-        freedom = len(left) - window.basis.shape[1] - 1
+        size = np.maximum(window.size, own * np.max(window.size, axis=1, keepdims=True))
+        power = np.abs(left @ window.tones.conj()) ** 2 / size
+        freedom = window.lines.shape[1] - window.basis.shape[2] - 1
         ratio = freedom * power / np.maximum(total - power, freedom * lines.floor + 1e-12 * total)
-        at = int(np.argmax(ratio))
+        at = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
         score = -float(f.logsf(ratio[at], 2, 2 * freedom)) / np.log(10)
         if score > best:
-            best, where = score, float(candidates[at])
+            best, where = score, float(window.frequency_hz[at])
     return best - float(np.log10(2 * len(lines.searched))), where
 
 
 def _fitted(lines: _Lines, near_hz: float) -> Tone:
     """Frequency and amplitude of the tone nearest to a frequency, by least squares."""
     around = lines.around(int(np.searchsorted(lines.frequency_hz, near_hz)))
-    window = _Window(around, np.ones(len(around), dtype=bool), lines.explained(around))
-    left = window.unexplained(lines.position[around])
+    basis = lines.explained(around)
     spacing = 1 / (lines.count * lines.period_s)
 
+    def unexplained(values: Complexes) -> Complexes:
+        return np.asarray(values - basis @ (basis.conj().T @ values))
+
+    left = unexplained(lines.position[around])
+
     def missed(frequency_hz: float) -> float:
-        column = window.unexplained(lines.of(frequency_hz, around))
+        column = unexplained(lines.of(frequency_hz, around))
         return -float(np.abs(column.conj() @ left) ** 2 / np.sum(np.abs(column) ** 2))
 
     grid = near_hz + spacing * np.linspace(-1, 1, 21)
@@ -246,11 +277,11 @@ def _fitted(lines: _Lines, near_hz: float) -> Tone:
     bounds = (near - 0.1 * spacing, near + 0.1 * spacing)
     options = {"xatol": 1e-5 * spacing}
     frequency = float(minimize_scalar(missed, bounds=bounds, method="bounded", options=options).x)
-    column = window.unexplained(lines.of(frequency, around))
+    column = unexplained(lines.of(frequency, around))
     size = float(np.sum(np.abs(column) ** 2))
     value = complex(column.conj() @ left) / size
     rest = float(np.sum(np.abs(left - value * column) ** 2))
-    variance = rest / max(len(around) - window.basis.shape[1] - 2, 1)
+    variance = rest / max(len(around) - basis.shape[1] - 2, 1)
     # The spectrum at positive frequencies holds half of a tone.
     amplitude, sd = 2 * value, 2 * np.sqrt(0.5 * variance / size)
     # The Cramer-Rao bound of the frequency of a sinusoid whose phase is unknown.
