@@ -63,7 +63,7 @@ class Likelihood:
 
     def normalised(self, theta: Floats) -> Complexes:
         """Deviations over their standard deviation: E|.|^2 = 1 where the model is true."""
-        return self._deviations(theta, 1 / np.sqrt(self.noise_variance))
+        return self._deviations(theta, self._precision)
 
     def _deviations(self, theta: Floats, weight: Floats) -> Complexes:
         form = self._rational_form(theta)
@@ -133,6 +133,11 @@ class Likelihood:
         lanes = 32
         repeated = np.repeat(values[:1], -len(values) % lanes, axis=0)
         return np.ascontiguousarray(np.moveaxis(np.concatenate([values, repeated]), 0, -1))
+
+    @cached_property
+    def _precision(self) -> Floats:
+        """One over the standard deviation of a window's noise, shape (W,)."""
+        return np.asarray(1 / np.sqrt(self.noise_variance))
 
     @property
     def noise_variance(self) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 
 from bayeshaptic.models.response.filtered import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
+from bayeshaptic.models.response.transfer import transfer
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.numerics.polynomial import roots
 from bayeshaptic.types import Complexes, Floats
@@ -19,7 +20,8 @@ def poles_and_residues(mechanism: Mechanism, filters: Filters) -> tuple[Complexe
     poles = [_eigenvalues(mechanism.state_matrix())]
     poles += [roots(factor.denominator) for factor in filters]
     p = moved_apart(np.concatenate(poles, axis=1))
-    numerator, denominator = filtered(*mechanism.transfer(), filters)
+    top, bottom = (polynomial.T for polynomial in transfer(mechanism))
+    numerator, denominator = filtered(top, bottom, filters)
     return p, residues(numerator, denominator[-1], p)
 
 
