@@ -44,7 +44,8 @@ class Proposal:
     def independent(self, walkers: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
         """A draw from the mixture for each walker."""
         drawn = self.mixture.sample(_generator(rng), len(walkers))
-        return drawn, self.mixture.log_density(walkers) - self.mixture.log_density(drawn)
+        here, there = np.split(self.mixture.log_density(np.concatenate([walkers, drawn])), 2)
+        return drawn, here - there
 
     def differences(self, walkers: Floats, rng: np.random.RandomState) -> tuple[Floats, Floats]:
         """A step by the difference of two points of the archive for each walker.
@@ -108,7 +109,14 @@ class Ensembles:
 
             redrawn = 0.25  # of redrawing moves, for each of the others
             moves.append((alone, redrawn))
-        self.sampler = emcee.EnsembleSampler(
+
+        class Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
+            """Without emcee's conversion of each walker's number, a tenth of a step."""
+
+            def compute_log_prob(self, coords: Floats) -> tuple[Floats, None]:
+                return self.log_prob_fn(coords), None
+
+        self.sampler = Sampler(
             len(self.positions),
             size,
             lambda y: self.density(straightening.bent(y)),
