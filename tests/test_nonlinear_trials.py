@@ -14,8 +14,11 @@ import pytest
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials import nonlinear as tried
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.effects.library import effects
+from bayeshaptic.effects.nonlinear.friction import CoulombFriction
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
@@ -195,3 +198,16 @@ def test_a_gap_is_followed_to_its_sharp_peak(monkeypatch: pytest.MonkeyPatch) ->
     # Two per cent off the true gap half of the likelihood's gain is gone.
     assert best.accepted.estimates["half_gap"].mean == pytest.approx(bench.effects[0].gap, rel=0.02)
     assert best.accepted.estimates["damping_in_gap"].mean <= 1.0
+
+
+def test_a_law_that_takes_all_damping_and_a_motion_that_runs_away_spoil_no_other() -> None:
+    """A friction a little too strong leaves no damping, without which any other runs away."""
+    state, _ = rubbed(0.5)
+    recording, without = state.etfe.unbroken, state.fit.theta
+    assert recording is not None
+    bench, friction = ForceBench(state, recording), CoulombFriction(MOTOR)
+    bench.remember(np.full(recording.samples, np.nan))
+    assert bench.point(friction, 0.5, without).gain_fit > 100
+    ground = np.isin(state.model.names, ("b1", "b2"))
+    damped = tried._damped(bench, np.where(ground, 0.0, without))
+    assert damped == pytest.approx(np.where(ground, 0.2 * without, without))

@@ -135,8 +135,12 @@ class ForceBench:
         return added if np.all(stays) else np.full_like(added, np.nan)
 
     def remember(self, extra: Floats) -> None:
-        """Take this for what the force adds, when the slow motion is read off the encoder."""
-        self._extra = extra
+        """Take this for what the force adds, when the slow motion is read off the encoder.
+
+        Not a motion that ran away (nan): with it every law after it would, too.
+        """
+        if np.isfinite(extra[0]):
+            self._extra = extra
 
     def point(
         self, effect: NonlinearEffect, strength: float, theta: Floats, rounds: int = 1

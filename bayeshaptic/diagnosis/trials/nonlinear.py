@@ -21,6 +21,7 @@ from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, Nonlin
 from bayeshaptic.inference.fit import Fit, summarise
 from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.random_excitation import points as points_of
@@ -124,13 +125,26 @@ def _search(
     points: list[Point] = []
     for effect in variants:
         if known:
-            points += _scan(bench, effect, _NEAR * known.strength, known.theta)
+            beside = _scan(bench, effect, _NEAR * known.strength, known.theta)
+            if not any(np.isfinite(point.gain_fit) for point in beside):
+                beside = _scan(bench, effect, _NEAR * known.strength, _damped(bench, known.theta))
+            points += beside
             continue
         firsts = effect.first_strengths(bench.model, theta, motion[effect.place])
         points += _scan(bench, effect, firsts, theta)
         if effect.signed:
             points += _scan(bench, effect, -firsts, theta)
     return max(points, key=lambda point: point.gain_fit)
+
+
+def _damped(bench: ForceBench, theta: Floats) -> Floats:
+    """Linear parameters beside a force that may have taken all damping: any other runs away there.
+
+    A fifth of what the ground dampers are without a force.
+    """
+    share, without = 0.2, bench.state.fit.theta
+    ground = np.isin(bench.model.names, GROUND_DAMPERS)
+    return np.where(ground, np.maximum(theta, share * without), theta)
 
 
 def _scan(
