@@ -27,7 +27,7 @@ from blind_recordings import CASES, LISTED, SINGLE, cases_for
 from bayeshaptic.diagnosis import acceptance, thresholds
 from bayeshaptic.diagnosis.loop import trials_for
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.state import CHOOSE, FIT, State, Trial, held_out_rms, share
+from bayeshaptic.diagnosis.state import FIT, Trial, compared_errors, share
 from bayeshaptic.diagnosis.trials.linear import sieve
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import BUDGET_S, RATE, metered
@@ -44,7 +44,6 @@ LEFT_OUT = {
     "LAW_TIE": 0.0,
     "MENDED": 1.0,
     "LAW_ERROR": 0.0,
-    "LINEAR_FIRST": np.inf,
 }
 """Every rule, and the value with which it decides nothing."""
 
@@ -64,15 +63,14 @@ def decided(job: Job) -> dict[str, Decided]:
     kind = trials_for(begun.etfe, begun.fit)
     before = kind.tests(kind.first)
     raised = tuple(replace(test, threshold=-np.inf) for test in before)
-    with metered(10 * BUDGET_S * RATE) as meter, left_out("LINEAR_FIRST", np.inf):
+    with metered(10 * BUDGET_S * RATE) as meter:
         trials = kind.trials(kind.first, raised, meter, lambda _: None)
 
     @cache
     def tests_of(number: int) -> tuple[Test, ...]:
         return kind.tests(trials[number].state)
 
-    errors = _errors(kind.first)
-    errors_of = [_errors(trial.state) for trial in trials]
+    errors_of = [compared_errors(kind.first, trial.state) for trial in trials]
 
     def left(trial: Trial) -> tuple[Test, ...]:
         tests = tests_of(next(i for i, one in enumerate(trials) if one is trial))
@@ -81,11 +79,9 @@ def decided(job: Job) -> dict[str, Decided]:
     def first_round() -> Decided:
         open_ = [
             trial
-            for trial, own in zip(trials, errors_of, strict=True)
-            if trial.convincing and not any(map(acceptance.raises_error, errors, own))
+            for trial, errors in zip(trials, errors_of, strict=True)
+            if trial.convincing and not any(map(acceptance.raises_error, *errors))
         ]
-        if begun.fit.reduced_chi_square > thresholds.LINEAR_FIRST:
-            open_ = [one for one in open_ if one.accepted.family == "linear"] or open_
         chosen = acceptance.choose(open_, lambda trial: acceptance.excess(left(trial)))
         if chosen is None:
             return Decided("", (), acceptance.verdict_of((), before)[0])
@@ -98,10 +94,6 @@ def decided(job: Job) -> dict[str, Decided]:
         with left_out(rule, value):
             found[rule] = first_round()
     return found
-
-
-def _errors(state: State) -> tuple[float, float]:
-    return held_out_rms(state.fit, CHOOSE), float(np.sqrt(state.fit.reduced_chi_square))
 
 
 @contextmanager

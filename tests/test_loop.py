@@ -11,7 +11,7 @@ import pytest
 
 from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.residuals.residual import smooth_columns
-from bayeshaptic.diagnosis.state import held_out_rms
+from bayeshaptic.diagnosis.state import Accepted, State, compared_errors, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit, summarise, weighted_residuals
@@ -51,6 +51,24 @@ FAMILIES = [
     ("time-varying", "grip_drift", True, 16.0, one("grip_drift")),
     ("measurement", "mains_tone", False, 8.0, one("mains_tone", amplitude=5e-5)),
 ]
+
+
+@pytest.mark.parametrize(("family", "raised"), [("nonlinear", False), ("linear", True)])
+def test_a_force_that_was_part_of_the_noise_is_judged_by_that_noise(
+    family: str, raised: bool
+) -> None:
+    """The same misfit beside a hundredth of the noise: ten times as many noises, and no worse."""
+    _, etfe, fit = fitted(False, 8.0, MODE)
+    quiet = replace(fit.windows, scatter=fit.windows.scatter / 100)
+    accepted = Accepted("some", "some", family, "")
+    before, after = (
+        State(etfe, fit),
+        State(etfe, summarise(fit.model, quiet, fit.theta), (accepted,)),
+    )
+    was, now = compared_errors(before, after)
+    assert bool(np.any(now > 5 * was)) == raised
+    # A fit that trusts other windows more moves a little.
+    assert raised or np.allclose(now, was, rtol=0.2)
 
 
 @pytest.mark.parametrize(

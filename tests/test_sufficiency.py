@@ -57,6 +57,10 @@ SAYS_TOO_LITTLE = {
     "stands still for": lambda: recorded(
         noise(rms=0.03), BENCH.with_effect("coulomb_friction", force=0.07)
     ),
+    "stands still for [34]": lambda: recorded(  # at rest for some 50 ms of each 80
+        np.repeat(np.random.default_rng(3).normal(0, 0.1, 100), 80),
+        BENCH.with_effect("coulomb_friction", force=0.09),
+    ),
     "stays at .* cut off": lambda: cut_off(),
     "hardly answers": lambda: backwards(),
 }

@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-import numpy as np
-
 from bayeshaptic.diagnosis import acceptance
 from bayeshaptic.diagnosis.battery import is_periodic
 from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.state import CHOOSE, State, Trial, held_out_rms
+from bayeshaptic.diagnosis.state import State, Trial, compared_errors
 from bayeshaptic.diagnosis.traced import Candidate, Traced
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.inference.fit import Fit
@@ -132,7 +130,7 @@ class _Loop:
         Tried again after every round: what the model lacked may have looked like a fault.
         """
         mended = self.kind.mended(state)
-        if mended is state or self._raises(_errors(state), mended):
+        if mended is state or _raises(state, mended):
             return state, tests
         new = mended.accepted[len(state.accepted) :]
         self.candidates += [
@@ -152,8 +150,7 @@ class _Loop:
                 left[id(trial)] = self._remaining(trial.state)
             return left[id(trial)]
 
-        errors = _errors(state)
-        open_ = [t for t in trials if t.convincing and not self._raises(errors, t.state)]
+        open_ = [t for t in trials if t.convincing and not _raises(state, t.state)]
         chosen = acceptance.choose(open_, lambda trial: acceptance.excess(remaining(trial)))
         self.candidates += [
             Candidate(t.name, t.accepted.title, t.score, t is chosen, self.number)
@@ -180,9 +177,6 @@ class _Loop:
     def _remaining(self, state: State) -> tuple[Test, ...]:
         return acceptance.remaining(self.kind.tests(state), state.accepted, self.seen)
 
-    def _raises(self, before: tuple[float, float], after: State) -> bool:
-        return any(map(acceptance.raises_error, before, _errors(after)))
-
     def _tick(self, what: str) -> None:
         if self.progress:
             # Each round is half of what is left, and each candidate a fifth of what is left of it:
@@ -193,12 +187,8 @@ class _Loop:
             self.progress(share, f"round {self.number}: trying {what}")
 
 
-def _errors(state: State) -> tuple[float, float]:
-    """Weighted rms on windows that took no part in the fit, and on all: neither may rise.
-
-    A quarter of the windows may get better at the expense of the others.
-    """
-    return held_out_rms(state.fit, CHOOSE), float(np.sqrt(state.fit.reduced_chi_square))
+def _raises(before: State, after: State) -> bool:
+    return any(map(acceptance.raises_error, *compared_errors(before, after)))
 
 
 def _statistic(name: str, tests: tuple[Test, ...]) -> float:

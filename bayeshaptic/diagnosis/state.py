@@ -202,12 +202,47 @@ def _noise_factor(power: Floats, scatter: Floats, freedom: Floats, nodes: int) -
     return float(np.exp(brentq(surplus, 0.0, max(highest, 1.0))))
 
 
-def held_out_rms(fit: Fit, part: tuple[int, ...] = REPORT) -> float:
-    """Weighted rms on a quarter of the windows, with the model fitted to the others; 1 is noise."""
+def held_out_rms(fit: Fit, part: tuple[int, ...] = REPORT, louder: Floats | None = None) -> float:
+    """Weighted rms on a quarter of the windows, with the model fitted to the others; 1 is noise.
+
+    Parameters
+    ----------
+    fit : Fit
+    part : tuple of int
+        Which quarter.
+    louder : ndarray, shape (W,), optional
+        Noise variance to weigh by, over the windows' own.
+    """
     out = share(fit.windows, part)
     theta = polish(fit.model, fit.windows.part(~out), fit.theta)
-    left = Likelihood(fit.model, fit.windows.part(out)).normalised(theta[None])[0]
-    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
+    power = _powers(fit.model, fit.windows.part(out), theta)
+    return float(np.sqrt(np.mean(power if louder is None else power / louder[out])))
+
+
+def compared_errors(before: State, after: State) -> tuple[Floats, Floats]:
+    """Weighted rms of two states on windows that took no part in the fit, and on all, (2,) each.
+
+    On both, because a quarter of the windows may get better at the expense of the others.  A force
+    that was taken off a recording was part of its noise, and beside the little noise that it leaves
+    what is left of it may stand out further than all of it did before: both are weighed by the
+    noise that was there before.
+    """
+    louder = np.ones(len(after.fit.windows.scatter))
+    if after.accepted[-1].family == "nonlinear":
+        known, at = (s.fit.windows.frequency_hz.mean(axis=1) for s in (before, after))
+        there, own = (s.fit.likelihood.noise_variance for s in (before, after))
+        louder = np.interp(at, known, there) / own
+    power = _powers(after.model, after.fit.windows, after.fit.theta) / louder
+    return (
+        np.array([held_out_rms(before.fit, CHOOSE), np.sqrt(before.fit.reduced_chi_square)]),
+        np.array([held_out_rms(after.fit, CHOOSE, louder), np.sqrt(np.mean(power))]),
+    )
+
+
+def _powers(model: Model, windows: Windows, theta: Floats) -> Floats:
+    """Mean squared normalised deviation of every window, shape (W,)."""
+    left = Likelihood(model, windows).normalised(theta[None])[0]
+    return np.asarray(np.mean(np.abs(left) ** 2, axis=1))
 
 
 def describe_gain(gain: float) -> str:

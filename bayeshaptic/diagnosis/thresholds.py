@@ -82,10 +82,6 @@ LAW_REST = 3.0
 Without it nothing changes; nor without the next."""
 LEAST = 1.2
 """Factor on the least that a candidate leaves up to which another leaves as little."""
-LINEAR_FIRST = 10.0
-"""Reduced chi-square from which a linear misfit is mended before forces are sized.
-
-Without it nothing changes but the time that it takes."""
 WORSE = 1.2
 """Factor by which the held-out error may rise; an explanation that raises it further is none.
 

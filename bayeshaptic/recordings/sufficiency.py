@@ -31,6 +31,10 @@ FEWEST_TONES = 5
 # the force ever idle; the position stood still for 9 % at most, of a weak chirp for 23 %.
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
+# Where the motion usually goes so many counts sooner, a standstill is one that lasts no longer: one
+# of 20 samples at least, as a steady force that dry friction holds takes from steps of 50 ms.
+_USUAL_COUNTS = 30.0
+_FEWEST = 20
 
 _USUAL = (
     "record some 30 s of white noise or of a multisine (bayeshaptic simulate phantom -o noise.csv "
@@ -111,7 +115,9 @@ def _no_force(recording: Recording) -> str | None:
 
 def _standstill(recording: Recording) -> str | None:
     step = increment_unit(recording.position) or 0.0
-    length = max(round(_IDLE_S / recording.period_s), 20)
+    longest = max(round(_IDLE_S / recording.period_s), _FEWEST)
+    usual = np.std(recording.position[_FEWEST:] - recording.position[:-_FEWEST])
+    length = int(np.clip(_FEWEST * _USUAL_COUNTS * step / (usual + 1e-300), _FEWEST, longest))
     parts = recording.samples // length
     position = recording.position[: parts * length].reshape(parts, length)
     resting = np.ptp(position, axis=1) <= 1.01 * step

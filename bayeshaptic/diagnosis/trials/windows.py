@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.acceptance import needless
 from bayeshaptic.diagnosis.battery import model_tests, residual_tests
 from bayeshaptic.diagnosis.residuals.residual import Test
@@ -65,10 +64,6 @@ class WindowTrials:
         found: list[Trial] = []
         if "linear" in families:
             found += linear_trials(state, meter, tick)
-            # On a model that is far off, a nonlinear force cannot be sized: first things first.
-            far_off = state.fit.reduced_chi_square > thresholds.LINEAR_FIRST
-            if far_off and any(trial.convincing for trial in found):
-                return found
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
         if "nonlinear" in families:
