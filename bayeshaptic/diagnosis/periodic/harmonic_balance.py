@@ -159,15 +159,17 @@ def promise(
 ) -> float:
     """Gain in log likelihood that one more force promises, to first order, the motion as it is.
 
-    The noise is as large as what is left.  Cheap: it tells which forces are worth a balance.
+    Beyond what parameters and forces that are there would gain without it; the noise is as large as
+    what is left.  Cheap: it tells which forces are worth a balance.
     """
     forces = (*part.forces, basis)
     unit = [period.transform(b.force(part.motions[b.place])) for b in forces]
     own = np.flatnonzero(fitted)
     joint = _Joint(part.model, windows, period, forces, np.array(unit), own)
     left, slope = joint.linearised(part.theta, np.append(part.strength, 0.0))
-    along = np.linalg.qr(slope)[0].T @ left
-    share = min(float(along @ along / (left @ left)), 0.999)
+    along = np.linalg.qr(slope)[0].T @ left  # the new force is the last column
+    without = float(left @ left - along[:-1] @ along[:-1])
+    share = min(float(along[-1] ** 2) / without, 0.999)
     return -len(own) * float(np.log1p(-share))
 
 

@@ -97,20 +97,23 @@ class LineTrials:
         """All candidates, the best variant of each: a test does not tell their classes apart."""
         assert isinstance(state, BalancedState)
         found: dict[tuple[str, Place | None], Trial] = {}
-        for basis in self._promising(state.part):
-            if meter.affords(basis.title):
-                tick(basis.title)
-                self._keep(found, (basis.name, basis.place), self._with_force(state, basis))
         rest = self._rest(state.part).part(self.fitted)
         bases = starting_bases(state.part.model, state.part.theta, state.fit.elsewhere)
         sieved = sieve(state.part.model, self.etfe, rest, bases)
+        best = 0.0
         for one in sieved:
             near = one.gain >= thresholds.REACH * sieved[0].gain
             if not (near and meter.affords(one.effect.title)):
                 continue
             tick(one.effect.title)
-            trial = self._with_linear(state, one.effect, one.starts, rest)
+            tried = self._with_linear(state.part, one.effect, one.starts, rest)
+            best = max(best, self._gained(state.part, tried))
+            trial = self._judged(state, tried, *_linear(one.effect))
             self._keep(found, (one.effect.name, None), trial)
+        for basis in self._promising(state.part, best):
+            if meter.affords(basis.title):
+                tick(basis.title)
+                self._keep(found, (basis.name, basis.place), self._with_force(state, basis))
         return list(found.values())
 
     def without_needless(self, state: State) -> tuple[State, str | None]:
@@ -132,8 +135,19 @@ class LineTrials:
         if trial and (key not in found or trial.score > found[key].score):
             found[key] = trial
 
-    def _promising(self, part: Balanced) -> list[Basis]:
-        """Forces that are not there yet and are worth a balance, the most promising first."""
+    def _gained(self, part: Balanced, tried: Balanced) -> float:
+        """Gain in log likelihood on the lines to fit, the noise as large as what is left.
+
+        In the terms of `promise`.
+        """
+        before, after = part.rms(self.fitted), tried.rms(self.fitted)
+        return 2 * np.count_nonzero(self.fitted) * float(np.log(before / after))
+
+    def _promising(self, part: Balanced, best: float) -> list[Basis]:
+        """Forces that are not there yet and are worth a balance, the most promising first.
+
+        What offers far less than the best of all candidates is none of them: a balance is dear.
+        """
         there = {(basis.name, basis.place) for basis in part.forces}
         offers = [
             (promise(part, self.windows, self.period, basis, self.fitted), basis)
@@ -141,7 +155,7 @@ class LineTrials:
             for basis in variants
             if (basis.name, basis.place) not in there
         ]
-        least = max([_PROMISE, *(_NEAR * offer for offer, _ in offers)])
+        least = max([_PROMISE, _NEAR * best, *(_NEAR * offer for offer, _ in offers)])
         offers.sort(key=lambda offer: -offer[0])
         return [basis for offer, basis in offers if offer >= least]
 
@@ -154,23 +168,11 @@ class LineTrials:
         return self._judged(state, tried, 1, Accepted(basis.name, basis.title, "nonlinear", ""))
 
     def _with_linear(
-        self, state: BalancedState, effect: LinearEffect, starts: Floats, rest: Windows
-    ) -> Trial:
-        part = state.part
+        self, part: Balanced, effect: LinearEffect, starts: Floats, rest: Windows
+    ) -> Balanced:
         model = part.model.with_effect(effect)
         theta = refine_anew(model, self.etfe, rest, starts).theta
-        tried = self._balance(model, part.forces, theta, part.strength)
-        names = tuple(p.name for p in effect.parameters)
-        accepted = Accepted(
-            effect.name,
-            effect.title,
-            effect.family,
-            "",
-            parameters=names,
-            told_apart_by=effect.told_apart_by,
-            change=Change(effect),
-        )
-        return self._judged(state, tried, len(names), accepted)
+        return self._balance(model, part.forces, theta, part.strength)
 
     def _judged(
         self, state: BalancedState, tried: Balanced, size: int, accepted: Accepted
@@ -220,6 +222,21 @@ class LineTrials:
         fit = least_squares(whole.model, corrected, start=whole.theta)
         sized = tuple(_sized(effect, whole) for effect in accepted)
         return BalancedState(corrected, fit, sized, part=part, whole=whole)
+
+
+def _linear(effect: LinearEffect) -> tuple[int, Accepted]:
+    """The number of a linear effect's parameters, and the effect as it would be accepted."""
+    names = tuple(parameter.name for parameter in effect.parameters)
+    accepted = Accepted(
+        effect.name,
+        effect.title,
+        effect.family,
+        "",
+        parameters=names,
+        told_apart_by=effect.told_apart_by,
+        change=Change(effect),
+    )
+    return len(names), accepted
 
 
 def _sized(effect: Accepted, whole: Balanced) -> Accepted:
