@@ -17,6 +17,8 @@ from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
 from bayeshaptic.inference.fit import MISFIT
 
+# Evidence "not worth more than a bare mention" (R. E. Kass and A. E. Raftery, JASA 90, 1995).
+_BARE_MENTION = 2.0
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
 
 
@@ -46,7 +48,7 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
         rest = (1 - share) * options.budget_s / len(rivals)
         found[name] = other, trace(other.etfe, other.fit, options.report, rest)
     noise = max(1.0, min(t.state.fit.reduced_chi_square for _, t in found.values()))
-    best = min(found, key=lambda name: _rank(found[name][1], noise))
+    best = _best({name: traced for name, (_, traced) in found.items()}, noise)
     begun, traced = found[best]
     assert begun.choice is not None
     choice = replace(
@@ -85,9 +87,12 @@ def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
     return simple and all(begun.fit.model.size < size for size in sizes)
 
 
-def _rank(traced: Traced, noise: float) -> tuple[bool, float]:
-    """What is explained comes first, then the information criterion."""
-    return traced.verdict == UNEXPLAINED, _criterion(traced, noise)
+def _best(found: dict[str, Traced], noise: float) -> str:
+    """What explains comes first, then the information criterion; of equals the fewest effects."""
+    explained = {n: t for n, t in found.items() if t.verdict != UNEXPLAINED} or found
+    behind = {name: _criterion(traced, noise) for name, traced in explained.items()}
+    equals = [name for name in behind if behind[name] <= min(behind.values()) + _BARE_MENTION]
+    return min(equals, key=lambda name: (len(found[name].state.accepted), behind[name]))
 
 
 def _criterion(traced: Traced, noise: float) -> float:
@@ -97,11 +102,15 @@ def _criterion(traced: Traced, noise: float) -> float:
 
 
 def _said(best: str, found: dict[str, tuple[Begun, Traced]], noise: float) -> str:
-    words = []
+    words, most = [], "the most"
     for name, (_, traced) in found.items():
         effects = ", ".join(effect.title for effect in traced.state.accepted) or "no effect"
         behind = _criterion(traced, noise) - _criterion(found[best][1], noise)
         side = "worse" if behind > 0 else "lower"
+        if behind < 0 and (traced.verdict == UNEXPLAINED) == (
+            found[best][1].verdict == UNEXPLAINED
+        ):
+            most = "as much with fewer effects"
         compared = "" if name == best else f", BIC {abs(behind):,.0f} {side}"
         words.append(f"{name} with {effects} ({traced.verdict}{compared})")
-    return f" With what each of them lacks, {best} explains the most: {'; '.join(words)}."
+    return f" With what each of them lacks, {best} explains {most}: {'; '.join(words)}."
