@@ -57,6 +57,18 @@ def below_nyquist(row, theta, gain) -> np.ndarray:
     return np.array(sorted(zip(row[used], theta[used], gain[used], strict=True)))
 
 
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize(("device", "structure"), CASES)
+def test_compiled_values_are_the_sum_over_the_poles(device, structure, exact) -> None:
+    response = pole_response(loops(device, structure), T, exact)
+    rows = np.array([7, 0, 7, 299])
+    theta = np.geomspace(1e-5, np.pi, 4 * 50).reshape(50, 4).T
+    terms = response.terms(rows, theta)
+    # Slow poles cancel each other at low frequencies: digits are lost against the largest term.
+    left = np.abs(response.at(rows, theta) - terms.sum(axis=0))
+    assert np.all(left < 1e-14 * len(terms) * np.abs(terms).sum(axis=0))
+
+
 def test_the_stiffness_of_a_loop_does_not_depend_on_the_batch_around_it() -> None:
     system = loops("lhifam", "grasped", count=20)
     together = find_crossings(system, T).critical
