@@ -43,6 +43,7 @@ def chosen_of(
     misfits: dict[str, float],
     loops: dict[str, Any],
     from_a_hand: float = 0.0,
+    scores: dict[str, float] | None = None,
 ) -> tuple[str, list[str]]:
     """The base model in the end, and those that the loop was closed on."""
     seen = []
@@ -59,7 +60,8 @@ def chosen_of(
     monkeypatch.setattr(choose, "deviance", deviance)
     monkeypatch.setattr(base_model, "replace", lambda old, **new: _changed(old, new))
     fits = {name: fit(name, value) for name, value in misfits.items()}
-    scored = {name: ScoredFit(f, 0.0, deviance(f, 1.0)[1]) for name, f in fits.items()}
+    score = dict.fromkeys(fits, 0.0) | (scores or {})
+    scored = {name: ScoredFit(f, score[name], deviance(f, 1.0)[1]) for name, f in fits.items()}
     choice = Choice(fits[chosen], "", scored)
     begun: Any = SimpleNamespace(etfe=None, fit=fits[chosen], choice=choice)
     return traced_from_best_base(begun, Options())[0].fit.model.name, seen
@@ -115,6 +117,38 @@ def test_a_hand_that_is_like_none_is_compared_with_what_nobody_holds(monkeypatch
     misfits = {"free": 90.0, "grasped": 1.0}
     assert chosen_of(monkeypatch, "grasped", misfits, found, 4.0) == ("grasped", ["grasped"])
     assert chosen_of(monkeypatch, "grasped", misfits, found, 60.0) == ("free", ["grasped", "free"])
+
+
+@pytest.mark.parametrize(
+    ("behind", "own", "best"),
+    [
+        # A hand that hardly holds fits all but as well as a third mass: its motion is no noise.
+        (6.2, UNEXPLAINED, "grasped"),
+        (6.2, CONSISTENT, "chain-2"),  # nothing is left to ask
+        (12.0, UNEXPLAINED, "chain-2"),  # no hand is like this
+    ],
+)
+def test_what_a_chain_leaves_may_be_a_hand_that_hardly_holds(
+    monkeypatch, behind, own, best
+) -> None:
+    found = {
+        "chain-2": traced("chain-2", own, 1.0),
+        "grasped": traced("grasped", CONSISTENT, 1.0),
+    }
+    misfits, scores = {"free": 200.0, "chain-2": 1.0, "grasped": 1.0}, {"grasped": behind}
+    name, seen = chosen_of(monkeypatch, "chain-2", misfits, found, scores=scores)
+    assert (name, seen) == (best, ["chain-2", "grasped"] if best == "grasped" else ["chain-2"])
+
+
+def test_of_base_models_that_explain_alike_the_one_with_fewest_effects(monkeypatch) -> None:
+    """A third mass with a spring is a hand: 10 and 2 parameters, 11 and 1."""
+    found = {
+        "chain-2": traced("chain-2", EXPLAINED, 1.0, 1, 1),
+        "grasped": traced("grasped", EXPLAINED, 1.0, 1),
+        "free": traced("free", UNEXPLAINED, 9.0, 3),
+    }
+    misfits = {"free": 200.0, "chain-2": 50.0, "grasped": 51.0}
+    assert chosen_of(monkeypatch, "chain-2", misfits, found)[0] == "grasped"
 
 
 def test_beside_a_chain_that_misfits_a_mode_may_be_on_the_motor(monkeypatch) -> None:

@@ -17,8 +17,9 @@ from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
 from bayeshaptic.inference.fit import MISFIT
 
-# Evidence "not worth more than a bare mention" (R. E. Kass and A. E. Raftery, JASA 90, 1995).
-_BARE_MENTION = 2.0
+# Differences of BIC: evidence "not worth more than a bare mention", and "very strong" evidence
+# (R. E. Kass and A. E. Raftery, JASA 90, 1995).
+_BARE_MENTION, _VERY_STRONG = 2.0, 10.0
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
 
 
@@ -37,10 +38,14 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
         With the base model whose explanation is the best.
     traced : Traced
     """
-    rivals = _rivals(begun)
-    share = _OWN if rivals else 1.0
+    rivals, doubted = _rivals(begun), _hardly_worse(begun)
+    share = _OWN if rivals or doubted else 1.0
     own = trace(begun.etfe, begun.fit, options.report, share * options.budget_s)
-    if not rivals or not own.state.accepted or _is_the_least(own, begun, rivals):
+    if not rivals:
+        rivals = doubted if own.verdict == UNEXPLAINED else ()
+    elif not own.state.accepted or _is_the_least(own, begun, rivals):
+        rivals = ()
+    if not rivals:
         return begun, own
     found = {begun.fit.model.name: (begun, own)}
     for name in rivals:
@@ -78,6 +83,22 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
     best = sorted(there, key=lambda name: others[name].score)[:1]
     beside = ["free"] if begun.fit.model.name == "chain-2" and "free" in others else []
     return (*best, *beside)
+
+
+def _hardly_worse(begun: Begun) -> tuple[str, ...]:
+    """The base models with or without a hand, as the chosen one is not, that fit all but as well.
+
+    A hand that hardly holds looks like a third mass, and its own motion like noise of a device.
+    """
+    choice = begun.choice
+    if choice is None:
+        return ()
+    chosen = choice.candidates[begun.fit.model.name]
+    return tuple(
+        name
+        for name, other in choice.candidates.items()
+        if other.held != chosen.held and other.score - chosen.score < _VERY_STRONG
+    )
 
 
 def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
