@@ -59,8 +59,10 @@ class Samples:
         return increment_unit(self.recording.position) or 0.0
 
     def without(self, wrong: Bools) -> Samples:
-        """The same with more samples known to be wrong."""
-        return replace(self, missing=self.missing | wrong)
+        """The same with more samples known to be wrong; itself where there are no more."""
+        missing = self.missing | wrong
+        # A predictor is a regression of a tenth of a second.
+        return self if np.array_equal(missing, self.missing) else replace(self, missing=missing)
 
     @property
     def mended(self) -> Recording:
