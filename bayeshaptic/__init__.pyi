@@ -83,6 +83,9 @@ from .models import (
     LogUniform as LogUniform,
 )
 from .models import (
+    MaybeZero as MaybeZero,
+)
+from .models import (
     Model as Model,
 )
 from .models import (

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import kstest
 
 from bayeshaptic.inference import least_squares, sample
-from bayeshaptic.models import HalfNormal, LogNormal, Model, NearZero, build_model, draw
+from bayeshaptic.models import HalfNormal, LogNormal, MaybeZero, Model, NearZero, build_model, draw
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -220,7 +220,7 @@ def _prior_information(model: Model, name: str) -> float:
     prior = model.prior(name)
     if isinstance(prior, LogNormal):
         return prior.log_sd**-2
-    assert isinstance(prior, HalfNormal | NearZero)
+    assert isinstance(prior, HalfNormal | MaybeZero | NearZero)
     return prior.scale**-2
 
 

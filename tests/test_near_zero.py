@@ -17,6 +17,7 @@ from bayeshaptic.inference.sampling.laplace import _possible, laplace
 from bayeshaptic.inference.sampling.near_zero import (
     inside,
     redrawing,
+    resolved,
     start_of,
     with_near_zero,
 )
@@ -229,7 +230,10 @@ def test_a_light_device_without_a_file_has_its_limit(light):
 
 def test_chains_that_agree_in_a_wrong_valley_have_not_converged(light, monkeypatch):
     etfe, fit, _ = light
-    # As far up as the prior would have it, where the other damper cannot follow.
+    # As far up as a prior on every scale would have it, where the other damper cannot follow.
+    scale = fit.model.prior("b1").scale
+    prior = bh.NearZero(scale, 1e-6 * scale, 0.25)
+    fit = bh.least_squares(fit.model.with_prior({"b1": prior, "b2": prior}), etfe, start=fit.theta)
     monkeypatch.setattr(sampler, "start_of", lambda here, fit: inside(here, fit, 0.3))
     posterior = bh.sample(fit.model, etfe, start=fit, ess=200, seed=1, most_evaluations=100_000)
     assert not posterior.converged and "best fit" in posterior.message
@@ -255,6 +259,7 @@ def test_what_follows_a_small_damper_leans_on_a_wall_only_where_it_is_there_itse
 def test_two_small_dampers_whose_sum_is_known_are_sampled_over_all_of_it():
     """By the logarithm of their ratio; in logarithms of their own chains stay at one end."""
     etfe, fit, _ = without_file({**LIGHT, "b1": 0.1, "b2": 0.2}, 10.0)
+    fit = resolved(fit)
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     b1, b2 = fit.model.names.index("b1"), fit.model.names.index("b2")
     assert {here.beside, *here.near_zero} == {b1, b2}
@@ -278,3 +283,25 @@ def test_two_small_dampers_whose_sum_is_known_are_sampled_over_all_of_it():
     assert posterior.converged
     low, high = np.quantile(posterior.draws[:, b1], [0.1, 0.9])
     assert low < 0.01 and high > 0.23  # 0.04 and 0.15 in logarithms of each
+
+
+def test_zero_weighs_as_much_as_three_standard_deviations():
+    prior = bh.MaybeZero(2.0, 0.01)
+    near, far = np.array([0.0, *np.geomspace(1e-9, 0.002, 20_001)]), np.linspace(0.5, 0.53, 301)
+    at_zero = np.trapezoid(np.exp(prior.log_density(near)), near)
+    slab = np.exp(prior.log_density(0.03))
+    assert at_zero == pytest.approx(3 * 0.01 * slab + 0.002 * slab, rel=1e-2)
+    shape = prior.log_density(far) - bh.HalfNormal(2.0).log_density(far)
+    assert shape == pytest.approx(np.log1p(-prior.zero), abs=1e-9)
+    assert np.all(bh.MaybeZero(2.0).log_density(far) == bh.HalfNormal(2.0).log_density(far))
+
+
+def test_sampling_takes_what_is_seen_from_the_fit():
+    _, fit, _ = without_file({**LIGHT, "b1": 0.1, "b2": 0.2}, 10.0)
+    assert fit.model.prior("b1").seen is None
+    prior = resolved(fit).model.prior("b1")
+    # With the other damper held the fit's own error is a tenth of that.
+    index = fit.model.names.index("b1")
+    assert prior.seen == pytest.approx(fit.sd[index], rel=0.3)
+    own = fit.model.with_prior({"b1": bh.MaybeZero(1.0, 0.5)})
+    assert resolved(replace(fit, model=own)).model.prior("b1").seen == 0.5

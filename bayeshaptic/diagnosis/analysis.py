@@ -213,7 +213,7 @@ def finish(
         recording=etfe.recording,
         etfe=etfe,
         device=begun.device,
-        model=fit.model,
+        model=posterior.model,  # whose priors know what the fit sees
         choice=begun.choice,
         fit=fit,
         posterior=posterior,

@@ -101,6 +101,12 @@ class Coordinates:
         assert self.beside is not None
         return -self.scale[self.beside] * self.follow[self.beside]
 
+    def ends_of_ratios(self, phi: Floats) -> tuple[Floats, Floats]:
+        """Log ratios where the small ones are zero, (B, 1), and the one beside, (B, n)."""
+        assert self.beside is not None
+        whole = np.maximum(self.scale[self.beside] * phi[:, [self.beside]], 0.0)
+        return -np.log1p(whole / self.beside_floor), np.log1p(whole / self._given_up / self.floor)
+
     def own(self, phi: Floats) -> Floats:
         """Of each parameter by itself: its logarithm, or its value over the scale."""
         if not self.near_zero:

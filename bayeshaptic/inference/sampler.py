@@ -18,7 +18,13 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.inference.sampling.laplace import laplace
-from bayeshaptic.inference.sampling.near_zero import inside, redrawing, start_of, with_near_zero
+from bayeshaptic.inference.sampling.near_zero import (
+    inside,
+    redrawing,
+    resolved,
+    start_of,
+    with_near_zero,
+)
 from bayeshaptic.inference.sampling.run import Run, run_until_done
 from bayeshaptic.inference.saved.checkpoint import Checkpoint, Stored, key_of
 from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
@@ -115,9 +121,9 @@ def sample(
     began = time.perf_counter()
     report = told(progress) or (lambda share, word: None)
     fit = start if start is not None else least_squares(model, etfe, seed=seed)
-    asked = rule or EveryParameter(fit.model, ess)
     report(0.02, "finding the peak")
-    fit = _converged(fit)
+    fit = resolved(_converged(fit))
+    asked = rule or EveryParameter(fit.model, ess)
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     density = Density(fit.likelihood, here)
     origin = start_of(here, fit)

@@ -7,12 +7,12 @@ from bayeshaptic.models.prior import (
     HalfNormal,
     LogNormal,
     LogUniform,
-    NearZero,
     Normal,
     Prior,
     Uniform,
     draw,
 )
+from bayeshaptic.models.prior_of_zero import MaybeZero, NearZero
 from bayeshaptic.models.prior_table import prior_from_table
 from bayeshaptic.models.response.system import LinearSystem
 
@@ -23,6 +23,7 @@ __all__ = [
     "LogNormal",
     "LogUniform",
     "Model",
+    "MaybeZero",
     "NearZero",
     "Normal",
     "Parameter",

@@ -10,7 +10,8 @@ from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.parameter import Parameter
-from bayeshaptic.models.prior import HalfNormal, LogNormal, NearZero, Normal, Prior
+from bayeshaptic.models.prior import HalfNormal, LogNormal, Normal, Prior
+from bayeshaptic.models.prior_of_zero import NearZero
 from bayeshaptic.models.structures import (
     FREE,
     GRASPED,
@@ -31,9 +32,6 @@ HAND_LOG_SD = 0.7
 DAMPER_SCALE = 2.0
 # One that the file gives as zero was not seen: it may be as small as this share of that.
 DAMPER_FLOOR = 1e-6
-# Where nobody said zero, four times as much lies next to it as in a factor e above: between what
-# pushes away from a damper of zero (1) and what pulls a small one there (0).
-DAMPER_RISE = 0.25
 # One that a file gives as less than this share of the total is there, but may be too small to be
 # seen: between a half-normal, which is flat next to zero, and that.
 SMALL_DAMPER, SMALL_DAMPER_RISE = 0.1, 0.5

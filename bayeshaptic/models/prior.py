@@ -7,7 +7,6 @@ that are positive and known up to a factor, ``"linear"`` for those that may be z
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -77,7 +76,7 @@ class Terms:
         return np.where((x >= self.low) & (x <= self.high), density, -np.inf)
 
 
-class _ByTerms(Prior):
+class ByTerms(Prior):
     """A prior whose density is of the form of `Terms`."""
 
     @property
@@ -90,7 +89,7 @@ class _ByTerms(Prior):
 
 
 @dataclass(frozen=True)
-class LogNormal(_ByTerms):
+class LogNormal(ByTerms):
     """log(x) is normal around log(median) with standard deviation `log_sd`."""
 
     median: float
@@ -119,7 +118,7 @@ class LogNormal(_ByTerms):
 
 
 @dataclass(frozen=True)
-class HalfNormal(_ByTerms):
+class HalfNormal(ByTerms):
     """abs(z), z normal around zero with standard deviation `scale`: for dampers, which may be 0."""
 
     scale: float
@@ -144,64 +143,7 @@ class HalfNormal(_ByTerms):
 
 
 @dataclass(frozen=True)
-class NearZero(_ByTerms):
-    """Density proportional to exp(-x^2 / (2 scale^2)) / (x + floor)^(1 - rise): dampers, maybe 0.
-
-    A published zero says that nothing was seen, not how little there is.  Between `floor` and
-    `scale` every factor is alike, so that on whatever scale the data tell zero from something,
-    much of the probability lies next to zero; a half-normal is flat there and pushes away from it.
-    With a `rise`, below one, every factor e has exp(rise) times the probability of the one below
-    it: where nobody said zero, next to it lies 1 / rise times what is in a factor e above it, on
-    whatever scale.
-    """
-
-    scale: float
-    floor: float
-    rise: float = 0.0
-    coordinate = "linear"
-    support = (0.0, np.inf)
-
-    def __post_init__(self) -> None:
-        check_fields(self, globals())
-        if not 1e-12 * self.scale <= self.floor < self.scale:
-            raise InputError(
-                f"NearZero needs a floor below its scale, by a factor of 1e12 at most; got {self}."
-            )
-        if not 0 <= self.rise < 1:
-            raise InputError(f"NearZero needs a rise of at least 0 and below 1; got {self}.")
-
-    @property
-    def terms(self) -> Terms:
-        whole = _near_zero(self.floor / self.scale, self.rise)[0]
-        constant = -np.log(whole) - self.rise * np.log(self.floor)
-        over = 1 - self.rise
-        return Terms(0.0, np.inf, constant, sd=self.scale, over_x=over, shift=self.floor)
-
-    def quantile(self, p: ArrayLike) -> Floats:
-        _, factors, below = _near_zero(self.floor / self.scale, self.rise)
-        return self.floor * np.expm1(np.interp(np.asarray(p, float), below, factors))
-
-    def describe(self, unit: str) -> str:
-        of = f"x^{self.rise - 1:.3g}" if self.rise else "log-uniform"
-        return (
-            f"near zero: {of} from {quantity(self.floor, unit)} to {quantity(self.scale, unit)} "
-            "with soft ends, zero included"
-        )
-
-
-@lru_cache(maxsize=64)
-def _near_zero(ratio: float, rise: float) -> tuple[float, Floats, Floats]:
-    """The integral of a `NearZero` density; log(1 + x / floor) with the probability below it."""
-    from scipy.integrate import cumulative_simpson
-
-    factors = np.linspace(0.0, np.log1p(9.0 / ratio), 20_001)
-    density = np.exp(rise * factors - 0.5 * (ratio * np.expm1(factors)) ** 2)
-    below = np.maximum.accumulate(cumulative_simpson(density, x=factors, initial=0.0))
-    return float(below[-1]), factors, below / below[-1]
-
-
-@dataclass(frozen=True)
-class Normal(_ByTerms):
+class Normal(ByTerms):
     """Normal around `mean` with standard deviation `sd`, cut off below `low` (by default not)."""
 
     mean: float
@@ -238,7 +180,7 @@ class Normal(_ByTerms):
 
 
 @dataclass(frozen=True)
-class Uniform(_ByTerms):
+class Uniform(ByTerms):
     """Every value between `low` and `high` alike."""
 
     low: float
@@ -266,7 +208,7 @@ class Uniform(_ByTerms):
 
 
 @dataclass(frozen=True)
-class LogUniform(_ByTerms):
+class LogUniform(ByTerms):
     """Every factor between `low` and `high` alike."""
 
     low: float

@@ -9,17 +9,18 @@ from bayeshaptic.models.prior import (
     HalfNormal,
     LogNormal,
     LogUniform,
-    NearZero,
     Normal,
     Prior,
     Uniform,
 )
+from bayeshaptic.models.prior_of_zero import MaybeZero, NearZero
 
 _FORMS: dict[frozenset[str], type] = {
     frozenset({"median", "log_sd"}): LogNormal,
     frozenset({"scale"}): HalfNormal,
     frozenset({"scale", "floor"}): NearZero,
     frozenset({"scale", "floor", "rise"}): NearZero,
+    frozenset({"scale", "seen"}): MaybeZero,
     frozenset({"mean", "sd"}): Normal,
     frozenset({"mean", "sd", "low"}): Normal,
     frozenset({"low", "high"}): Uniform,
@@ -30,8 +31,8 @@ def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     """The prior that a ``[prior]`` table of a study declares for the parameter `name`.
 
     ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{scale, floor}`` (and ``rise``)
-    near zero, ``{mean, sd}`` (and ``low``) normal, ``{low, high}`` uniform, and ``{low, high, log =
-    true}`` log-uniform.
+    near zero, ``{scale, seen}`` half-normal or zero, ``{mean, sd}`` (and ``low``) normal, ``{low,
+    high}`` uniform, and ``{low, high, log = true}`` log-uniform.
 
     Raises
     ------
@@ -44,7 +45,8 @@ def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     if form is None:
         raise InputError(
             f"prior of {name}: keys {sorted(table)} fit no prior; use {{median, log_sd}}, "
-            "{scale}, {scale, floor}, {mean, sd}, {low, high} or {low, high, log = true}."
+            "{scale}, {scale, floor}, {scale, seen}, {mean, sd}, {low, high} or {low, high, log = "
+            "true}."
         )
     try:
         numbers = {key: float(value) for key, value in keys.items()}  # type: ignore[arg-type]

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayeshaptic.models.build import DAMPER_FLOOR, DAMPER_RISE, delay_prior
+from bayeshaptic.models.build import delay_prior
 from bayeshaptic.models.hand import KILOGRAMS, hand_priors
 from bayeshaptic.models.model import Model
-from bayeshaptic.models.prior import LogNormal, NearZero, Prior, draw
+from bayeshaptic.models.prior import LogNormal, Prior, draw
+from bayeshaptic.models.prior_of_zero import MaybeZero
 from bayeshaptic.models.structures import GROUND_DAMPERS, HAND
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
@@ -60,7 +61,7 @@ def informed(model: Model, etfe: Etfe) -> Model:
     """`model` with the period and units of the data, and weak priors where it has none.
 
     The weak priors use two numbers of the data, a mass and the band: log-normal with a factor e^2
-    (masses) or e^3 (springs and dampers) a standard deviation, and near zero for ground dampers.
+    (masses) or e^3 (springs and dampers) a standard deviation; ground dampers may be zero.
     Those of a hand say what hands are like.
     """
     model = replace(
@@ -85,8 +86,7 @@ def informed(model: Model, etfe: Etfe) -> Model:
 
 def _weak_prior(name: str, dimension: str, found: ResponseScales, period_s: float) -> Prior:
     if name in GROUND_DAMPERS:
-        scale = 0.5 * found.mass * found.middle
-        return NearZero(scale, DAMPER_FLOOR * scale, DAMPER_RISE)
+        return MaybeZero(0.5 * found.mass * found.middle)
     if dimension == "mass":
         return LogNormal(found.mass, 2.0)
     if dimension == "damping":

@@ -19,7 +19,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.laplace import laplace
-from bayeshaptic.inference.sampling.near_zero import start_of, with_near_zero
+from bayeshaptic.inference.sampling.near_zero import resolved, start_of, with_near_zero
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.pareto import pareto_k
 from bayeshaptic.numerics.weights import normalised, systematic, truncated
@@ -125,6 +125,7 @@ def _penalised(fit: Fit, windows: Windows) -> float:
 
 def _rival(name: str, fit: Fit, windows: Windows, rng: np.random.Generator) -> Rival | None:
     draws, kept = 3000, 500
+    fit = resolved(fit)
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     density = Density(Likelihood(fit.model, windows), here)
     _, proposal = laplace(density, start_of(here, fit))

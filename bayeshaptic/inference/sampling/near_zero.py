@@ -1,9 +1,9 @@
 """Coordinates for parameters of which a recording says no more than that they are next to zero.
 
-The prior `NearZero` has as much probability on every scale: only a logarithm shows all of it.
-But what the data know, sums of dampers before all, are lines in the natural values, hundreds of
-times longer than they are thick, and a logarithm would bend them.  So the others are measured from
-where they follow the small one to.
+The prior `NearZero` has as much probability on every scale, `MaybeZero` a spike: only a logarithm
+shows all of it.  But what the data know, sums of dampers before all, are lines in the natural
+values, hundreds of times longer than they are thick, and a logarithm would bend them.  So the
+others are measured from where they follow the small one to.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.inference.coordinates import Coordinates
+from bayeshaptic.inference.coordinates import Coordinates, sampling_coordinates
 from bayeshaptic.inference.fit import Fit, weighted_residuals
-from bayeshaptic.models import NearZero, draw
+from bayeshaptic.models import MaybeZero, NearZero, Prior, draw
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 
 Redraw = Callable[[Floats, np.random.Generator], tuple[Floats, Floats]]
 """From points (B, P) to proposed points, with log density of proposing the way back over there."""
+_MAY_BE_ZERO = (MaybeZero, NearZero)  # priors
 _SEEN = 5.0  # standard deviations from zero, from which a parameter is sampled as it is
 # Coordinate units, of a ridge that is straight: e^10 in a logarithm.  A guard: the ridges of
 # 12 simulated recordings, held and free, clean and with effects, are all shorter than 1.
@@ -28,19 +29,18 @@ _LONGEST = 10.0
 
 
 def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
-    """`here` with logarithms for the `NearZero` parameters that `fit` does not see.
+    """`here` with logarithms for the parameters next to zero that `fit` does not see.
 
     How the others follow them is the direction in which the fit suffers least.  Of several whose
     sum is seen, these are measured by their ratios to the largest.
     """
     priors = [fit.model.prior(name) for name in fit.model.names]
-    if not any(isinstance(prior, NearZero) for prior in priors):
+    if not any(isinstance(prior, _MAY_BE_ZERO) for prior in priors):
         return here
-    slope = jacobian(weighted_residuals(fit.likelihood, here), here.coordinate(fit.theta)[None])[0]
-    slope = slope / np.sqrt(max(1.0, fit.reduced_chi_square))
+    slope = _slope(here, fit)
     values = fit.theta / here.scale
     seen = values > _SEEN * _errors(slope)
-    found = {i: p for i, p in enumerate(priors) if isinstance(p, NearZero) and not seen[i]}
+    found = {i: p for i, p in enumerate(priors) if isinstance(p, _MAY_BE_ZERO) and not seen[i]}
     small = sorted(found, key=lambda index: values[index])
     beside = _beside(slope, values, small)
     small = [index for index in small if index != beside]
@@ -64,6 +64,25 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
         beside=beside,
         beside_floor=1.0 if beside is None else found[beside].floor,
     )
+
+
+def resolved(fit: Fit) -> Fit:
+    """`fit` with priors that know how well it sees those parameters that may be zero."""
+    priors = {name: fit.model.prior(name) for name in fit.model.names}
+    open_ = {n: p for n, p in priors.items() if isinstance(p, MaybeZero) and p.seen is None}
+    if not open_:
+        return fit
+    here = sampling_coordinates(fit.model, fit.theta, fit.sd)
+    seen = dict(zip(fit.model.names, _errors(_slope(here, fit)) * here.scale, strict=True))
+    known = {name: replace(prior, seen=float(seen[name])) for name, prior in open_.items()}
+    return replace(fit, model=fit.model.with_prior(known))
+
+
+def _slope(here: Coordinates, fit: Fit) -> Floats:
+    """Of residuals of unit variance, misfit included, shape (N, P)."""
+    residuals = weighted_residuals(fit.likelihood, here)
+    slope = jacobian(residuals, here.coordinate(fit.theta)[None])[0]
+    return slope / np.sqrt(max(1.0, fit.reduced_chi_square))
 
 
 def _beside(slope: Floats, values: Floats, small: list[int]) -> int | None:
@@ -112,7 +131,7 @@ def inside(here: Coordinates, fit: Fit, begin: float = 0.0) -> Floats:
     phi = here.coordinate(fit.theta)
     inner = fit.theta.copy()
     for index in (*here.near_zero, *(() if here.beside is None else (here.beside,))):
-        least = float(fit.model.prior(fit.model.names[index]).quantile(begin))
+        least = float(_on_every_scale(fit.model.prior(fit.model.names[index])).quantile(begin))
         inner[index] = max(inner[index], least)
     small = list(here.near_zero)
     phi[small] = here.coordinate(inner)[small]  # the others follow
@@ -122,16 +141,25 @@ def inside(here: Coordinates, fit: Fit, begin: float = 0.0) -> Floats:
     return phi + np.clip(own, here.low + margin, here.high - margin) - own
 
 
+def _on_every_scale(prior: Prior) -> NearZero:
+    """A density that is nowhere far from `prior` next to zero, whichever scale the data see."""
+    if isinstance(prior, NearZero):
+        return prior
+    assert isinstance(prior, MaybeZero)
+    return NearZero(prior.scale, max(prior.floor, 1e-12 * prior.scale))
+
+
 def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:
-    """A proposal of small parameters from their priors, the others held where they are.
+    """A proposal of small parameters on every scale, the others held where they are.
 
     Where the data prefer a little to nothing, there is a hump beside the plateau next to zero, and
-    mixtures of a few components leave out corners of the plateau.  None where their sum is known:
-    most draws would be beyond it.
+    mixtures of a few components leave out corners of the plateau.
     """
-    if not here.near_zero or here.beside is not None:
+    if here.beside is not None:
+        return _redrawing_ratios(here)
+    if not here.near_zero:
         return None
-    priors = [fit.model.prior(fit.model.names[index]) for index in here.near_zero]
+    priors = [_on_every_scale(fit.model.prior(fit.model.names[i])) for i in here.near_zero]
 
     def log_density(phi: Floats) -> Floats:
         theta = here.natural(phi)
@@ -143,5 +171,17 @@ def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:
         drawn = phi.copy()
         drawn[:, here.near_zero] = np.log1p(theta / here.floor)
         return drawn, log_density(phi) - log_density(drawn)
+
+    return propose
+
+
+def _redrawing_ratios(here: Coordinates) -> Redraw:
+    """A proposal of log ratios anywhere between their ends, which the sum gives, and that stays."""
+
+    def propose(phi: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        low, high = here.ends_of_ratios(phi)
+        drawn = phi.copy()
+        drawn[:, here.near_zero] = rng.uniform(low, high)
+        return drawn, np.zeros(len(phi))
 
     return propose

@@ -12,6 +12,7 @@ from bayeshaptic.models import (
     HalfNormal,
     LogNormal,
     LogUniform,
+    MaybeZero,
     Model,
     NearZero,
     Normal,
@@ -21,7 +22,8 @@ from bayeshaptic.models import (
 from bayeshaptic.models.structures import structure_named
 
 _PRIORS: dict[str, type] = {
-    kind.__name__: kind for kind in (HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform)
+    kind.__name__: kind
+    for kind in (HalfNormal, LogNormal, LogUniform, MaybeZero, NearZero, Normal, Uniform)
 }
 
 
