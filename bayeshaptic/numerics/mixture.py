@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 from bayeshaptic.types import Floats
 
@@ -51,10 +51,13 @@ class StudentMixture:
 
     def component_log_densities(self, x: Floats) -> Floats:
         """Weighted log density of every component, shape (C, B)."""
+        return self._log_densities(self.distances(x))
+
+    def _log_densities(self, distances: Floats) -> Floats:
         nu, size = self.freedom, self.means.shape[1]
         norm = gammaln(0.5 * (nu + size)) - gammaln(0.5 * nu) - 0.5 * size * np.log(nu * np.pi)
         half_log_det = np.log(np.einsum("cpp->cp", self.roots)).sum(axis=1)
-        kernel = -0.5 * (nu + size) * np.log1p(self.distances(x) / nu)
+        kernel = -0.5 * (nu + size) * np.log1p(distances / nu)
         return kernel + (np.log(self.weights) + norm - half_log_det)[:, None]
 
     def log_density(self, x: Floats) -> Floats:
@@ -118,9 +121,11 @@ def fit_student_mixture(
     )
     ridge = 1e-3 * overall.roots[0] @ overall.roots[0].T  # in the shape of the whole
     for _ in range(rounds):
-        logs = mixture.component_log_densities(x)
-        share = np.exp(logs - logsumexp(logs, axis=0)) * w
-        pull = share * (freedom + size) / (freedom + mixture.distances(x))
+        distances = mixture.distances(x)
+        logs = mixture._log_densities(distances)
+        share = np.exp(logs - logs.max(axis=0))
+        share *= w / share.sum(axis=0)
+        pull = share * (freedom + size) / (freedom + distances)
         total = share.sum(axis=1)
         if np.any(total < (size + 2) / len(x)):  # a component that starves would collapse
             return overall
