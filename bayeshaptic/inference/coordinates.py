@@ -93,7 +93,8 @@ class Coordinates:
         left = self.scale[self.beside] * phi[..., [self.beside]]
         grown = (self.floor * factor) @ self._given_up[:, None]
         whole = left + self.beside_floor + self.floor @ self._given_up
-        return self.floor * (factor * whole / (self.beside_floor + grown) - 1)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # far outside
+            return self.floor * (factor * whole / (self.beside_floor + grown) - 1)
 
     @property
     def _given_up(self) -> Floats:
@@ -112,9 +113,9 @@ class Coordinates:
         if not self.near_zero:
             return phi
         small = self._small(phi)
-        own = phi + small @ self.follow.T
-        if self.beside is not None:
-            with np.errstate(invalid="ignore", divide="ignore"):  # nan outside of the support
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # nan: not in support
+            own = phi + small @ self.follow.T
+            if self.beside is not None:
                 own[..., self.near_zero] = np.log1p(small / self.floor)
         return own
 
@@ -125,8 +126,9 @@ class Coordinates:
         if self.beside is None:
             return total
         other = own[..., self.beside] * self.scale[self.beside] + self.beside_floor
-        given = (self.floor * np.exp(own[..., self.near_zero])) @ self._given_up
-        return total - np.log1p(given / other)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # nan: not in support
+            given = (self.floor * np.exp(own[..., self.near_zero])) @ self._given_up
+            return np.asarray(total - np.log1p(given / other))
 
     def inside(self, phi: Floats) -> NDArray[np.bool_]:
         """Which vectors lie in the support of the priors, shape (B,)."""
