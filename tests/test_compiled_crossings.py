@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.models.build import build_model
-from bayeshaptic.numerics.polynomial import multiply
+from bayeshaptic.numerics.polynomial import evaluate, multiply, roots
 from bayeshaptic.numerics.polynomial_roots import find_roots
 from bayeshaptic.stability.crossings import _compiled_search, find_crossings, plain_search
 from bayeshaptic.stability.responses.response import pole_response
@@ -134,3 +134,14 @@ def test_a_long_delay_has_many_crossings() -> None:
     )
     assert np.sum(found[:, 0] == 1) > 90
     np.testing.assert_allclose(found, plain, rtol=1e-9)
+
+
+def test_one_and_two_roots_in_closed_form_are_as_exact_as_the_coefficients() -> None:
+    rng = np.random.default_rng(3)
+    for degree in (1, 2):
+        size = (degree + 1, 1000)
+        c = rng.standard_normal(size) * 10 ** rng.uniform(-4, 4, size)
+        c[:-1, 0] = 0.0  # all at zero
+        found = roots(c).T
+        sizes = evaluate(np.abs(c), np.abs(found).astype(complex)).real
+        assert np.all(np.abs(evaluate(c, found)) <= 1e-15 * sizes)

@@ -36,11 +36,30 @@ def evaluate(polynomial: Polynomial, s: NDArray[np.complex128]) -> NDArray[np.co
 
 
 def roots(polynomial: Polynomial) -> NDArray[np.complex128]:
-    """Roots of a batch of polynomials by the companion matrix, shape (B, degree)."""
+    """Roots of a batch of polynomials, shape (B, degree).
+
+    By the companion matrix; of one and two roots, as filters have them, in closed form.
+    """
     degree = len(polynomial) - 1
     if degree == 0:
         return np.zeros((polynomial.shape[1], 0), complex)
+    monic = polynomial[:-1] / polynomial[-1]
+    if degree == 1:
+        return -monic.T.astype(complex)
+    if degree == 2:
+        return _two_roots(*monic)
     companion = np.zeros((polynomial.shape[1], degree, degree))
     companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    companion[:, :, -1] = -(polynomial[:-1] / polynomial[-1]).T
+    companion[:, :, -1] = -monic.T
     return np.linalg.eigvals(companion).astype(complex)
+
+
+def _two_roots(c: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Roots of s^2 + b s + c, shape (B, 2), neither by a difference of nearly equal numbers."""
+    half = 0.5 * b
+    discriminant = half * half - c
+    root = np.sqrt(discriminant.astype(complex))
+    larger = -half - np.where(half < 0, -root, root)
+    some = np.where(larger == 0, 1.0, larger)
+    smaller = np.where(discriminant < 0, np.conj(larger), np.where(larger == 0, 0.0, c / some))
+    return np.stack([larger, smaller], axis=1)
