@@ -143,11 +143,11 @@ def test_sizes_of_another_recording_are_read_off_its_evidence() -> None:
     size = np.array([1.0, 2.0, 4.0, -1.0, -2.0])
     shape = np.array([[10.0], [10.0], [10.0], [10.0], [10.0]])
     log = np.array([-0.1, -0.4, -1.6, 0.2, 0.5])
-    own = Evidence(size, shape, np.full(5, 0.2), log)
+    own = Evidence(size, shape, np.full(5, 0.2), log + 0.1, log)
     assert own.of(size, shape) == pytest.approx(log)
     others = own.of(np.array([0.5, 8.0, 2.0, -0.5]), np.full((4, 1), 9.0))
     assert others == pytest.approx([-0.025, -6.4, -0.4, 0.05])
-    assert own.with_more([own, own]) == pytest.approx(np.log(0.2 * np.exp(3 * log).sum()))
+    assert own.with_more([own, own]) == pytest.approx(np.log(0.2 * np.exp(3 * log + 0.1).sum()))
 
 
 def test_two_recordings_rule_out_what_one_cannot(rigid: Posterior) -> None:
@@ -162,7 +162,7 @@ def test_two_recordings_rule_out_what_one_cannot(rigid: Posterior) -> None:
         row = next(row for row in rows if row.name == name)
         own = next(w for w in one.looked.weighed if w.name == name).evidence
         assert own is not None and row.together is not None
-        odds = 0.1 / 0.9 * float(own.weight @ np.exp(8 * own.log))
+        odds = 0.1 / 0.9 * float(own.weight @ np.exp(own.log + 7 * own.by_data))
         assert row.together == pytest.approx(odds / (1 + odds), rel=0.15, abs=0.01)
         assert row.strength_q95[1] < 0.6 * row.strength_q95[0]
     widths = [np.ptp(limit.db([0.01, 0.95])) for limit in (made[0], found[0][0])]

@@ -25,12 +25,16 @@ class Evidence:
         Prior probability of each.
     log : ndarray, shape (C,)
         Log evidence of each.
+    by_data : ndarray, shape (C,)
+        Less what the priors of the parameters that give way have in it.  These are the device's, in
+        every recording the same: of several recordings one counts them.
     """
 
     size: Floats = field(repr=False)
     shape: Floats = field(repr=False)
     weight: Floats = field(repr=False)
     log: Floats = field(repr=False)
+    by_data: Floats = field(repr=False)
 
     def with_more(self, others: Sequence[Evidence]) -> float:
         """Log evidence of the effect together with what others say of its sizes."""
@@ -38,7 +42,7 @@ class Evidence:
         return float(logsumexp(log, b=self.weight))
 
     def of(self, size: Floats, shape: Floats) -> Floats:
-        """Log evidence of other sizes (D,) with the shapes (D, K) that come closest, (D,).
+        """What the data say of other sizes (D,) with the shapes (D, K) that come closest, (D,).
 
         In between linear over the logarithm of the size; beyond the ends as the square of the size,
         which is what the log likelihood of a small change goes with.
@@ -52,13 +56,13 @@ class Evidence:
                 known = (which.ravel() == kind) & ((self.size > 0) == positive)
                 if asked.any() and known.any():
                     out[asked] = _interpolated(
-                        np.abs(size[asked]), np.abs(self.size[known]), self.log[known]
+                        np.abs(size[asked]), np.abs(self.size[known]), self.by_data[known]
                     )
         return out
 
 
 def sum_of(several: Sequence[Evidence], size: Floats, shape: Floats) -> Floats:
-    """Log evidence of the sizes (D,) with the shapes (D, K) by several recordings, (D,)."""
+    """What several recordings' data say of the sizes (D,) with the shapes (D, K), (D,)."""
     return np.sum([one.of(size, shape) for one in several], axis=0)
 
 

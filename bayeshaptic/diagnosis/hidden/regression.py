@@ -93,6 +93,11 @@ class Around:
         impossible = 1e6
         return np.where(np.isfinite(found), found, impossible)
 
+    def log_prior(self, phi: Floats) -> Floats:
+        """Log prior density in `here` at points (B, P) of its support, (B,)."""
+        with np.errstate(all="ignore"):  # far-away points may overflow
+            return self.model.log_prior(self.here.natural(phi)) + self.here.log_jacobian(phi)
+
     def density(self, model: Model, vectors: Floats, phi: Floats) -> Floats:
         """Log posterior density in `here`, (B,): of extended `model` with the base at `phi`."""
         value = np.full(len(phi), -np.inf)
@@ -100,10 +105,8 @@ class Around:
         if not inside.any():
             return value
         with np.errstate(all="ignore"):  # far-away vectors may overflow
-            value[inside] = (
-                self.model.log_prior(self.here.natural(phi[inside]))
-                + self.here.log_jacobian(phi[inside])
-                + Likelihood(model, self.windows)(vectors[inside])
+            value[inside] = self.log_prior(phi[inside]) + Likelihood(model, self.windows)(
+                vectors[inside]
             )
         return np.where(np.isfinite(value), value, -np.inf)
 

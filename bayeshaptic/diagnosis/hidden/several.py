@@ -36,7 +36,7 @@ class Together:
         What its strength is.
     strength_q95 : (float, float)
         With a probability of 95 % it is no larger, if it is there: by the recording that knows most
-        of it, and by all of them.
+        of it, alone and with all the others.
     """
 
     name: str
@@ -109,7 +109,7 @@ def _table(
             for one, other in zip(before, after, strict=True)
             for old, new in zip(_of(one, name), _of(other, name), strict=True)
         ]
-        old, new = min(pairs, key=lambda pair: pair[0].strength_q95)  # it knows most
+        old, new = (min(each, key=lambda e: e.strength_q95) for each in zip(*pairs, strict=True))
         rows.append(
             Together(
                 name,

@@ -119,7 +119,11 @@ def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
     log = guess + said - np.log(sizes.weight)
     log = log - (float(logsumexp(said + guess)) - evidence)
     least_log = -1e3  # log evidence: less is as impossible
-    told = Evidence(size, sizes.shape, sizes.weight, np.maximum(log, least_log))
+    before = known.log_prior(known.centre[None])
+    with np.errstate(invalid="ignore"):  # outside of the support
+        data = np.where(np.isfinite(log), log - known.log_prior(there) + before, -np.inf)
+    log, data = np.maximum(log, least_log), np.maximum(data, least_log)
+    told = Evidence(size, sizes.shape, sizes.weight, log, data)
     return Weighed(
         suspect.name,
         suspect.title,

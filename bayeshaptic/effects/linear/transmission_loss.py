@@ -143,13 +143,16 @@ class RelaxingTransmission(LinearEffect):
         return grid(stiffness, np.geomspace(0.03, 30, 7) / self._rate(sizes))
 
     def unseen(self, model: Model, etfe: Etfe) -> Unseen:
-        """Up to the transmission's own spring, relaxing thirty times slower to faster than it."""
+        """Up to the transmission's own spring, relaxing thirty times slower to ten times faster.
+
+        Faster than that it is a damper, which the model has.
+        """
         sizes = typical(model, etfe)
 
         def own(share: Floats, shapes: Floats) -> Floats:
             return np.stack([share * sizes["kc"], shapes[:, 0]], axis=1)
 
-        times = np.geomspace(0.03, 30, 7) / self._rate(sizes)
+        times = np.geomspace(0.1, 30, 6) / self._rate(sizes)
         title = "spring that relaxes over the other"
         return Unseen("number", title, 1.0, own, *combined(times))
 
