@@ -40,7 +40,7 @@ def expand(
         start = -1
         for q in range(order):
             value = above[degree - q] if 0 <= degree - q < len(above) else 0.0
-            for back in range(1, min(q, degree) + 1):
+            for back in range(min(q, degree), 0, -1):  # the newest last: it is waited for
                 value -= below[degree - back] * h[q - back]
             h[q] = value
             if start < 0 and value != 0.0:
