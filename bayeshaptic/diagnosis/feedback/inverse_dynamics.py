@@ -5,35 +5,41 @@ and friction come back through the controller.  The equation of motion holds all
 
 .. math:: u = m \ddot x + b \dot x + F_c\, \mathrm{sign}(\dot x) + \dots + \mathrm{offset},
 
-and is linear in its coefficients: least squares of the force on columns made of the position,
-low-passed forwards and backwards so that nothing is late, and everything then decimated to the
-bandwidth that is left (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997;
-A. Janot, M. Gautier and M. Brunot, "Data set and reference models of EMPS", 2019).
+and is linear in its coefficients: least squares of the force on columns made of the position, all
+low-passed forwards and backwards so that nothing is late, and then decimated to the bandwidth that
+is left, while the device moves (M. Gautier, "Dynamic identification of robots with power model",
+ICRA 1997; A. Janot, M. Gautier and M. Brunot, "Data set and reference models of EMPS", 2019).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import decimate
 
-from bayeshaptic.diagnosis.feedback.terms import SmoothMotion, Term, smooth_motion, terms_of
+from bayeshaptic.diagnosis.feedback.choose_terms import (
+    Addition,
+    between_sets,
+    choose_terms,
+    held_out,
+)
+from bayeshaptic.diagnosis.feedback.terms import (
+    SmoothMotion,
+    Term,
+    at_rest,
+    smooth_motion,
+    smoothed,
+    terms_of,
+)
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Bools, Floats
 
 # Samples by which the force acts later than it is written down, root mean square: the hold, the
 # loop's delay and the sensor's filter make anything from none to two.
 _LAG = float(np.sqrt(4 / 3))
-
-
-@dataclass(frozen=True)
-class Addition:
-    """One round: the term that was added and the held-out rms error of the force with it."""
-
-    term: str
-    held_out_rms: float
 
 
 @dataclass(frozen=True)
@@ -45,16 +51,18 @@ class InverseDynamics:
     terms : tuple of Term
     value, sd : ndarray, shape (J,)
         Coefficients; standard deviations allow for the residual's correlation within a second, and
-        for a lag between force and motion that nobody knows: of mass and damping in a short or a
-        clean recording that is nearly all.
+        for a lag between force and motion that nobody knows (of mass and damping in a clean
+        recording that is nearly all), and for what the choice of terms leaves open.
     steps : tuple of Addition
         From the linear model on, each error that of one half with the coefficients of the other.
     tried : tuple of Addition
         Terms that did not earn their place, and what they would have brought.
     relative_error : float
-        Norm of the residual over the norm of the force, all of it fitted.
+        Norm of the residual over the norm of the force while the device moves, all of it fitted.
     time_s, force, explained : ndarray, shape (N,)
         Filtered and decimated.
+    moving : ndarray of bool, shape (N,)
+        Where the device moves: at rest dry friction is whatever holds it, and nothing is fitted.
     path : SmoothMotion
         At the same times.
     cutoff_hz : float
@@ -69,6 +77,7 @@ class InverseDynamics:
     time_s: Floats = field(repr=False)
     force: Floats = field(repr=False)
     explained: Floats = field(repr=False)
+    moving: Bools = field(repr=False)
     path: SmoothMotion = field(repr=False)
     cutoff_hz: float
 
@@ -79,8 +88,8 @@ class InverseDynamics:
 
     @property
     def rms(self) -> float:
-        """Rms of the force that is left, all of it fitted."""
-        return float(np.sqrt(np.mean((self.force - self.explained) ** 2)))
+        """Rms of the force that is left while the device moves, all of it fitted."""
+        return float(np.sqrt(np.mean((self.force - self.explained)[self.moving] ** 2)))
 
 
 def inverse_dynamics(
@@ -90,8 +99,8 @@ def inverse_dynamics(
 ) -> InverseDynamics:
     """Explain the force of a recording by its motion; works with and without feedback.
 
-    Begins with mass, damper and offset and adds the term that lowers the error most on the half
-    that was not fitted, while both halves gain.
+    Begins with mass, damper and offset and adds dry friction, then the term that lowers the error
+    most on the half that was not fitted, while both halves gain enough: see `choose_terms`.
 
     Parameters
     ----------
@@ -101,7 +110,7 @@ def inverse_dynamics(
         Of the low-pass (Butterworth, order 4, forwards and backwards); a twentieth of the
         sampling rate by default.
     terms : tuple of str, optional
-        Use exactly these beside mass, damping and offset.
+        Use exactly these beside mass, damping and offset; then errors allow for no other choice.
 
     Returns
     -------
@@ -130,36 +139,49 @@ def inverse_dynamics(
             return inner
         return np.asarray(decimate(inner, every, zero_phase=True), dtype=np.float64)
 
-    force, time_s = thin(recording.force), np.arange(recording.samples)[edge:-edge:every]
+    def smooth(signal: Floats) -> Floats:
+        return thin(smoothed(signal, cutoff_hz, recording.period_s))
+
+    force, time_s = smooth(recording.force), np.arange(recording.samples)[edge:-edge:every]
     start, library = terms_of(recording, path)
     known = {term.name: term for term in (*start, *library)}
-    columns = {name: thin(term.column(path)) for name, term in known.items()}
-    chosen = [term.name for term in start]
-    steps, tried = [Addition("linear", _held_out(columns, chosen, force)[0])], []
-    if terms is not None:
-        unknown = sorted(set(terms) - set(known))
-        if unknown:
-            raise InputError(f"no term {', '.join(unknown)}; there are {', '.join(known)}")
-        chosen += [name for name in terms if name not in chosen]
-        steps.append(Addition(" + ".join(terms), _held_out(columns, chosen, force)[0]))
+    every_column = {
+        name: (thin if term.linear else smooth)(term.column(path)) for name, term in known.items()
+    }
+    moving = ~at_rest(recording, cutoff_hz)[edge:-edge:every]
+    if np.count_nonzero(moving) < fewest // 2:
+        raise InputError(
+            f"{recording.name}: it stands still too long for inverse dynamics; record it in motion"
+        )
+    columns = {name: column[moving] for name, column in every_column.items()}
+    seconds = every * recording.period_s * np.count_nonzero(moving)
+    names = [term.name for term in start]
+    if terms is None:
+        positive = {term.name for term in library if term.positive}
+        chosen, steps, tried = choose_terms(columns, names, positive, force[moving], seconds)
     else:
-        tried = _grow(columns, chosen, force, steps)
+        chosen, steps, tried = _asked_for(columns, names, force[moving], terms)
     design = np.stack([columns[name] for name in chosen], axis=1)
     block_s = 1.0  # residuals further apart are taken to be independent
-    value, sd = _solve(design, force, max(int(block_s / (every * recording.period_s)), 1))
-    late = thin(np.concatenate([recording.force[:1], recording.force[:-1]]))
+    block = max(int(block_s / (every * recording.period_s)), 1)
+    value, sd = _solve(design, force[moving], block)
+    late = smooth(np.concatenate([recording.force[:1], recording.force[:-1]]))[moving]
     sd = np.hypot(sd, _LAG * (np.linalg.lstsq(design, late, rcond=None)[0] - value))
-    left = force - design @ value
+    if terms is None:
+        sd = np.hypot(sd, between_sets(columns, names, chosen, force[moving], value))
+    explained = np.stack([every_column[name] for name in chosen], axis=1) @ value
+    left = (force - explained)[moving]
     return InverseDynamics(
         tuple(Term(name, known[name].title, known[name].unit) for name in chosen),
         value,
         sd,
         tuple(steps),
         tuple(tried),
-        float(np.linalg.norm(left) / np.linalg.norm(force)),
+        float(np.linalg.norm(left) / np.linalg.norm(force[moving])),
         np.asarray(time_s * recording.period_s, dtype=np.float64),
         force,
-        np.asarray(design @ value, dtype=np.float64),
+        np.asarray(explained, dtype=np.float64),
+        moving,
         SmoothMotion(
             *(thin(a) for a in (path.position, path.velocity, path.acceleration, path.jerk))
         ),
@@ -167,44 +189,19 @@ def inverse_dynamics(
     )
 
 
-def _grow(
-    columns: dict[str, Floats], chosen: list[str], force: Floats, steps: list[Addition]
-) -> list[Addition]:
-    """Add terms to `chosen` while both halves gain; what is left over comes back."""
-    worth = 0.02  # a term must lower the held-out error by so much, in both halves
-    while True:
-        _, halves = _held_out(columns, chosen, force)
-        found = {
-            name: _held_out(columns, [*chosen, name], force)
-            for name in columns
-            if name not in chosen and _says_more(columns, chosen, name)
-        }
-        order = sorted(found, key=lambda name: found[name][0])
-        if not order or np.any(found[order[0]][1] > (1 - worth) * halves):
-            return [Addition(name, found[name][0]) for name in order]
-        chosen.append(order[0])
-        steps.append(Addition(order[0], found[order[0]][0]))
-
-
-def _says_more(columns: dict[str, Floats], chosen: list[str], name: str) -> bool:
-    """Whether a column is more than a combination of those chosen."""
-    design = np.stack([columns[one] for one in chosen], axis=1)
-    scale = np.linalg.norm(design, axis=0) + np.finfo(float).tiny
-    column = columns[name]
-    left = column - design / scale @ np.linalg.lstsq(design / scale, column, rcond=None)[0]
-    its_own = 1e-3  # of its power, or it is no new term: a tone's spring is a mass
-    return bool(left @ left > its_own * (column @ column))
-
-
-def _held_out(columns: dict[str, Floats], names: list[str], force: Floats) -> tuple[float, Floats]:
-    """Rms error of each half with the other half's coefficients: together, and a half, (2,)."""
-    design = np.stack([columns[name] for name in names], axis=1)
-    first = np.arange(len(force)) < len(force) // 2
-    squares = []
-    for own in (first, ~first):
-        value = np.linalg.lstsq(design[~own], force[~own], rcond=None)[0]
-        squares.append(np.mean((force[own] - design[own] @ value) ** 2))
-    return float(np.sqrt(np.mean(squares))), np.sqrt(np.array(squares, dtype=np.float64))
+def _asked_for(
+    columns: Mapping[str, Floats], start: list[str], force: Floats, terms: tuple[str, ...]
+) -> tuple[list[str], list[Addition], list[Addition]]:
+    """Exactly these beside the linear ones."""
+    unknown = sorted(set(terms) - set(columns))
+    if unknown:
+        raise InputError(f"no term {', '.join(unknown)}; there are {', '.join(columns)}")
+    chosen = [*start, *(name for name in terms if name not in start)]
+    steps = [
+        Addition("linear", held_out(columns, start, force)[0]),
+        Addition(" + ".join(terms), held_out(columns, chosen, force)[0]),
+    ]
+    return chosen, steps, []
 
 
 def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.effects.laws import corrections, fitted
@@ -13,7 +14,8 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.types import Floats
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.types import Bools, Floats
 
 
 @dataclass(frozen=True)
@@ -37,15 +39,44 @@ class Term:
 
 @dataclass(frozen=True)
 class Column(Term):
-    """With the column itself: from `SmoothMotion` to the force for a coefficient of one, (N,)."""
+    """With the column itself.
+
+    Attributes
+    ----------
+    column : callable
+        From `SmoothMotion` to the force for a coefficient of one, (N,).
+    linear : bool
+        Whether it is as smooth as the motion.
+    positive : bool
+        Whether a coefficient below zero makes no sense.
+    """
 
     column: Callable[[SmoothMotion], Floats] = field(repr=False)
+    linear: bool = False
+    positive: bool = False
+
+
+def smoothed(signal: Floats, cutoff_hz: float, period_s: float) -> Floats:
+    """Zero-phase low-pass, Butterworth, order 4, forwards and backwards."""
+    low = butter(4, cutoff_hz, fs=1 / period_s, output="sos")
+    return np.asarray(sosfiltfilt(low, signal))
+
+
+def at_rest(recording: Recording, cutoff_hz: float) -> Bools:
+    """Samples at which the position stays within a count for a period of the cut-off, (N,).
+
+    Dry friction is there whatever holds the mass, and the motion says nothing of it.
+    """
+    count = recording.encoder_resolution or increment_unit(recording.position) or 0.0
+    length = max(int(1 / (cutoff_hz * recording.period_s)), 1)
+    y = recording.position
+    still = maximum_filter1d(y, length) - minimum_filter1d(y, length) <= 2.01 * count
+    return np.asarray(maximum_filter1d(still.astype(np.int8), length) > 0)
 
 
 def smooth_motion(recording: Recording, cutoff_hz: float) -> SmoothMotion:
-    """Zero-phase low-pass and central differences."""
-    low = butter(4, cutoff_hz, fs=1 / recording.period_s, output="sos")
-    x = sosfiltfilt(low, recording.position)
+    """Low-passed, and central differences."""
+    x = smoothed(recording.position, cutoff_hz, recording.period_s)
     v = np.gradient(x, recording.period_s)
     a = np.zeros_like(x)
     a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / recording.period_s**2
@@ -63,9 +94,9 @@ def terms_of(
 
     force, x = unit("force"), recording.position_unit
     start = (
-        Column("mass", "mass", unit("mass"), lambda p: p.acceleration),
-        Column("damping", "viscous damping", unit("damping"), lambda p: p.velocity),
-        Column("offset", "constant force", force, lambda p: np.ones_like(p.velocity)),
+        Column("mass", "mass", unit("mass"), lambda p: p.acceleration, linear=True),
+        Column("damping", "viscous damping", unit("damping"), lambda p: p.velocity, linear=True),
+        Column("offset", "constant force", force, lambda p: np.ones_like(p.velocity), linear=True),
     )
     usual = Usual.of(path.velocity, path.position, x)
     laws = [*(shape for _, shape in fitted(MOTOR, usual)), *corrections(usual)]
@@ -83,14 +114,20 @@ def terms_of(
             f"{force} ({x}/s)^-1/2",
             lambda p: np.sign(p.velocity) * np.sqrt(np.abs(p.velocity)),
         ),
-        Column("spring", "spring", unit("stiffness"), lambda p: p.position - middle),
+        Column("spring", "spring", unit("stiffness"), lambda p: p.position - middle, linear=True),
         Column(
             "friction_slope",
             "friction that changes along the way",
             unit("stiffness"),
             lambda p: (p.position - middle) * np.sign(p.velocity),
         ),
-        Column("jerk", "lag between force and motion", f"{force} s^3/{x}", lambda p: p.jerk),
+        Column(
+            "jerk",
+            "lag between force and motion",
+            f"{force} s^3/{x}",
+            lambda p: p.jerk,
+            linear=True,
+        ),
     )
 
 
@@ -101,4 +138,4 @@ def _term(shape: Shape, force: str, x: str, middle: float) -> Column:
         return -shape.force(path.velocity if shape.over == VELOCITY else path.position - middle)
 
     title = shape.title.replace(" {where}", "")
-    return Column(shape.name, title, shape.unit(force, x), column)
+    return Column(shape.name, title, shape.unit(force, x), column, positive=shape.positive)
