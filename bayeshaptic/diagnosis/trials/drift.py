@@ -55,7 +55,7 @@ def drift_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[T
     `meter` says whether one more is affordable, `tick` is called with the title of each.
     """
     recording = state.etfe.recording
-    shortest_s = 5.0
+    shortest_s = 2.5  # of a part, as of a recording
     if recording is None or recording.duration_s < PARTS * shortest_s:
         return []
     edges = np.linspace(0, recording.samples, PARTS + 1).astype(int)
