@@ -12,7 +12,7 @@ from scipy.special import ndtr
 from bayeshaptic.arguments import check_fields
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.prior import ByTerms, HalfNormal, Prior, Terms
-from bayeshaptic.quantities import percent, quantity
+from bayeshaptic.quantities import quantity
 from bayeshaptic.types import Floats
 
 # Standard deviations of what is seen that weigh as much as zero does. Of estimates with unit
@@ -141,7 +141,7 @@ class MaybeZero(Prior):
         slab = HalfNormal(self.scale).describe(unit)
         if self.seen is None:
             return slab
-        return f"zero with a probability of {percent(self.zero)}, else {slab}"
+        return f"{slab}; zero weighs as much as {quantity(SPIKE * self.seen, unit)}"
 
 
 @lru_cache(maxsize=64)

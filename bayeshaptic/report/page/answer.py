@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Of benchmarks/README.md: how often 90 % intervals of K_CR held the truth of simulated recordings,
 # and of how many; a test compares them.
 FARED = {
-    "consistent": (87, 100, "with nothing beside the model"),
+    "consistent": (86, 200, "with nothing beside the model"),
     "explained": (89, 150, "with an effect of the library"),
     "unexplained": (94, 63, "with an effect that nothing promises to find"),
 }
