@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
-from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
+from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
@@ -211,3 +212,16 @@ def test_a_law_that_takes_all_damping_and_a_motion_that_runs_away_spoil_no_other
     ground = np.isin(state.model.names, ("b1", "b2"))
     damped = tried._damped(bench, np.where(ground, 0.0, without))
     assert damped == pytest.approx(np.where(ground, 0.2 * without, without))
+
+
+def test_scores_of_few_lines_count_for_less() -> None:
+    """Noise that is known from twenty lines makes four standard deviations of what chance makes."""
+    rng = np.random.default_rng(5)
+    freedom, count = 40, 400_000
+    scores = rng.standard_normal(count) / np.sqrt(rng.chisquare(freedom, count) / freedom)
+    normal = np.array([as_normal(abs(score), freedom) for score in scores[np.abs(scores) > 3.5]])
+    expected = 2 * ndtr(-4.0) * count  # 25 of them; 50 without
+    assert abs(np.sum(normal > 4.0) - expected) < 4 * np.sqrt(expected)
+    assert np.sum(np.abs(scores) > 4.0) > expected + 4 * np.sqrt(expected)
+    assert as_normal(5.0, 1e9) == pytest.approx(5.0, rel=1e-6)
+    assert as_normal(80.0, 1e9) == 80.0  # too unlikely for a number

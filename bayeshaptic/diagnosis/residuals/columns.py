@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
+from scipy.special import ndtri, stdtr
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
@@ -43,30 +44,42 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     tests = []
     for name, (column, rms) in columns(fit, etfe, recording).items():
         windows = etfe.spectra.windows(fit.response, column[None])
-        strength, sd = common_coefficient(windows)
-        score = abs(strength / sd) if sd > 0 else 0.0
+        strength, sd, freedom = common_coefficient(windows)
+        score = as_normal(abs(strength / sd), freedom) if sd > 0 else 0.0
         text = f"a force like {name} stands {score:.1f} standard deviations out of the noise"
         seen = ForceSeen(strength, sd, rms)
         tests.append(Test(name, "nonlinear", score, thresholds.two_sided(), None, text, seen))
     return tuple(tests)
 
 
-def common_coefficient(windows: Windows) -> tuple[float, float]:
+def common_coefficient(windows: Windows) -> tuple[float, float, float]:
     """Coefficient of the last input, the same in all windows, and its robust standard deviation.
 
-    Each window's own smooth response is free, so only what it cannot explain counts.
+    Each window's own smooth response is free, so only what it cannot explain counts.  Third come
+    the degrees of freedom of the deviation: each window knows its own noise from its lines, and
+    what a motion that is slow can tell stands in one or two of them (F. E. Satterthwaite,
+    Biometrics Bulletin 2, 1946).
     """
     nodes = windows.frequency_hz.shape[1]
     slope, found = windows.design[:, -1, -1], windows.target[:, -1]
-    weight = np.maximum(windows.lines - nodes - 2, 0.5) / windows.scatter
-    information = float(np.sum(weight * np.abs(slope) ** 2))
+    lines = np.maximum(windows.lines - nodes - 2, 0.5)
+    weight = lines / windows.scatter
+    each = weight * np.abs(slope) ** 2
+    information = float(np.sum(each))
     if information == 0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 1.0
     coefficient = float(np.sum(weight * (slope.conj() * found).real) / information)
     left = found - coefficient * slope
     spread = np.sqrt(np.sum((weight * (slope.conj() * left).real) ** 2))
     usual = np.sqrt(0.5 * information)
-    return coefficient, max(float(spread), float(usual)) / information
+    freedom = information**2 / float(np.sum(each**2 / (2 * lines)))
+    return coefficient, max(float(spread), float(usual)) / information, freedom
+
+
+def as_normal(score: float, freedom: float) -> float:
+    """The normal score that is as unlikely as a score of Student's t."""
+    chance = float(stdtr(freedom, -score))
+    return float(-ndtri(chance)) if chance > 1e-300 else score
 
 
 def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, tuple[Complexes, float]]:
