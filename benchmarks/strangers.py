@@ -1,0 +1,125 @@
+"""Recordings of another simulation, with effects that nobody declared: what becomes of each?
+
+    python -m benchmarks.strangers [COUNT] [FIRST] [FILE]
+
+Devices like those of Diaz and Gil and new ones, free and held, seven excitations, 6 to 40 s, none,
+one or two of 24 effects, some of them of no kind that the library knows; half of the known devices
+with their device file.  Each recording takes the whole way to a recommendation.  FILE
+keeps what is done, a line a recording: a run that was stopped goes on from there.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+import traceback
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.errors import InputError
+from bayeshaptic.report.headline import headline
+from benchmarks.strangers_recordings import make
+
+
+def one(seed: int) -> dict[str, Any]:
+    """What became of one recording; limits over the truth."""
+    case = make(seed)
+    if case is None:
+        return {"seed": seed, "outcome": "ran away"}
+    found: dict[str, Any] = {"seed": seed, "what": case.what, "effects": case.effects}
+    found["file"] = "device" in case.told
+    began = time.process_time()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            found |= _of(close_loop(case.recording, **case.told), case.truth)
+        except InputError as error:
+            found |= {"outcome": "refused", "why": str(error)}
+        except Exception:
+            found |= {"outcome": "DEFECT", "why": traceback.format_exc()}
+    found["warned"] = sorted({str(warning.message) for warning in told})
+    found["seconds"] = time.process_time() - began
+    return found
+
+
+def _of(closed: Closed, truth: float) -> dict[str, Any]:
+    told = headline(closed)
+    limit = closed.analysis.limit.quantile(np.array([0.05, 0.5, 0.95])) / truth
+    return {
+        "outcome": "refused" if told.status == "untrusted" else "recommended",
+        "why": told.sentence,
+        "model": closed.analysis.model.name,
+        "verdict": closed.verdict,
+        "found": closed.effect_names,
+        "limit": [float(value) for value in limit],
+        "stiffness": None if told.stiffness is None else float(told.stiffness / truth),
+    }
+
+
+def line(row: dict[str, Any]) -> str:
+    """One recording in a line."""
+    if row["outcome"] == "ran away":
+        return f"{row['seed']:4d} ran away"
+    inside = ", ".join(row["effects"]) or "nothing"
+    text = f"{row['seed']:4d} {row['what']} | {inside} | {row['outcome']}"
+    if "limit" in row:
+        low, middle, high = row["limit"]
+        named = ", ".join(row["found"]) or "nothing"
+        text += f" {row['model']}, {row['verdict']}: {named}, {low:.3g} {middle:.3g} {high:.3g}"
+    if row["outcome"] != "recommended":
+        text += f" ({row['why'].splitlines()[-1][:90]})"
+    return f"{text}, {row['seconds']:.1f} s {' '.join(row['warned'])}"
+
+
+def summary(rows: list[dict[str, Any]]) -> None:
+    """How many were recommended, and what the intervals held, with and without a device file."""
+    rows = [row for row in rows if row["outcome"] != "ran away"]
+    print(f"\n{len(rows)} recordings, stiffness and limit over the truth")
+    for label, some in (
+        ("all", rows),
+        ("with a device file", [row for row in rows if row["file"]]),
+        ("without", [row for row in rows if not row["file"]]),
+        ("nothing in them", [row for row in rows if not row["effects"]]),
+    ):
+        given = [row for row in some if row["outcome"] == "recommended"]
+        if not given:
+            continue
+        limits = np.array([row["limit"] for row in given])
+        inside = np.mean((limits[:, 0] <= 1) & (limits[:, 2] >= 1))
+        above = sum(row["stiffness"] is not None and row["stiffness"] > 1 for row in given)
+        width = np.median(20 * np.log10(limits[:, 2] / limits[:, 0]))
+        seconds = np.array([row["seconds"] for row in some])
+        print(
+            f"{label}: {len(some)}, recommended {len(given)}, 90 % intervals hold "
+            f"{100 * inside:.0f} %, wholly above {np.sum(limits[:, 0] > 1)}, below "
+            f"{np.sum(limits[:, 2] < 1)}, median width {width:.2f} dB; stiffness above the truth "
+            f"{above}; CPU s median {np.median(seconds):.1f}, worst {seconds.max():.0f}"
+        )
+    defects = [row["seed"] for row in rows if row["outcome"] == "DEFECT"]
+    print(f"defects: {defects or 'none'}; warnings: {[r['seed'] for r in rows if r['warned']]}")
+
+
+def main() -> None:
+    arguments = [*sys.argv[1:], *("40", "0", "")[len(sys.argv) - 1 :]]
+    count, first, kept = int(arguments[0]), int(arguments[1]), arguments[2]
+    path = Path(kept) if kept else None
+    rows: dict[int, dict[str, Any]] = {}
+    if path and path.exists():
+        rows = {row["seed"]: row for row in map(json.loads, path.read_text().splitlines())}
+    for seed in range(first, first + count):
+        if seed not in rows:
+            rows[seed] = one(seed)
+            if path:
+                with path.open("a") as file:
+                    file.write(json.dumps(rows[seed]) + "\n")
+        print(line(rows[seed]), flush=True)
+    summary([rows[seed] for seed in range(first, first + count)])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,103 @@
+"""The motion of a stranger's device in small steps, and what a logger makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STEPS = 8  # a sample
+
+
+@dataclass(frozen=True)
+class Forces:
+    """What pushes besides the command; zero is none.
+
+    Dry friction at the motor, more by `sticking` at rest; in the transmission a cubic spring and a
+    gap in the linear one; quadratic drag on the body; cogging (as a force) and ripple (as a share
+    of the command) over the motor's position; a command that is compressed as tanh.
+    """
+
+    friction: float = 0.0
+    sticking: float = 1.0
+    stribeck_speed: float = 1.0
+    cubic: float = 0.0
+    gap: float = 0.0
+    spring: float = 0.0
+    drag: float = 0.0
+    cogging: float = 0.0
+    cogs: float = 0.0
+    ripple: float = 0.0
+    ripples: float = 0.0
+    compressed: float = 0.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A device over one step: transitions that follow each other every so many samples.
+
+    `force` is the input of the command, `inner` that of forces on the masses of the row.
+    """
+
+    transitions: Array
+    every: int
+    force: Array
+    inner: Array
+    position: Array
+    delay_steps: int
+
+    def under(self, command: Array, hand: Array, forces: Forces) -> Array | None:
+        """The position at the samples; none where it runs away."""
+        numbers = np.array(astuple(forces))
+        made = _run(
+            np.ascontiguousarray(self.transitions),
+            self.every,
+            np.ascontiguousarray(self.force),
+            np.ascontiguousarray(self.inner),
+            self.position,
+            self.delay_steps,
+            command,
+            hand,
+            numbers,
+        )
+        return made if len(made) == len(command) else None
+
+
+@njit(cache=True)
+def _run(transitions, every, entry, entries, position, late, command, hand, numbers):  # type: ignore[no-untyped-def]
+    friction, sticking, slow, cubic, gap, spring, drag = numbers[:7]
+    cogging, cogs, ripple, ripples, compressed = numbers[7:]
+    samples, row = len(command), entries.shape[1]
+    state, found, inner = np.zeros(len(entry)), np.zeros(samples), np.zeros(row)
+    for k in range(samples):
+        found[k] = position @ state
+        transition = transitions[min(k // every, len(transitions) - 1)]
+        for step in range(STEPS):
+            begun = k * STEPS + step - late  # the command of this step
+            force = command[begun // STEPS] if begun >= 0 else 0.0
+            if compressed > 0:
+                force = np.tanh(force * compressed) / compressed
+            force *= 1 + ripple * np.sin(ripples * state[0])
+            inner[:] = 0.0
+            if row > 1:
+                stretch = state[0] - state[1]
+                pull = spring * (cubic * stretch**3 - max(-gap, min(gap, stretch)))
+                inner[0] -= pull
+                inner[1] += pull
+            body = min(row - 1, 1)
+            inner[body] -= drag * abs(state[row + body]) * state[row + body]
+            inner[0] += cogging * np.sin(cogs * state[0])
+            inner[-1] += hand[k]
+            ahead = transition @ state + entry * force + entries @ inner
+            if friction > 0:  # what would stop the motor, as far as friction reaches
+                most = friction * (1 + (sticking - 1) * np.exp(-((ahead[row] / slow) ** 2)))
+                stop = max(-most, min(most, -ahead[row] / entries[row, 0]))
+                ahead += entries[:, 0] * stop
+            state = ahead
+        if not abs(state[0]) < 1e6:
+            return found[:k]
+    return found
