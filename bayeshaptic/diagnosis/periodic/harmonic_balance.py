@@ -12,6 +12,7 @@ from bayeshaptic.diagnosis.periodic.steady_motion import (
     Applied,
     Complexes,
     Floats,
+    Following,
     Period,
     Responses,
     apply,
@@ -126,21 +127,25 @@ def balance(
     own = slice(None) if fitted is None else np.flatnonzero(fitted)
     strength = np.zeros(len(forces)) if strength is None else np.asarray(strength, float)
     applied = no_force(period, places_of(model.system(theta)))
+    following = Following()
     converged = not forces
-    rounds = 25
-    settled = 0.02  # of a standard deviation of the coefficients
+    rounds = 30
+    settled = 0.02  # of a standard deviation of the coefficients, the noise as what is left
     for _ in range(rounds):
-        motions, applied = _settle(model.system(theta), period, forces, strength, applied)
+        motions, applied = _settle(
+            model.system(theta), period, forces, strength, applied, following
+        )
         unit = [period.transform(basis.force(motions[basis.place])) for basis in forces]
         joint = _Joint(model, windows, period, forces, np.array(unit), own)
         new_theta, new_strength = joint.solve(theta, strength)
-        change = np.max(np.abs(new_strength - strength) / joint.sds(new_theta), initial=0.0)
+        sds = joint.sds(new_theta) * max(joint.rms(new_theta, new_strength), 1.0)
+        change = np.max(np.abs(new_strength - strength) / sds, initial=0.0)
         theta, strength = new_theta, new_strength
         if change < settled or not forces:
             converged = True
             break
     # Of the parameters found: without forces those of the start were the only ones so far.
-    motions, _ = _settle(model.system(theta), period, forces, strength, applied)
+    motions, _ = _settle(model.system(theta), period, forces, strength, applied, following)
     return Balanced(
         model,
         theta,
@@ -179,6 +184,7 @@ def _settle(
     forces: tuple[Basis, ...],
     strength: Floats,
     applied: Applied,
+    following: Following,
 ) -> tuple[dict[Place, Motion], Applied]:
     """Motion from forces and forces from motion, in turn, for given parameters and strengths."""
     turns = 3
@@ -187,7 +193,7 @@ def _settle(
         total = {place: np.zeros(period.samples) for place in applied.places}
         for basis, size in zip(forces, strength, strict=True):
             total[basis.place] += size * basis.force(motions[basis.place])
-        applied = apply(period, total, motions)
+        applied = apply(period, following.toward(total), motions)
     return motions, applied
 
 
@@ -223,6 +229,10 @@ class _Joint:
     def residual(self, theta: Floats, strength: Floats) -> Complexes:
         left = self.likelihood.deviations(theta[None])[0, :, 0]
         return np.asarray((left - strength @ self.columns(theta)) / self.sd)
+
+    def rms(self, theta: Floats, strength: Floats) -> float:
+        """Weighted rms of the lines to fit."""
+        return float(np.sqrt(np.mean(np.abs(self.residual(theta, strength)[self.own]) ** 2)))
 
     def _residuals(self, columns: Complexes) -> Callable[[Floats], Floats]:
         size = self.model.size

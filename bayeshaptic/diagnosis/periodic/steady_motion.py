@@ -180,6 +180,39 @@ def apply(
     return Applied(tuple(forces), np.array(proportional), np.array(rest))
 
 
+@dataclass
+class Following:
+    """Forces in time on the way to those that their motion asks for.
+
+    Strong friction slows the motion, which then asks for less: steps that turn back get shorter, so
+    that the way ends and does not go round.
+
+    Attributes
+    ----------
+    share : float
+        Of the step to go.
+    force, step : dict or None
+        By place: where the forces are, and what the last motion asked for beyond that.
+    """
+
+    share: float = 1.0
+    force: dict[Place, Floats] | None = None
+    step: dict[Place, Floats] | None = None
+
+    def toward(self, wanted: dict[Place, Floats]) -> dict[Place, Floats]:
+        """The forces after one more step, shape (N,) each."""
+        if self.force is None:
+            self.force = wanted
+            return wanted
+        step = {place: wanted[place] - self.force[place] for place in wanted}
+        if self.step is not None:
+            back = sum(float(step[place] @ self.step[place]) for place in step) < 0
+            self.share = 0.5 * self.share if back else min(1.5 * self.share, 1.0)
+        self.step = step
+        self.force = {place: self.force[place] + self.share * step[place] for place in step}
+        return self.force
+
+
 def steady_motion(system: LinearSystem, period: Period, applied: Applied) -> dict[Place, Motion]:
     """The motion at the places, one period each, under the command and internal forces.
 
