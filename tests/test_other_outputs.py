@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.begun import with_delay_of_the_loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.signals.causality import causality
 
 PERIOD_S, SAMPLES = 1e-3, 4000
 RATES_HZ = np.arange(1.0, 151.0)  # one period a second
@@ -88,6 +92,21 @@ def test_a_velocity_beside_a_command(device, tmp_path):
     assert np.all(of_the_motor < 1.1 * (rate * PERIOD_S) ** 2 / 12 + 1e-4)
     assert 0.025 < of_the_motor[99] < 0.036  # 3.3 % at 100 Hz, as the recording's notice says
     assert any("3.3 %" in notice.text for notice in recording.notices)
+
+
+def test_a_velocity_beside_a_command_is_no_feedback(tmp_path):
+    """Its integral through splines knows the next samples, and with them what is commanded now."""
+    rng = np.random.default_rng(3)
+    force = rng.standard_normal(6000)
+    speed = lfilter([0.0, 1e-3 / 0.5], [1.0, -np.exp(-3e-3)], force)
+    speed += 1e-4 * np.std(speed) * rng.standard_normal(6000)
+    path = tmp_path / "tacho.npz"
+    np.savez(path, t=np.arange(6000) * PERIOD_S, u=force, v=speed)
+    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    assert causality(replace(recording, velocity=None)).has_feedback
+    judged = causality(recording)
+    assert not judged.has_feedback and not judged.doubtful
+    assert len(recording.part(100, 400).velocity) == 300
 
 
 @pytest.mark.parametrize("table", [True, False])

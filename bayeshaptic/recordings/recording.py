@@ -60,6 +60,8 @@ class Recording(Shown):
     reference : ndarray, shape (N,), or None
         What the controller followed, in any unit, where it was written down: it moves the force,
         and nothing of the motion moves it.
+    velocity : ndarray, shape (N,), or None
+        As it was recorded, where the position is its integral.
     """
 
     force: NDArray[np.float64] = field(repr=False)
@@ -80,6 +82,7 @@ class Recording(Shown):
     feedback: Feedback | None = None
     joints: tuple[int, ...] = ()
     reference: NDArray[np.float64] | None = field(default=None, repr=False)
+    velocity: NDArray[np.float64] | None = field(default=None, repr=False)
 
     @property
     def kind(self) -> str:
@@ -111,7 +114,15 @@ class Recording(Shown):
         joints = tuple(joint - start for joint in self.joints if start < joint < stop)
         force, position = self.force[start:stop], self.position[start:stop]
         reference = None if self.reference is None else self.reference[start:stop]
-        return replace(self, force=force, position=position, joints=joints, reference=reference)
+        velocity = None if self.velocity is None else self.velocity[start:stop]
+        return replace(
+            self,
+            force=force,
+            position=position,
+            joints=joints,
+            reference=reference,
+            velocity=velocity,
+        )
 
     def _lines(self) -> tuple[str, ...]:
         length = quantity(self.duration_s, "s")

@@ -58,7 +58,8 @@ def as_command_and_position(recording: Recording, force: str, position: str) -> 
     if measured:
         command, motion = held_equivalent(command), motion[:-1]
     notices = (*recording.notices, *_told(measured, position, recording.period_s))
-    return replace(recording, force=command, position=motion, notices=notices)
+    velocity = recording.position if position == "velocity" and not measured else None
+    return replace(recording, force=command, position=motion, notices=notices, velocity=velocity)
 
 
 def integrated(signal: Floats, period_s: float, times: int) -> Floats:
