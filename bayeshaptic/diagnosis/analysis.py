@@ -32,8 +32,9 @@ from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical
 from bayeshaptic.threads import single_threaded
 
 NO_WITNESS = "feedback biases it"
-# Evaluations of the likelihood that one posterior may take.
-_MOST_EVALUATIONS = 400_000
+# Evaluations of the likelihood that one posterior may take, and where dynamic links make each take
+# ten times as long.
+_MOST_EVALUATIONS, _MOST_WITH_LINKS = 400_000, 200_000
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
 _MISFIT_EVALUATIONS = 100_000
 
@@ -192,6 +193,8 @@ def finish(
     clock = Clock(dict(begun.seconds))
     scale = noise_scale(fit)
     # A misfit's tail means nothing, and a limit for comparison needs none.
+    rational = fit.model.system(fit.theta).rational
+    most = _MOST_EVALUATIONS if rational else _MOST_WITH_LINKS
     watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
     with clock.stage("sampling"):
         posterior = sample(
@@ -200,7 +203,7 @@ def finish(
             start=_with_noise(fit, scale),
             seed=options.seed,
             progress=options.within(0.1, 0.8).report,
-            most_evaluations=_MISFIT_EVALUATIONS if scale > 1 else _MOST_EVALUATIONS,
+            most_evaluations=_MISFIT_EVALUATIONS if scale > 1 else most,
             checkpoints=options.checkpoints,
             **({"rule": watch} if options.ess is None else {"ess": options.ess}),
         )
