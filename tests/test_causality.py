@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import chirp
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.errors import InputError
@@ -52,6 +53,17 @@ def test_no_false_alarm_in_open_loop(case: str) -> None:
         assert not found.doubtful
         assert found.feedback[1].value < 0.01
         assert found.answer.value > 0.04
+
+
+def test_sweeps_whose_period_is_no_whole_number_of_samples_are_no_feedback() -> None:
+    """With ten stretches for the cross-fit this one may be, with forty not; both must say so."""
+    bench, period_s = Bench.from_device("lhifam", False, "free"), 4.1134
+    time_s = np.arange(int(5 * period_s / PERIOD)) * PERIOD
+    sweep = chirp(time_s % period_s, 0.5, period_s, 300.0)
+    made = simulate(bench, bench.force_rms * np.sqrt(2) * sweep)
+    found = judge(made.force, made.position)
+    assert not found.has_feedback
+    assert not found.doubtful
 
 
 @pytest.mark.parametrize("case", CASES)

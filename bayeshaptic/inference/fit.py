@@ -178,11 +178,13 @@ def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) 
     within = np.linalg.inv(curvature)
     stretch = np.where(here.log, theta, here.scale)[inner]
     covariance[np.ix_(inner, inner)] = within * np.outer(stretch, stretch) * max(1.0, chi_square)
+    with np.errstate(invalid="ignore"):  # nan where rounding left nothing of a variance
+        sd = np.sqrt(np.diag(covariance))
     return Fit(
         model,
         theta,
         covariance,
-        _outcomes(model, theta, np.sqrt(np.diag(covariance)), bound),
+        _outcomes(model, theta, sd, bound),
         chi_square,
         float(likelihood(theta[None])[0]),
         windows,

@@ -96,7 +96,7 @@ def share_left(traced: Traced, family: str) -> float:
         max((test.statistic for test in tests if test.family == family), default=0.0)
         for tests in (traced.before, traced.after)
     )
-    return min(after / before, 1.0) if before > 0 else 1.0
+    return float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 1.0
 
 
 def _downwards(fit: Fit, traced: Traced, family: str) -> float:

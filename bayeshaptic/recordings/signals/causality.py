@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.excitation import find_repetition
+from bayeshaptic.recordings.signals.excitation import find_repetition, is_sweep
 from bayeshaptic.recordings.signals.news import News, news
 from bayeshaptic.recordings.signals.prediction import Share, predict
 from bayeshaptic.types import Bools, Floats
@@ -106,6 +106,11 @@ class Causality:
         return self._position_drives(DOUBTFUL) or bursts or self.at_limits > _MOST_AT_LIMIT
 
     @property
+    def doubt(self) -> int:
+        """2 where it has feedback, 1 where it may have, 0 for an open loop."""
+        return 2 if self.has_feedback else int(self.doubtful)
+
+    @property
     def opposite(self) -> bool:
         """The position moves against the force: one of them has the opposite sign."""
         now, soon, *late = self.answers
@@ -179,6 +184,10 @@ class Causality:
 def causality(recording: Recording) -> Causality:
     """Test which of the force and the position drives the other.
 
+    Under a sweep what looks like feedback must do so with shorter stretches for the cross-fit, too:
+    few long ones hold other frequencies than those beside them, predictions of both signals fail
+    together there, and what they leave is correlated.
+
     Parameters
     ----------
     recording : Recording
@@ -188,6 +197,15 @@ def causality(recording: Recording) -> Causality:
     -------
     Causality
     """
+    first = _causality(recording, stretches=10)
+    if not first.doubt or not is_sweep(recording.force):
+        return first
+    finer = _causality(recording, stretches=40)
+    milder = finer.doubt < first.doubt and not finer.swapped and not finer.opposite
+    return finer if milder else first
+
+
+def _causality(recording: Recording, stretches: int) -> Causality:
     most_samples = 60_000
     start = max(0, (recording.samples - most_samples) // 2)
     force = recording.force[start : start + most_samples]
@@ -195,7 +213,8 @@ def causality(recording: Recording) -> Causality:
     at_limits = _at_limits(force)
     saturates = float(np.mean(at_limits))
     left_out = at_limits if 0 < saturates < _MOST_AT_LIMIT else None
-    of_force, of_position = predict(force, position, left_out), predict(position, force)
+    of_force = predict(force, position, left_out, stretches)
+    of_position = predict(position, force, stretches=stretches)
     return Causality(
         feedback=tuple(of_force.past(floor) for _, _, floor in _LADDER),
         news=news(of_force, of_position) if saturates < _MOST_AT_LIMIT else News(0.0),

@@ -1,6 +1,6 @@
 """One signal predicted from its past, the other's past, and what both have at the same instant.
 
-Cross-fitted: coefficients from every second of ten stretches, errors on the others. Robust: a
+Cross-fitted: coefficients from every second of some stretches, errors on the others. Robust: a
 reference that steps throws a controlled force far off its course a few times a second, and those
 samples must not decide how the rest is predicted. Errors beyond twice the 95th percentile count no
 more than that (iteratively reweighted least squares; P. J. Huber, *Robust Statistics*, 1981).
@@ -122,7 +122,9 @@ class Prediction:
         return tuple(found)
 
 
-def predict(target: Floats, other: Floats, left_out: Bools | None = None) -> Prediction:
+def predict(
+    target: Floats, other: Floats, left_out: Bools | None = None, stretches: int = 10
+) -> Prediction:
     """Predict each increment of `target` from the past of both signals.
 
     Parameters
@@ -131,6 +133,8 @@ def predict(target: Floats, other: Floats, left_out: Bools | None = None) -> Pre
         Of at least some hundred samples.
     left_out : ndarray of bool, shape (N,), optional
         Samples of the target that are not to be predicted, such as those at a limit.
+    stretches : int
+        Coefficients are from every second of so many.
 
     Returns
     -------
@@ -140,7 +144,6 @@ def predict(target: Floats, other: Floats, left_out: Bools | None = None) -> Pre
     wanted = _scaled(target[rows] - target[rows - 1])
     beside = np.stack([other[rows + lead] - other[rows - 1] for lead in _LEADS], axis=1)
     beside = (beside - beside.mean(axis=0)) / max(float(beside[:, -1].std()), _TINY)
-    stretches = 10
     half = np.arange(len(rows)) * stretches // len(rows) % 2 == 0
     errors, cut, new = (
         np.empty((2, len(rows))),
