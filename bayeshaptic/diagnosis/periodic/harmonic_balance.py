@@ -141,7 +141,7 @@ def balance(
         sds = joint.sds(new_theta) * max(joint.rms(new_theta, new_strength), 1.0)
         change = np.max(np.abs(new_strength - strength) / sds, initial=0.0)
         theta, strength = new_theta, new_strength
-        if change < settled or not forces:
+        if not forces or (change < settled and following.arrived):
             converged = True
             break
     # Of the parameters found: without forces those of the start were the only ones so far.

@@ -212,6 +212,19 @@ class Following:
         self.force = {place: self.force[place] + self.share * step[place] for place in step}
         return self.force
 
+    @property
+    def arrived(self) -> bool:
+        """Whether the motion asks for next to nothing beyond the forces that act, rms.
+
+        Of dry friction in twenty recordings of a free device, what settled had at most 3 % to go,
+        what went round still 19 % and more.
+        """
+        to_go = 0.05  # of the forces
+        if self.force is None or self.step is None:
+            return False
+        missing, there = (sum(f @ f for f in each.values()) for each in (self.step, self.force))
+        return bool(missing <= to_go**2 * there)
+
 
 def steady_motion(system: LinearSystem, period: Period, applied: Applied) -> dict[Place, Motion]:
     """The motion at the places, one period each, under the command and internal forces.
