@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_analysis import _tests, fake_closed
 
 from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.traced import Traced
-from bayeshaptic.diagnosis.trials.drift import _edge_error, _fall
-from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.trials.drift import _edge_error, _fall, drift_trials
+from bayeshaptic.diagnosis.widening.discrepancy import share_left, with_discrepancy
 from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import build_model
+from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings import read_recording
+from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.stability.critical import critical_stiffness
 
 
@@ -58,6 +65,14 @@ def test_the_fall_is_that_of_a_ramp_from_the_middle_of_a_part_to_its_end() -> No
     assert _fall(np.array([3.0, 1.0, 2.0])) == 0, "nothing goes on from the middle"
 
 
+def test_a_drift_needs_three_parts_as_long_as_recordings_are() -> None:
+    recording = read_recording(Path(__file__).parent.parent / "data/recordings/phantom-free.csv.gz")
+    for seconds, there in ((7.4, False), (7.6, True)):
+        etfe = estimate_etfe(recording.part(0, round(seconds / recording.period_s)))
+        state = State(etfe, least_squares(build_model("free", "phantom"), etfe))
+        assert bool(drift_trials(state, Meter())) == there
+
+
 def test_the_rest_of_an_effect_is_its_share_of_what_the_effect_did() -> None:
     closed = fake_closed("explained", "nonlinear")
     fit = closed.analysis.fit
@@ -88,6 +103,17 @@ def test_a_law_that_leaves_what_would_pass_for_noise_is_not_quite_right_either()
     )
     ratio = log_ratios(closed, found, base)
     assert 0 < np.abs(ratio).max() <= abs(np.log(limit_of(base) / limit_of(fit))) / 30
+
+
+@pytest.mark.parametrize(
+    "before, after, share",
+    [(90.0, 45.0, 0.5), (90.0, 120.0, 1.0), (90.0, -np.inf, 0.0), (0.0, 5.0, 1.0)],
+)
+def test_what_is_left_is_a_share(before: float, after: float, share: float) -> None:
+    """Tests that have nothing to say after an effect give minus infinity: nothing is left."""
+    traced = fake_closed("explained", "nonlinear").traced
+    traced = replace(traced, before=_tests(before, "nonlinear"), after=_tests(after, "nonlinear"))
+    assert share_left(traced, "nonlinear") == share
 
 
 def test_where_nothing_was_found_the_limit_falls_and_its_upper_end_stays() -> None:

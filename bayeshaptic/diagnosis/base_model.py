@@ -47,19 +47,18 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
         rivals = ()
     if not rivals:
         return begun, own
-    found = {begun.fit.model.name: (begun, own)}
+    begins, found = {begun.fit.model.name: begun}, {begun.fit.model.name: own}
     for name in rivals:
         other = replace(begun, fit=begun.choice.candidates[name].fit)  # type: ignore[union-attr]
         rest = (1 - share) * options.budget_s / len(rivals)
-        found[name] = other, trace(other.etfe, other.fit, options.report, rest)
-    noise = max(1.0, min(t.state.fit.reduced_chi_square for _, t in found.values()))
-    best = _best({name: traced for name, (_, traced) in found.items()}, noise)
-    begun, traced = found[best]
+        begins[name] = other
+        found[name] = trace(other.etfe, other.fit, options.report, rest)
+    noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
+    best = _best(found, noise)
+    fit = begins[best].fit
     assert begun.choice is not None
-    choice = replace(
-        begun.choice, fit=begun.fit, reason=begun.choice.reason + _said(best, found, noise)
-    )
-    return replace(begun, choice=choice), traced
+    choice = replace(begun.choice, fit=fit, reason=begun.choice.reason + _said(best, found, noise))
+    return replace(begins[best], choice=choice), found[best]
 
 
 def _rivals(begun: Begun) -> tuple[str, ...]:
@@ -108,10 +107,14 @@ def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
     return simple and all(begun.fit.model.size < size for size in sizes)
 
 
+def _comparable(found: dict[str, Traced]) -> dict[str, Traced]:
+    """What explains; where nothing does, all."""
+    return {name: one for name, one in found.items() if one.verdict != UNEXPLAINED} or found
+
+
 def _best(found: dict[str, Traced], noise: float) -> str:
     """What explains comes first, then the information criterion; of equals the fewest effects."""
-    explained = {n: t for n, t in found.items() if t.verdict != UNEXPLAINED} or found
-    behind = {name: _criterion(traced, noise) for name, traced in explained.items()}
+    behind = {name: _criterion(traced, noise) for name, traced in _comparable(found).items()}
     equals = [name for name in behind if behind[name] <= min(behind.values()) + _BARE_MENTION]
     return min(equals, key=lambda name: (len(found[name].state.accepted), behind[name]))
 
@@ -122,16 +125,17 @@ def _criterion(traced: Traced, noise: float) -> float:
     return information_criterion(traced.state.fit, noise, beside)
 
 
-def _said(best: str, found: dict[str, tuple[Begun, Traced]], noise: float) -> str:
-    words, most = [], "the most"
-    for name, (_, traced) in found.items():
+def _said(best: str, found: dict[str, Traced], noise: float) -> str:
+    behind = {
+        name: _criterion(traced, noise) - _criterion(found[best], noise)
+        for name, traced in found.items()
+    }
+    words = []
+    for name, traced in found.items():
         effects = ", ".join(effect.title for effect in traced.state.accepted) or "no effect"
-        behind = _criterion(traced, noise) - _criterion(found[best][1], noise)
-        side = "worse" if behind > 0 else "lower"
-        if behind < 0 and (traced.verdict == UNEXPLAINED) == (
-            found[best][1].verdict == UNEXPLAINED
-        ):
-            most = "as much with fewer effects"
-        compared = "" if name == best else f", BIC {abs(behind):,.0f} {side}"
+        side = "worse" if behind[name] > 0 else "lower"
+        compared = "" if name == best else f", BIC {abs(behind[name]):,.0f} {side}"
         words.append(f"{name} with {effects} ({traced.verdict}{compared})")
+    least = min(_comparable(found), key=lambda name: behind[name])
+    most = "as much with fewer effects" if behind[least] < 0 else "the most"
     return f" With what each of them lacks, {best} explains {most}: {'; '.join(words)}."

@@ -15,7 +15,7 @@ import numpy as np
 
 from bayeshaptic.types import Floats
 
-SIMPLEST = "coulomb"
+SIMPLEST, LAG = "coulomb", "jerk"
 # Share of the held-out error, of both halves, that the simplest law must take away, and any other
 # term.  Of 96 closed loops of 1.5 and 4 s, 70 of them with dry friction: at (0.1, 0.3) friction is
 # named in 66, and in 2 of 26 without; at (0.02, 0.02), whichever law is best first, in 40 and none,
@@ -23,7 +23,9 @@ SIMPLEST = "coulomb"
 _SIMPLEST_WORTH, _WORTH = 0.1, 0.3
 # A longer record needs less: in proportion beyond so many seconds, down to a fiftieth.
 _SHORT_S, _LEAST_WORTH = 4.0, 0.02
-# Errors that a recording counts for when sets are weighed: what is left is no white noise.
+# Errors that a recording counts for when sets are weighed: what is left is no white noise.  Errors
+# of mass, damping and friction over their standard deviations, rms, in 166 closed loops of 0.7 to
+# 12 s: 0.90, 0.63, 0.63 with 3 of them, 1.06, 1.10, 1.21 with 30, 1.15, 2.12, 1.23 with 100.
 _COUNT = 30.0
 _ITS_OWN = 1e-3  # of a column's power, or it is no new term: a tone's spring is a mass
 
@@ -106,7 +108,8 @@ def between_sets(
 ) -> Floats:
     """How far coefficients are from those of other sets that predict about as well, rms, (J,).
 
-    The others have a term more, less, or another one instead; or none, or the simplest law alone.
+    The others have a term more, less, or another one instead; or none, or the simplest law alone,
+    as it is and with the lag that a controller's samples make.
 
     Parameters
     ----------
@@ -118,7 +121,7 @@ def between_sets(
     """
     own = frozenset(chosen[len(start) :])
     others = [name for name in columns if name not in start and name not in own]
-    sets = {own, frozenset(), frozenset({SIMPLEST}), frozenset({SIMPLEST, "jerk"})}
+    sets = {own, frozenset(), frozenset({SIMPLEST}), frozenset({SIMPLEST, LAG})}
     sets |= {own - {out} for out in own} | {own | {more} for more in others}
     sets |= {own - {out} | {more} for out in own for more in others}
     errors, found = [], []

@@ -14,9 +14,11 @@ ICRA 1997; A. Janot, M. Gautier and M. Brunot, "Data set and reference models of
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import decimate
 
 from bayeshaptic.diagnosis.feedback.choose_terms import (
@@ -123,53 +125,41 @@ def inverse_dynamics(
     """
     band = 0.05  # of the sampling rate: the usual cut-off
     cutoff_hz = band / recording.period_s if cutoff_hz is None else cutoff_hz
-    every = max(int(0.5 / (cutoff_hz * recording.period_s)), 1)
-    edge = int(np.ceil(2 / (cutoff_hz * recording.period_s)))  # where the filters are not settled
+    low = _LowPass(cutoff_hz, recording.period_s)
     fewest = 100  # samples left after decimation
-    if (recording.samples - 2 * edge) // every < fewest:
+    if (recording.samples - 2 * low.edge) // low.every < fewest:
         raise InputError(
             f"{recording.name}: {recording.samples} samples are too few for inverse dynamics below "
             f"{cutoff_hz:g} Hz; raise cutoff_hz"
         )
-    path = smooth_motion(recording, cutoff_hz)
-
-    def thin(signal: Floats) -> Floats:
-        inner = signal[edge:-edge]
-        if every == 1:
-            return inner
-        return np.asarray(decimate(inner, every, zero_phase=True), dtype=np.float64)
-
-    def smooth(signal: Floats) -> Floats:
-        return thin(smoothed(signal, cutoff_hz, recording.period_s))
-
-    force, time_s = smooth(recording.force), np.arange(recording.samples)[edge:-edge:every]
-    start, library = terms_of(recording, path)
-    known = {term.name: term for term in (*start, *library)}
-    every_column = {
-        name: (thin if term.linear else smooth)(term.column(path)) for name, term in known.items()
-    }
-    moving = ~at_rest(recording, cutoff_hz)[edge:-edge:every]
+    moving = ~low.picked(at_rest(recording, cutoff_hz))
     if np.count_nonzero(moving) < fewest // 2:
         raise InputError(
             f"{recording.name}: it stands still too long for inverse dynamics; record it in motion"
         )
-    columns = {name: column[moving] for name, column in every_column.items()}
-    seconds = every * recording.period_s * np.count_nonzero(moving)
-    names = [term.name for term in start]
+    path = smooth_motion(recording, cutoff_hz)
+    start, library = terms_of(recording, path)
+    known = {term.name: term for term in (*start, *library)}
+    column = {
+        name: (low.thin if term.linear else low.smooth)(term.column(path))
+        for name, term in known.items()
+    }
+    columns = {name: one[moving] for name, one in column.items()}
+    force, names = low.smooth(recording.force), [term.name for term in start]
     if terms is None:
         positive = {term.name for term in library if term.positive}
+        seconds = low.every * recording.period_s * np.count_nonzero(moving)
         chosen, steps, tried = choose_terms(columns, names, positive, force[moving], seconds)
     else:
         chosen, steps, tried = _asked_for(columns, names, force[moving], terms)
     design = np.stack([columns[name] for name in chosen], axis=1)
     block_s = 1.0  # residuals further apart are taken to be independent
-    block = max(int(block_s / (every * recording.period_s)), 1)
-    value, sd = _solve(design, force[moving], block)
-    late = smooth(np.concatenate([recording.force[:1], recording.force[:-1]]))[moving]
+    value, sd = _solve(design, force[moving], int(block_s / (low.every * recording.period_s)))
+    late = low.smooth(np.concatenate([recording.force[:1], recording.force[:-1]]))[moving]
     sd = np.hypot(sd, _LAG * (np.linalg.lstsq(design, late, rcond=None)[0] - value))
     if terms is None:
         sd = np.hypot(sd, between_sets(columns, names, chosen, force[moving], value))
-    explained = np.stack([every_column[name] for name in chosen], axis=1) @ value
+    explained = np.stack([column[name] for name in chosen], axis=1) @ value
     left = (force - explained)[moving]
     return InverseDynamics(
         tuple(Term(name, known[name].title, known[name].unit) for name in chosen),
@@ -178,15 +168,45 @@ def inverse_dynamics(
         tuple(steps),
         tuple(tried),
         float(np.linalg.norm(left) / np.linalg.norm(force[moving])),
-        np.asarray(time_s * recording.period_s, dtype=np.float64),
+        low.picked(recording.period_s * np.arange(recording.samples)),
         force,
         np.asarray(explained, dtype=np.float64),
         moving,
-        SmoothMotion(
-            *(thin(a) for a in (path.position, path.velocity, path.acceleration, path.jerk))
-        ),
+        SmoothMotion(*(low.thin(a) for a in astuple(path))),
         cutoff_hz,
     )
+
+
+@dataclass(frozen=True)
+class _LowPass:
+    """Signals below a cut-off, decimated to what is left, without the ends."""
+
+    cutoff_hz: float
+    period_s: float
+
+    @property
+    def every(self) -> int:
+        """Samples of which one is kept."""
+        return max(int(0.5 / (self.cutoff_hz * self.period_s)), 1)
+
+    @property
+    def edge(self) -> int:
+        """Samples at each end in which the filters have not settled."""
+        return int(np.ceil(2 / (self.cutoff_hz * self.period_s)))
+
+    def picked(self, signal: NDArray[Any]) -> NDArray[Any]:
+        """The samples that are kept, as they are."""
+        return signal[self.edge : -self.edge : self.every]
+
+    def thin(self, signal: Floats) -> Floats:
+        """A signal that is smooth already."""
+        inner = signal[self.edge : -self.edge]
+        if self.every == 1:
+            return inner
+        return np.asarray(decimate(inner, self.every, zero_phase=True), dtype=np.float64)
+
+    def smooth(self, signal: Floats) -> Floats:
+        return self.thin(smoothed(signal, self.cutoff_hz, self.period_s))
 
 
 def _asked_for(

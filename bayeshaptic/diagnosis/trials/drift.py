@@ -27,6 +27,7 @@ from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
+from bayeshaptic.recordings.sufficiency import SHORTEST_S
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Tick
 
@@ -55,8 +56,7 @@ def drift_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[T
     `meter` says whether one more is affordable, `tick` is called with the title of each.
     """
     recording = state.etfe.recording
-    shortest_s = 2.5  # of a part, as of a recording
-    if recording is None or recording.duration_s < PARTS * shortest_s:
+    if recording is None or recording.duration_s < PARTS * SHORTEST_S:
         return []
     edges = np.linspace(0, recording.samples, PARTS + 1).astype(int)
     try:

@@ -1,0 +1,38 @@
+"""What kind of force a recording has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import chirp
+
+from bayeshaptic.recordings.signals.excitation import is_sweep
+
+RNG = np.random.default_rng(5)
+T = 1e-3 * np.arange(20_000)
+SWEEPS = {
+    "up": chirp(T, 0.5, T[-1], 200.0),
+    "logarithmic": chirp(T, 0.5, T[-1], 200.0, method="logarithmic"),
+    "again and again": np.tile(chirp(T[:3333], 1.0, T[3333], 300.0), 6),
+    "with some noise": chirp(T, 0.5, T[-1], 200.0) + 0.05 * RNG.standard_normal(len(T)),
+}
+OTHERS = {
+    "white": RNG.standard_normal(len(T)),
+    "binary": np.sign(RNG.standard_normal(len(T))),
+    "multisine": np.cos(2 * np.pi * np.outer(T, np.arange(1, 101)) + RNG.uniform(0, 7, 100)).sum(1),
+    "steps": np.repeat(RNG.standard_normal(40), 500),
+    "ramps": np.interp(T, np.linspace(0, T[-1], 40), RNG.standard_normal(40)),
+    "slow tone": np.sin(2 * np.pi * 2 * T),
+    "nothing": np.zeros(len(T)),
+    "too short": np.ones(100),
+}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_one_tone_at_a_time_is_a_sweep(name: str) -> None:
+    assert is_sweep(SWEEPS[name])
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_forces_are_none(name: str) -> None:
+    assert not is_sweep(OTHERS[name])
