@@ -23,7 +23,7 @@ import numpy as np
 from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.headline import headline
-from benchmarks.strangers_recordings import make
+from benchmarks.strangers.recordings import make
 
 
 def one(seed: int) -> dict[str, Any]:

@@ -13,11 +13,14 @@ import numpy as np
 from scipy.signal import butter, chirp, lfilter
 
 from bayeshaptic.recordings.recording import Recording
-from benchmarks.strangers_device import Array, Masses, States
-from benchmarks.strangers_motion import STEPS, Forces, Motion
+from benchmarks.strangers.device import Array, Masses, States
+from benchmarks.strangers.motion import STEPS, Forces, Motion
 
-LINEAR = ("amplifier 1", "amplifier 2", "sensor", "base", "relaxing", "mode", "hand mode", "eddy")
-LINEAR = (*LINEAR, "late")
+LINEAR = (
+    *("amplifier 1", "amplifier 2", "sensor"),
+    *("base", "relaxing", "mode", "hand mode", "eddy"),
+    "late",
+)
 FORCES = ("coulomb", "stribeck", "backlash", "hardening", "drag", "cogging", "ripple", "compressed")
 CHANGES = ("grip", "warming up")
 FAULTS = ("noise of force", "wavy encoder", "jitter", "drift", "coarse")
