@@ -32,9 +32,9 @@ FEWEST_TONES = 5
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
 # Where the motion usually goes so many counts sooner, a standstill is one that lasts no longer: one
-# of 20 samples at least, as a steady force that dry friction holds takes from steps of 50 ms.  Of 300
-# open loops excited by noise, multisines, sweeps and binary sequences none rests for over 22 % so; of
-# 60 excited by steps five are refused (two with 0.1 s alone), one of them without friction.
+# of 20 samples at least, as a steady force that dry friction holds takes from steps of 50 ms. Of
+# 300 open loops under noise, multisines, sweeps and binary sequences none rests for over 22 % so;
+# of 60 under steps five are refused (two with 0.1 s alone), one of them without friction.
 _USUAL_COUNTS = 30.0
 _FEWEST = 20
 
