@@ -19,7 +19,8 @@ from bayeshaptic.rig import Bench, WhiteNoise, simulate
 COUNTED: list[tuple[bool, str | None, dict[str, Any], bool, float]] = [
     # 48 starts of the fit, 40,000 draws and more, what could hide
     (False, None, {}, True, 20),
-    # five parameters more, and starting values from the data alone
+    # five parameters more, and starting values from the data alone; 12 of these for ground dampers
+    # that may be zero
     (True, None, {}, False, 41),
     # all linear effects sieved and a few followed; two posteriors, before and after
     (False, "second_mode", {"frequency_hz": 110.0, "mass_ratio": 0.1}, True, 57),
