@@ -10,17 +10,45 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from bayeshaptic.diagnosis.begun import Begun
+from bayeshaptic.diagnosis.begun import Begun, Opened, refitted
 from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.diagnosis.of_the_loop import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import information_criterion
 from bayeshaptic.inference.fit import MISFIT
+from bayeshaptic.models import Model
 
 # Differences of BIC: evidence "not worth more than a bare mention", and "very strong" evidence
 # (R. E. Kass and A. E. Raftery, JASA 90, 1995).
 _BARE_MENTION, _VERY_STRONG = 2.0, 10.0
+_MOST_AGAIN = 2  # times that the loop is closed again
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
+
+
+def traced_as_of_the_loop(
+    found: Opened, begun: Begun, model: str | Model, options: Options
+) -> tuple[Begun, Traced]:
+    """The loop closed; again where what was found changes what is between the samples.
+
+    Parameters
+    ----------
+    found : Opened
+        As it was measured.
+    begun : Begun
+        With the base model fitted to what that makes of it.
+    model : str or Model
+        As asked for.
+    options : Options
+    """
+    begun, traced = traced_from_best_base(begun, options)
+    for _ in range(_MOST_AGAIN):
+        etfe = as_of_the_loop(found.etfe, traced.state.fit)
+        if hardly_differ(etfe, begun.etfe):
+            break
+        again = refitted(begun, etfe, model, options)
+        begun, traced = traced_from_best_base(again, options)
+    return begun, traced
 
 
 def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced]:

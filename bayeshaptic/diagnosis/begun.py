@@ -11,6 +11,7 @@ from typing import Any
 
 from bayeshaptic.arguments import instance, shown
 from bayeshaptic.devices import Device, load_device
+from bayeshaptic.diagnosis.of_the_loop import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.choose import Choice, choose_model
@@ -25,6 +26,7 @@ from bayeshaptic.recordings.followed import through_reference, too_weak
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.differences import with_differences
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
 from bayeshaptic.recordings.sufficiency import refuse_too_little
@@ -32,6 +34,7 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded
 
 _WIDEST = 0.4  # of the sampling rate: a band's upper end
+_MOST_ROUNDS = 8  # fits to what the last one makes of the samples
 
 
 def device_of(options: Options, model: str | Model) -> Device | None:
@@ -139,6 +142,8 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     model = base_model(model, options)
     clock = Clock()
     device = device_of(options, model)
+    if isinstance(measurement, Recording):
+        measurement = with_differences(measurement)
     measurement, notices = with_delay_of_the_loop(measurement, device, options)
     if isinstance(measurement, Recording):
         with clock.stage("checks"):
@@ -167,7 +172,19 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
         fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
-    return Begun(**{**vars(found), "seconds": clock.seconds}, fit=fit, choice=choice)
+        begun = Begun(**{**vars(found), "seconds": clock.seconds}, fit=fit, choice=choice)
+        for _ in range(_MOST_ROUNDS):
+            etfe = as_of_the_loop(found.etfe, begun.fit)
+            if hardly_differ(etfe, begun.etfe):
+                break
+            begun = refitted(begun, etfe, model, options)
+    return begun
+
+
+def refitted(begun: Begun, etfe: Etfe, model: str | Model, options: Options) -> Begun:
+    """With the base model fitted to another estimate of the response."""
+    fit, choice = _fit(etfe, base_model(model, options), begun.device, options)
+    return replace(begun, etfe=etfe, fit=fit, choice=choice)
 
 
 def with_delay_of_the_loop(

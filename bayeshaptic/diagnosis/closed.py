@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.diagnosis.analysis import Analysis, finish, without_sampling
-from bayeshaptic.diagnosis.base_model import traced_from_best_base
+from bayeshaptic.diagnosis.base_model import traced_as_of_the_loop
 from bayeshaptic.diagnosis.begun import Begun, Opened, base_model, fitted, measurement_of, opened
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
@@ -144,7 +144,7 @@ def close_loop(
     if force is not None or is_certain(begun.notices):
         return _refused(begun, force, chosen)
     began = time.perf_counter()
-    begun, traced = traced_from_best_base(begun, chosen.within(0.05, 0.4))
+    begun, traced = traced_as_of_the_loop(found, begun, model, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
     if traced.verdict == UNEXPLAINED and begun.etfe.through_reference:
         one_mass = _one_mass_instead(measurement, begun, model, chosen)

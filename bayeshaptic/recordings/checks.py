@@ -239,8 +239,12 @@ def _compliances(device: Device, s: NDArray[Any]) -> list[NDArray[Any]]:
 
 
 def _causality(recording: Recording, where: str) -> list[Notice]:
+    """What drives what; of a measured force, whose past its motion knows better, the sign alone."""
     found = causality(recording)
-    if found.swapped:
+    measured = recording.sensed is not None and recording.sensed.measured_force
+    if measured and not rough_response(recording).opposite(recording.period_s):
+        return []
+    if found.swapped and not measured:
         raise InputError(
             f"{where}: force and position look swapped: the past position predicts the force (it "
             f"removes {100 * found.removed:.0f} % of the error), the past force does not "
@@ -248,7 +252,7 @@ def _causality(recording: Recording, where: str) -> list[Notice]:
             topic="swapped",
         )
     against = not found.relay and rough_response(recording).opposite(recording.period_s)
-    if found.opposite or (against and not found.has_feedback):
+    if measured or found.opposite or (against and not found.has_feedback):
         raise InputError(
             f"{where}: the position moves against the force: one of them has the opposite sign, "
             "and the device would have a negative mass; turn one round with --columns, as in "

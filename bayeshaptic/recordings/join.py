@@ -12,6 +12,7 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.sensed import Sensed
 from bayeshaptic.types import Floats
 
 # Shorter than this, a piece has too few lines for windows of its own.
@@ -83,6 +84,7 @@ def join_recordings(
         notices=(*notices, Notice("note", "pieces", text)),
         joints=tuple(int(end) for end in ends[:-1]),
         reference=_references(pieces),
+        sensed=_sensed(pieces),
     )
 
 
@@ -90,6 +92,24 @@ def _references(pieces: Sequence[Recording]) -> Floats | None:
     """What the controllers followed, one piece after the other; None where one does not say."""
     found = [piece.reference for piece in pieces if piece.reference is not None]
     return np.concatenate(found) if len(found) == len(pieces) else None
+
+
+def _sensed(pieces: Sequence[Recording]) -> Sensed | None:
+    """What was sensed in the pieces, one after the other; of one kind."""
+    first, *others = (piece.sensed for piece in pieces)
+    if any(other != first for other in others):
+        raise InputError(
+            "the recordings are not of the same outputs (position, velocity, acceleration, command "
+            "or measured force): analyse them apart"
+        )
+    found = [piece.sensed for piece in pieces if piece.sensed is not None]
+    if first is None or not found:
+        return None
+    return replace(
+        first,
+        force=np.concatenate([one.force for one in found]),
+        output=np.concatenate([one.output for one in found]),
+    )
 
 
 def unbroken(recording: Recording) -> Recording:

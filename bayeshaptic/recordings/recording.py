@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import pretty_unit, quantity
 from bayeshaptic.recordings.feedback import Feedback
+from bayeshaptic.recordings.sensed import Sensed
 from bayeshaptic.shown import Shown
 
 FORCE_UNITS = ("N", "Nm", "A")
@@ -60,8 +61,8 @@ class Recording(Shown):
     reference : ndarray, shape (N,), or None
         What the controller followed, in any unit, where it was written down: it moves the force,
         and nothing of the motion moves it.
-    velocity : ndarray, shape (N,), or None
-        As it was recorded, where the position is its integral.
+    sensed : Sensed or None
+        What was sensed, where it was not a command and a position.
     """
 
     force: NDArray[np.float64] = field(repr=False)
@@ -82,7 +83,7 @@ class Recording(Shown):
     feedback: Feedback | None = None
     joints: tuple[int, ...] = ()
     reference: NDArray[np.float64] | None = field(default=None, repr=False)
-    velocity: NDArray[np.float64] | None = field(default=None, repr=False)
+    sensed: Sensed | None = None
 
     @property
     def kind(self) -> str:
@@ -114,14 +115,14 @@ class Recording(Shown):
         joints = tuple(joint - start for joint in self.joints if start < joint < stop)
         force, position = self.force[start:stop], self.position[start:stop]
         reference = None if self.reference is None else self.reference[start:stop]
-        velocity = None if self.velocity is None else self.velocity[start:stop]
+        sensed = None if self.sensed is None else self.sensed.part(start, stop)
         return replace(
             self,
             force=force,
             position=position,
             joints=joints,
             reference=reference,
-            velocity=velocity,
+            sensed=sensed,
         )
 
     def _lines(self) -> tuple[str, ...]:

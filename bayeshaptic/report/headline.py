@@ -30,6 +30,7 @@ HEADLINE_RISKS = (0.01, 0.05)
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001
+_LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,12 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
         )
     if analysis.etfe.through_reference:
         found += _in_closed_loop(analysis, verdict)
+    recording = analysis.recording
+    if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
+        found.append(
+            "what was sensed lags beyond the delay that is known, and whether that is in the loop "
+            "or in the sensor of force or motion, which the loop does without, nobody can tell"
+        )
     if analysis.sampled and (far := unstated(analysis)) is not None:
         found.append(far)
     if not analysis.posterior.converged:
@@ -121,6 +128,11 @@ def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
             f"with probability {percent(never)} the loop is unstable however soft the wall is"
         )
     return tuple(found)
+
+
+def _added(diagnosis: Any) -> tuple[str, ...]:
+    """Names of the effects that were found."""
+    return tuple(effect["name"] for effect in (diagnosis or {}).get("effects", ()))
 
 
 def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:

@@ -208,8 +208,7 @@ def causality(recording: Recording) -> Causality:
 def _causality(recording: Recording, stretches: int) -> Causality:
     most_samples = 60_000
     start = max(0, (recording.samples - most_samples) // 2)
-    force = recording.force[start : start + most_samples]
-    position = _known_then(recording)[start : start + most_samples]
+    force, position = (s[start : start + most_samples] for s in _known_then(recording))
     at_limits = _at_limits(force)
     saturates = float(np.mean(at_limits))
     left_out = at_limits if 0 < saturates < _MOST_AT_LIMIT else None
@@ -229,12 +228,12 @@ def _causality(recording: Recording, stretches: int) -> Causality:
     )
 
 
-def _known_then(recording: Recording) -> Floats:
-    """The position as far as each sample tells: an integral through splines knows the next ones."""
-    if recording.velocity is None or len(recording.velocity) != recording.samples:
-        return recording.position
-    speed = recording.velocity - recording.velocity.mean()
-    return np.asarray(np.cumsum(speed) * recording.period_s)
+def _known_then(recording: Recording) -> tuple[Floats, Floats]:
+    """Force and position as far as each sample tells."""
+    sensed = recording.sensed
+    if sensed is None or len(sensed.output) != recording.samples:
+        return recording.force, recording.position
+    return sensed.known_then()
 
 
 def _at_limits(force: Floats) -> Bools:

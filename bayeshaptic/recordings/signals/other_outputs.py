@@ -7,7 +7,8 @@ it, half a period earlier and larger by what the hold takes away,
 .. math:: U'(f) = U(f) \, \frac{j 2 \pi f T}{1 - e^{-j 2 \pi f T}}.
 
 Between the samples signals are splines of the fifth order, within 1e-3 up to a fifth of the
-sampling rate.
+sampling rate. What these, and what is between the samples, make of it is put right where a model is
+fitted (`bayeshaptic.models.response.between_samples`).
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.sensed import ORDER, Sensed
 from bayeshaptic.types import Floats
 
 NO_LOOP = "hold"  # topic of what says that a measurement is not of a loop: its delay is not in it
 MEASURED_FORCE = "measured_force"
 DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
-_ORDER = 5
-_FEWEST = 2 * _ORDER
+_FEWEST = 2 * ORDER
 
 
 def as_command_and_position(recording: Recording, force: str, position: str) -> Recording:
@@ -58,8 +59,13 @@ def as_command_and_position(recording: Recording, force: str, position: str) -> 
     if measured:
         command, motion = held_equivalent(command), motion[:-1]
     notices = (*recording.notices, *_told(measured, position, recording.period_s))
-    velocity = recording.position if position == "velocity" and not measured else None
-    return replace(recording, force=command, position=motion, notices=notices, velocity=velocity)
+    return replace(
+        recording,
+        force=command,
+        position=motion,
+        notices=notices,
+        sensed=Sensed(measured, times, recording.force, recording.position).part(0, len(motion)),
+    )
 
 
 def integrated(signal: Floats, period_s: float, times: int) -> Floats:
@@ -68,7 +74,7 @@ def integrated(signal: Floats, period_s: float, times: int) -> Floats:
 
     for _ in range(times):
         clock = np.arange(len(signal)) * period_s
-        spline = make_interp_spline(clock, signal - signal.mean(), _ORDER)
+        spline = make_interp_spline(clock, signal - signal.mean(), ORDER)
         signal = np.asarray(spline.antiderivative()(clock), dtype=np.float64)
     return signal
 
@@ -80,7 +86,7 @@ def held_equivalent(force: Floats) -> Floats:
     """
     from scipy.interpolate import make_interp_spline
 
-    spline = make_interp_spline(np.arange(len(force)), force, _ORDER)
+    spline = make_interp_spline(np.arange(len(force)), force, ORDER)
     middle = np.arange(len(force) - 1) + 0.5
     command = spline(middle) - spline(middle, 2) / 24 + 7 * spline(middle, 4) / 5760
     return np.asarray(command, dtype=np.float64)
@@ -96,9 +102,12 @@ def with_loop_delay(recording: Recording, delay_s: float) -> Recording:
 
     later = delay_s / recording.period_s
     kept = recording.samples - int(np.ceil(later))
-    spline = make_interp_spline(np.arange(recording.samples), recording.force, _ORDER)
+    spline = make_interp_spline(np.arange(recording.samples), recording.force, ORDER)
     command = np.asarray(spline(np.arange(kept) + later), dtype=np.float64)
-    return replace(recording, force=command, position=recording.position[:kept])
+    sensed = recording.sensed
+    if sensed is not None:
+        sensed = replace(sensed.part(0, kept), later=later)
+    return replace(recording, force=command, position=recording.position[:kept], sensed=sensed)
 
 
 def _told(measured: bool, position: str, period_s: float) -> tuple[Notice, ...]:
@@ -119,9 +128,8 @@ def _told(measured: bool, position: str, period_s: float) -> tuple[Notice, ...]:
         text = f"The position is the integral of the recorded {position}."
         if not measured:
             text += (
-                " A velocity shows the steps of a held command: the response is off by up to 3.3 % "
-                f"of that of the motor's mass alone at {0.1 / period_s:.3g} Hz, and four times "
-                "less at half of that."
+                " It shows the steps of a held command, which a fitted model takes off: up to 3.3 "
+                f"% of the response of the motor's mass alone at {0.1 / period_s:.3g} Hz."
             )
-        found.append(Notice("note" if measured else "warning", "columns", text))
+        found.append(Notice("note", "columns", text))
     return tuple(found)

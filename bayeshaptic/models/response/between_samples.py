@@ -1,0 +1,65 @@
+r"""What a position sampled in the loop shows beyond what another sensor saw.
+
+A sampled position holds the images of what moves between the samples, :math:`P(s_k)/s_k` at
+:math:`s_k = s + j 2 \pi k / T`. The integral of a sampled velocity holds :math:`P(s_k)/s` instead,
+and a force that was measured where it acts none of them. Both differ from the loop's response by a
+smooth function of the frequency, a few thousandths at a tenth of the sampling rate and a fifth at a
+third of it, which a fitted model knows far better than that; what it makes of the command is added
+to the position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.types import Complexes, Floats
+
+_POINTS = 400  # of the smooth function
+_LOWEST = 1e-3  # of the Nyquist frequency: below, the function is what it is there
+
+
+def with_images(recording: Recording, system: LinearSystem) -> Recording:
+    """The recording as of a sampled position beside a held command.
+
+    Parameters
+    ----------
+    recording : Recording
+        As it was read; back as it is where that is what it holds.
+    system : LinearSystem
+        A batch of one.
+    """
+    if recording.sensed is None:
+        return recording
+    from scipy.interpolate import make_interp_spline
+
+    length = 2 * recording.samples
+    theta = np.pi * np.linspace(_LOWEST, 1.0, _POINTS)
+    smooth = make_interp_spline(theta, images(recording, system, theta), 3)
+    lines = np.maximum(2 * np.pi * np.fft.rfftfreq(length), theta[0])
+    command = np.fft.rfft(recording.force - recording.force.mean(), length)
+    shown = np.fft.irfft(smooth(lines) * command, length)[: recording.samples]
+    return replace(recording, position=recording.position + shown)
+
+
+def images(recording: Recording, system: LinearSystem, theta: Floats) -> Complexes:
+    """The loop's response less that of the recording as it is, at angles w T; shape (L,)."""
+    sensed, period_s = recording.sensed, recording.period_s
+    assert sensed is not None
+    frequency_hz = theta / (2 * np.pi * period_s)
+    loop = system.sampled_response(frequency_hz, period_s)[0]
+    integral = sensed.integral(theta) * period_s**sensed.derivatives
+    s: Complexes = np.multiply(1j, theta / period_s)
+    if sensed.measured_force:
+        own_delay = system.delay_s[0] - sensed.later * period_s
+        seen = system.continuous_response(s)[0] * np.exp(-s * own_delay)
+        seen = seen * s**sensed.derivatives / sensed.command(theta)
+    else:
+        power = np.zeros((sensed.derivatives + 1, 1))
+        power[-1] = 1.0
+        seen = system.with_filter(power, np.ones((1, 1))).sampled_response(frequency_hz, period_s)
+        seen = seen[0]
+    return np.asarray(loop - seen * integral)
