@@ -8,16 +8,20 @@ import re
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.text import Text
 from PIL import Image
 
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.drawing.axes import Plain
 from bayeshaptic.report.figures.drawing.canvas import draw_both
+from bayeshaptic.report.figures.drawing.letters import in_pixels
 
 
-def _figure() -> Figure:
-    """One of each thing that figures are made of."""
+def _figure(texts: bool = True) -> Figure:
+    """One of each thing that figures are made of; texts are laid out, and drawn or not."""
     rng = np.random.default_rng(0)
     figure = style.new_figure(3.3)
     left, right = figure.subplots(1, 2)
@@ -30,6 +34,11 @@ def _figure() -> Figure:
     right.imshow(rng.random((4, 4)))
     right.scatter(range(4), range(4), c=range(4))
     right.set_yscale("log")
+    if not texts:
+        for axes in (left, right):
+            axes.tick_params(labelcolor=(0, 0, 0, 0))
+        for text in figure.findobj(Text):
+            text.set_alpha(0)
     return figure
 
 
@@ -40,10 +49,12 @@ def _numbers(svg: str) -> list[float]:
 
 
 def test_both_formats_are_those_of_matplotlib() -> None:
-    pixels, svg = draw_both(_figure())
+    bare, figure = _figure(texts=False), _figure()
+    (pixels, _), (_, svg) = draw_both(bare), draw_both(figure)
+    for one in (bare, figure):
+        one.set_layout_engine("none")  # as it was laid out
     png, other = io.BytesIO(), io.StringIO()
-    figure = _figure()
-    figure.savefig(png, format="png", dpi=style.DPI)
+    bare.savefig(png, format="png", dpi=style.DPI)
     figure.savefig(other, format="svg", dpi=style.DPI, metadata={"Date": None, "Creator": None})
     assert np.array_equal(pixels, np.asarray(Image.open(png).convert("RGB")))
     ours, theirs = _numbers(svg), _numbers(other.getvalue())
@@ -51,6 +62,29 @@ def test_both_formats_are_those_of_matplotlib() -> None:
     # Texts are measured and images placed in whole pixels here, in points there.
     assert ours == pytest.approx(theirs, abs=1.01 * 72 / style.DPI)
     assert svg.count("<image") == other.getvalue().count("<image") == 2
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0])
+def test_texts_are_those_of_matplotlib_on_whole_pixels(angle: float) -> None:
+    font = FontProperties(size=style.FONT)
+    drawn = []
+    for draw in (in_pixels, RendererAgg.draw_text):
+        page = RendererAgg(200, 200, style.DPI)
+        pen = page.new_gc()
+        pen.set_foreground((0.2, 0.4, 0.8, 0.5), isRGBA=True)
+        draw(page, pen, 100.3, 120.6, "gain, \N{GREEK SMALL LETTER MU}m", font, angle)
+        drawn.append(np.asarray(page.buffer_rgba()).astype(float))
+    ours, theirs = drawn
+    assert ours[..., 3].max() == pytest.approx(theirs[..., 3].max(), abs=1)
+    inked = ours[..., 3] > 0
+    assert np.abs(ours[inked][:, :3] - theirs[theirs[..., 3] > 0][0, :3]).max() <= 12  # rounding
+    places = np.indices((200, 200))
+    ink, middle = [], []
+    for picture in (ours, theirs):
+        ink.append(picture[..., 3].sum())
+        middle.append((places * picture[..., 3]).sum(axis=(1, 2)) / ink[-1])
+    assert ink[0] == pytest.approx(ink[1], rel=0.05)
+    assert np.abs(middle[0] - middle[1]).max() < 1.0  # half a pixel of the text, half of a letter
 
 
 @pytest.mark.parametrize("scale", ["linear", "log"])

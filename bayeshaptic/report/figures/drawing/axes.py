@@ -2,7 +2,7 @@
 
 matplotlib makes of every tick two short lines, a grid line and two texts, and updates all of them
 at each look at the layout: half of what a figure costs.  `Plain` axes keep one tick as the pattern
-of all; the picture is the same to the pixel.
+of all.
 """
 
 from __future__ import annotations
@@ -24,6 +24,24 @@ from bayeshaptic.types import Floats
 class Plain(Axes):
     """Axes with `_Few` marks."""
 
+    _around: tuple[list[list[str]], Floats] | None = None
+
+    def get_tightbbox(self, renderer: Any = None, *args: Any, **options: Any) -> Bbox | None:
+        """What the axes take with their labels; measured once a layout while the labels stay.
+
+        The layout looks twice, because labels change with the size: those of most axes do not.
+        """
+        if not options.get("for_layout_only"):
+            return super().get_tightbbox(renderer, *args, **options)
+        axes: tuple[Any, Any] = self.xaxis, self.yaxis
+        labels = [marks.labels for axis in axes for marks in axis._update_ticks()]
+        if self._around is None or self._around[0] != labels:
+            whole = super().get_tightbbox(renderer, *args, **options)
+            if whole is None:
+                return None
+            self._around = labels, whole.get_points() - self.bbox.get_points()
+        return Bbox(self.bbox.get_points() + self._around[1])
+
     def _init_axis(self) -> None:
         self.xaxis = _AcrossAxis(self, clear=False)
         self.yaxis = _UpAxis(self, clear=False)
@@ -37,6 +55,13 @@ class Page(Figure):
 
     def add_subplot(self, *args: Any, **options: Any) -> Any:
         return super().add_subplot(*args, **{"axes_class": Plain, **options})
+
+    def draw(self, renderer: Any) -> None:
+        """Lay out anew, and draw."""
+        for axes in self.axes:
+            if isinstance(axes, Plain):
+                axes._around = None
+        super().draw(renderer)
 
 
 class _Marks:
@@ -58,6 +83,7 @@ class _Few(Axis):
         self._patterns: dict[bool, Tick] = {}
         self._extents: dict[tuple[Any, ...], Bbox] = {}
         self._found: tuple[tuple[Any, ...], list[_Marks]] | None = None
+        self._beside: tuple[Any, Floats, tuple[list[Bbox], list[Bbox]]] | None = None
 
     def set_tick_params(self, *args: Any, **options: Any) -> None:
         super().set_tick_params(*args, **options)
@@ -102,15 +128,24 @@ class _Few(Axis):
         return self._patterns[major]
 
     def _get_ticklabel_bboxes(self, ticks: Any, renderer: Any) -> tuple[list[Bbox], list[Bbox]]:
-        below = (self._boxes(marks, marks.pattern.label1, renderer) for marks in ticks)
-        above = (self._boxes(marks, marks.pattern.label2, renderer) for marks in ticks)
-        return sum(below, []), sum(above, [])
+        """One box around the labels on either side; those of a neighbour are asked for, too."""
+        place = self.axes.bbox.get_points()
+        known = self._beside
+        if known is None or known[0] is not ticks or not np.array_equal(known[1], place):
+            sides = [
+                [box for marks in ticks for box in self._boxes(marks, above, renderer)]
+                for above in (False, True)
+            ]
+            below, above = ([Bbox.union(boxes)] if boxes else [] for boxes in sides)
+            self._beside = known = ticks, place, (below, above)
+        return known[2]
 
-    def _boxes(self, marks: _Marks, pattern: Text, renderer: Any) -> list[Bbox]:
+    def _boxes(self, marks: _Marks, above: bool, renderer: Any) -> list[Bbox]:
         """Extents of the labels; each text is measured once, wherever it stands."""
+        pattern = marks.pattern.label2 if above else marks.pattern.label1
         if not pattern.get_visible():
             return []
-        across = np.full(len(marks.places), float(pattern is marks.pattern.label2))
+        across = np.full(len(marks.places), float(above))
         places = (marks.places, across) if self._along == "x" else (across, marks.places)
         points = pattern.get_transform().transform(np.stack(places, axis=1))
         boxes = []

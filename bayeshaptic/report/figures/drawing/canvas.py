@@ -8,7 +8,6 @@ renderers.
 from __future__ import annotations
 
 import io
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,9 @@ from matplotlib.backend_bases import FigureCanvasBase, GraphicsContextBase, Rend
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.backends.backend_svg import RendererSVG
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
 from matplotlib.transforms import Affine2D, Bbox, TransformedPath
 
+from bayeshaptic.report.figures.drawing.letters import Outlines, in_pixels, letters
 from bayeshaptic.types import Bytes
 
 
@@ -45,12 +44,6 @@ class _Canvas(FigureCanvasBase):
         self.get_renderer = lambda: both
 
 
-@lru_cache(8192)
-def _measured(text: str, font: FontProperties, ismath: Any, dpi: float) -> Any:
-    """Width, height and descent of a text in pixels: figures have most of their texts in common."""
-    return RendererAgg(1, 1, dpi).get_text_width_height_descent(text, font, ismath)
-
-
 class _Both(RendererBase):
     """Hands every stroke to Agg, in pixels, and to the SVG writer, in points."""
 
@@ -70,6 +63,7 @@ class _Both(RendererBase):
             image_dpi=int(self.dpi),
             metadata={"Date": None, "Creator": None},
         )
+        self._vector._text2path = Outlines()  # type: ignore[attr-defined]
         self._factor = points_per_inch / self.dpi
         self._to_points = Affine2D().scale(self._factor)
 
@@ -165,7 +159,10 @@ class _Both(RendererBase):
         mtext: Any = None,
     ) -> None:
         for raster in self._rasters():
-            raster.draw_text(gc, x, y, s, prop, angle, ismath, mtext)
+            if ismath:
+                raster.draw_text(gc, x, y, s, prop, angle, ismath, mtext)
+            else:
+                in_pixels(raster, gc, x, y, s, prop, angle)
         if not self._in_pixels_only:
             place = x * self._factor + self._wider(s, prop, angle, ismath, mtext), y * self._factor
             self._vector.draw_text(self._in_points(gc), *place, s, prop, angle, ismath)
@@ -205,7 +202,9 @@ class _Both(RendererBase):
         self._vector.close_group(s)
 
     def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> Any:
-        return _measured(s, prop.copy(), ismath, self.dpi)
+        if ismath:
+            return self._pixels.get_text_width_height_descent(s, prop, ismath)
+        return letters(s, prop, self.dpi).size
 
     def get_canvas_width_height(self) -> tuple[float, float]:
         return self._size
