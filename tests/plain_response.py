@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.models.response.filtered import Filters, fast_filters, filtered, parted
+from bayeshaptic.models.response.filtered import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_and_residues
 from bayeshaptic.models.response.sampled import from_poles, from_polynomials
+from bayeshaptic.numerics.partial_fractions import moved_apart, residues
+from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.types import Bools, Complexes, Floats
 
 
@@ -52,3 +54,64 @@ def _behind_fast_filters(
     response, good = from_polynomials(rest, bottom, delay_s, frequency_hz, period_s)
     response += from_poles(poles.T, residues.T, delay_s, frequency_hz, period_s)
     return response, good
+
+
+def fast_filters(filters: Filters, batch: int, period_s: float) -> Bools:
+    """Where a filter is faster than the series over aliases bears, shape (B,)."""
+    found = np.zeros(batch, bool)
+    fast = 1.0  # |q| T
+    for factor in filters:
+        found |= np.abs(roots(factor.denominator)).max(axis=1, initial=0.0) * period_s > fast
+    return found
+
+
+def parted(
+    numerator: Polynomial, denominator: Polynomial, filters: Filters
+) -> tuple[Polynomial, Complexes, Complexes]:
+    """A transfer function behind filters as the sum of the filters' poles and the rest.
+
+    Returns
+    -------
+    rest : ndarray
+        R, a numerator over the `denominator` of the mechanism alone.
+    poles, residues : ndarray of complex, shape (n, B)
+    """
+    numerator, bottom = filtered(numerator, np.ones((1, denominator.shape[1])), filters)
+    own = moved_apart(np.concatenate([roots(factor.denominator) for factor in filters], axis=1))
+    poles, parts = own.T, residues(numerator, bottom[-1], own).T
+    parts /= evaluate(denominator, poles)
+    rest = _divided(
+        _difference(numerator, multiply(denominator, _sum(poles, parts, bottom[-1]))), bottom
+    )
+    return rest[: len(denominator) - 1], poles, parts
+
+
+def _sum(poles: Complexes, residues: Complexes, lead: Floats) -> Polynomial:
+    """Numerator of the sum of the partial fractions over a denominator with this leading factor."""
+    total = np.zeros((len(poles), poles.shape[1]), complex)
+    for j in range(len(poles)):
+        term = (residues[j] * lead)[None]
+        for i in range(len(poles)):
+            if i != j:
+                longer = np.zeros((len(term) + 1, term.shape[1]), complex)
+                longer[1:] += term
+                longer[:-1] -= poles[i] * term
+                term = longer
+        total += term
+    return np.asarray(total.real)
+
+
+def _difference(a: Polynomial, b: Polynomial) -> Polynomial:
+    out = np.zeros((max(len(a), len(b)), b.shape[1]))
+    out[: len(a)] += a
+    out[: len(b)] -= b
+    return out
+
+
+def _divided(dividend: Polynomial, divisor: Polynomial) -> Polynomial:
+    """The power series of a quotient, as many terms as the dividend has."""
+    quotient = np.zeros_like(dividend)
+    for k in range(len(dividend)):
+        known = sum(divisor[j] * quotient[k - j] for j in range(1, min(k, len(divisor) - 1) + 1))
+        quotient[k] = (dividend[k] - known) / divisor[0]
+    return quotient

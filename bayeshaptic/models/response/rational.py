@@ -13,12 +13,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from bayeshaptic.models.response.filtered import Filters, fast_filters, filtered, parted
+from bayeshaptic.models.response.filtered import Filters
 from bayeshaptic.models.response.kernels.arrays import RationalArrays
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_and_residues
-from bayeshaptic.models.response.sampled import HIGH, ORDER, REACH, alias_tables, phi
+from bayeshaptic.models.response.sampled import HIGH, ORDER, REACH, alias_tables
 from bayeshaptic.models.response.transfer import transfer
+from bayeshaptic.numerics.polynomial import roots
 from bayeshaptic.types import Complexes, Floats, Ints
 
 
@@ -53,7 +54,7 @@ def rational_form(
     nodes = nodes_at(frequency_hz, period_s)
     top, bottom = transfer(mechanism)
     turns = delay_s / period_s
-    terms: list[PoleTerms] = []
+    terms = PoleTerms(np.zeros(len(turns), int), np.zeros((len(turns), 0, 3, 2)))
     if filters:
         top, bottom, terms = _behind(top, bottom, filters, turns, period_s)
     above, below = (np.empty((len(turns), 2, _groups(p.shape[1]))) for p in (top, bottom))
@@ -71,12 +72,9 @@ def rational_form(
     if bad.size:
         own = tuple(factor.rows(bad) for factor in filters)
         p, r = poles_and_residues(mechanism.rows(bad), own)
-        terms.append(PoleTerms(bad, True, *_closed_form(p * period_s, r * period_s, turns[bad])))
-    poles = _gathered(terms, len(turns))
-    tables = alias_tables()
-    return RationalArrays(
-        above, below, series, turns, *poles, nodes.theta, nodes.hold, nodes.high, *tables
-    )
+        terms = terms.alone(bad, _closed_form(p * period_s, r * period_s, turns[bad]))
+    at, tables = (nodes.theta, nodes.hold, nodes.high), alias_tables()
+    return RationalArrays(above, below, series, turns, terms.count, terms.table, *at, *tables)
 
 
 def _groups(coefficients: int) -> int:
@@ -97,70 +95,78 @@ def sampled_response(form: RationalArrays) -> Complexes:
 
 @dataclass(frozen=True)
 class PoleTerms:
-    """Poles in the closed form, for some rows of a batch.
+    """Poles in the closed form.
 
     Attributes
     ----------
-    rows : ndarray of int, shape (R,)
-    alone : bool
-        Whether they are all there is: the series does not hold.
-    direct, late, centre : ndarray, shape (R, n)
-        Numerators without and with a further z^-1, and what is subtracted from z - 1.
+    count : ndarray of int, shape (B,)
+        How many there are; negative where they are all there is: the series does not hold.
+    table : ndarray, shape (B, n, 3, 2)
+        Numerators without and with a further z^-1, and what is subtracted from z - 1; real and
+        imaginary parts.
     """
 
-    rows: Ints
-    alone: bool
-    direct: Complexes
-    late: Complexes
-    centre: Complexes
+    count: Ints
+    table: Floats
+
+    def alone(self, rows: Ints, table: Floats) -> PoleTerms:
+        """These poles, shape (R, n, 3, 2), and no others, in some rows of the batch."""
+        width = max(self.table.shape[1], table.shape[1])
+        wider = np.zeros((len(self.count), width, 3, 2))
+        wider[:, : self.table.shape[1]] = self.table
+        wider[rows, : table.shape[1]] = table
+        count = self.count.copy()
+        count[rows] = -table.shape[1]
+        return PoleTerms(count, wider)
 
 
 def _behind(
     top: Floats, bottom: Floats, filters: Filters, turns: Floats, period_s: float
-) -> tuple[Floats, Floats, list[PoleTerms]]:
+) -> tuple[Floats, Floats, PoleTerms]:
     """Numerators and denominators behind filters, the fast ones of which are parted from them."""
-    whole_top, whole_bottom = (p.T for p in filtered(top.T, bottom.T, filters))
-    fast = np.flatnonzero(fast_filters(filters, len(turns), period_s))
-    if not fast.size:
-        return whole_top, whole_bottom, []
-    own = tuple(factor.rows(fast) for factor in filters)
-    rest, p, r = parted(top[fast].T, bottom[fast].T, own)
-    closed = _closed_form(p.T * period_s, r.T * period_s, turns[fast])
-    top = _with_rows(whole_top, fast, rest.T)
-    return top, _with_rows(whole_bottom, fast, bottom[fast]), [PoleTerms(fast, False, *closed)]
+    from bayeshaptic.models.response.kernels.filters import part
+
+    batch = len(turns)
+    own = np.concatenate([np.zeros((batch, 0)), *(roots(f.denominator) for f in filters)], axis=1)
+    tops, above = _together([f.numerator for f in filters], batch)
+    bottoms, below = _together([f.denominator for f in filters], batch)
+    longer_top = max(top.shape[1] + int(np.sum(above - 1)), bottom.shape[1] - 1)
+    out_top = np.empty((batch, longer_top))
+    out_bottom = np.empty((batch, bottom.shape[1] + own.shape[1]))
+    terms = PoleTerms(np.empty(batch, int), np.zeros((batch, own.shape[1], 3, 2)))
+    part(
+        np.ascontiguousarray(top),
+        np.ascontiguousarray(bottom),
+        tops,
+        bottoms,
+        np.stack([above, below]),
+        own.astype(complex),
+        turns,
+        period_s,
+        out_top,
+        out_bottom,
+        terms.count,
+        terms.table,
+    )
+    return out_top, out_bottom, terms
 
 
-def _with_rows(whole: Floats, rows: Ints, part: Floats) -> Floats:
-    """Polynomials (B, n), some rows of them replaced by others of any length."""
-    out = np.zeros((len(whole), max(whole.shape[1], part.shape[1])))
-    out[:, : whole.shape[1]] = whole
-    out[rows] = 0.0
-    out[rows, : part.shape[1]] = part
-    return out
+def _together(polynomials: list[Floats], batch: int) -> tuple[Floats, Ints]:
+    """Polynomials in one array, (F, n, B), and how many coefficients each has."""
+    lengths = np.array([len(polynomial) for polynomial in polynomials], int)
+    out = np.zeros((len(polynomials), int(lengths.max(initial=1)), batch))
+    for place, polynomial in zip(out, polynomials, strict=True):
+        place[: len(polynomial)] = polynomial
+    return out, lengths
 
 
-def _closed_form(p: Complexes, r: Complexes, turns: Floats) -> tuple[Complexes, ...]:
-    """Numerators and centres of poles and residues, each times the period."""
-    late = (turns - np.floor(turns))[:, None]
-    early = 1.0 - late
-    with np.errstate(all="ignore"):
-        direct = r * early * phi(p * early)
-        second = r * np.exp(p * early) * late * phi(p * late)
-        return direct, second, np.expm1(p)
+def _closed_form(p: Complexes, r: Complexes, turns: Floats) -> Floats:
+    """The table of poles and residues, (R, n), each times the period."""
+    from bayeshaptic.models.response.kernels.filters import close
 
-
-def _gathered(terms: list[PoleTerms], batch: int) -> tuple[Ints, Floats, Floats, Floats]:
-    """The terms of all rows; what is said last of a row holds."""
-    count = np.zeros(batch, int)
-    widest = max((part.direct.shape[1] for part in terms), default=0)
-    tables = np.zeros((3, batch, widest, 2))
-    for part in terms:
-        width = part.direct.shape[1]
-        count[part.rows] = -width if part.alone else width
-        for table, values in zip(tables, (part.direct, part.late, part.centre), strict=True):
-            table[part.rows, :width, 0] = values.real
-            table[part.rows, :width, 1] = values.imag
-    return count, *tables
+    table = np.empty((*p.shape, 3, 2))
+    close(np.ascontiguousarray(p), np.ascontiguousarray(r), turns, table)
+    return table
 
 
 def nodes_at(frequency_hz: Floats, period_s: float) -> Nodes:

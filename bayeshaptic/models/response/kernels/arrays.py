@@ -21,7 +21,7 @@ class RationalArrays(NamedTuple):
         Delay in periods.
     pole_count : ndarray of int, shape (B,)
         How many poles are to be added in the closed form; negative where they are all there is.
-    direct, late, centre : ndarray, shape (B, N, 2)
+    poles : ndarray, shape (B, N, 3, 2)
         Of these poles: numerators without and with a further z^-1, and what is subtracted from
         z - 1; real and imaginary parts.
     theta : ndarray, shape (L,)
@@ -39,9 +39,7 @@ class RationalArrays(NamedTuple):
     series: Floats
     turns: Floats
     pole_count: Ints
-    direct: Floats
-    late: Floats
-    centre: Floats
+    poles: Floats
     theta: Floats
     hold: Floats
     high: Ints

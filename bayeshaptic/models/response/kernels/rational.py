@@ -179,9 +179,10 @@ def _add_poles(form: RationalArrays, row: int, space: Space, real: Floats, imag:
     hold_re, hold_im = form.hold[0], form.hold[1]
     re[:], im[:] = 0.0, 0.0
     for pole in range(abs(form.pole_count[row])):
-        direct_re, direct_im = form.direct[row, pole, 0], form.direct[row, pole, 1]
-        late_re, late_im = form.late[row, pole, 0], form.late[row, pole, 1]
-        centre_re, centre_im = form.centre[row, pole, 0], form.centre[row, pole, 1]
+        table = form.poles[row, pole]
+        direct_re, direct_im = table[0, 0], table[0, 1]
+        late_re, late_im = table[1, 0], table[1, 1]
+        centre_re, centre_im = table[2, 0], table[2, 1]
         for node in range(len(re)):
             above_re = direct_re + late_re * (1 - hold_re[node]) + late_im * hold_im[node]
             above_im = direct_im + late_im * (1 - hold_re[node]) - late_re * hold_im[node]
