@@ -241,6 +241,34 @@ def test_a_spring_and_a_damper_as_a_dynamic_link():
     np.testing.assert_allclose(mine.frequency_hz, known.frequency_hz, rtol=1e-7)
 
 
+@pytest.mark.parametrize("ends", [(0, 1), (1, None), (0, None)])
+@pytest.mark.parametrize("based", [False, True])
+def test_a_ratio_of_polynomials_is_one_more_pole(ends, based):
+    """Times from far below a sample, whose poles have the closed form, to seconds."""
+
+    def relaxing(s, stiffness, time_s):
+        return stiffness * s * time_s / (1 + s * time_s)
+
+    system, v = plain("lhifam", "grasped", batch=40)
+    system = filtered(on_a_base(system) if based else system, np.full(40, 3e-4))
+    time_s, nothing, one = np.geomspace(1e-7, 3.0, 40), np.zeros(40), np.ones(40)
+    stiffness = np.tile([0.01, 1.0], 20) * v["kc"]
+    ratio = np.stack([nothing, stiffness * time_s]), np.stack([one, time_s])
+    link = DynamicLink(*ends, relaxing, (stiffness, time_s), ratio)
+    summed = system.with_dynamic_link(replace(link, ratio=None))
+    mine = system.with_dynamic_link(link)
+    assert mine.has_rational_form and not summed.has_rational_form
+    assert not mine.with_dynamic_link(link).has_rational_form
+    np.testing.assert_allclose(
+        mine.sampled_response(FREQUENCY_HZ, T), summed.sampled_response(FREQUENCY_HZ, T), rtol=1e-7
+    )
+    rows = np.arange(3, 30, 5)
+    np.testing.assert_array_equal(
+        mine.rows(rows).sampled_response(FREQUENCY_HZ, T),
+        mine.sampled_response(FREQUENCY_HZ, T)[rows],
+    )
+
+
 @pytest.mark.parametrize("approximation", ["exact", "continuous"])
 @pytest.mark.parametrize(("device", "name"), DEVICES)
 def test_crossings_with_dynamic_links_by_the_response_alone(device, name, approximation):

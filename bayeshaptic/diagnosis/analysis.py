@@ -193,7 +193,7 @@ def finish(
     clock = Clock(dict(begun.seconds))
     scale = noise_scale(fit)
     # A misfit's tail means nothing, and a limit for comparison needs none.
-    rational = fit.model.system(fit.theta).rational
+    rational = fit.model.system(fit.theta).has_rational_form
     most = _MOST_EVALUATIONS if rational else _MOST_WITH_LINKS
     watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
     with clock.stage("sampling"):

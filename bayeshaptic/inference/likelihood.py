@@ -96,7 +96,7 @@ class Likelihood:
     def _rational_form(self, theta: Floats) -> RationalArrays | None:
         """The loops at the windows' nodes; None where they have no finite set of poles."""
         system = self.model.system(theta)
-        if not system.rational or self.model.period_s is None:
+        if not system.has_rational_form or self.model.period_s is None:
             return None
         return system.rational_form(self._node_frequencies, self.model.period_s)
 

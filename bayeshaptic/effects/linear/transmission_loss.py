@@ -164,4 +164,9 @@ class RelaxingTransmission(LinearEffect):
         return Unseen("number", title, 1.0, own, *combined(times))
 
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
-        return system.with_dynamic_link(DynamicLink(*_ENDS, relaxing_stiffness, self.own(values)))
+        stiffness, time_s = own = self.own(values)
+        ratio = (
+            np.stack([np.zeros_like(time_s), stiffness * time_s]),
+            np.stack([np.ones_like(time_s), time_s]),
+        )
+        return system.with_dynamic_link(DynamicLink(*_ENDS, relaxing_stiffness, own, ratio))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.numerics.polynomial import Polynomial
 from bayeshaptic.types import Complexes, Floats
 
 Index = slice | NDArray[np.bool_] | NDArray[np.int_]
@@ -26,12 +27,16 @@ class DynamicLink:
         (their axis last).  It must be analytic to the right of the imaginary axis, real on the
         positive real axis, and grow more slowly than s^2.
     values : tuple of ndarray, each of shape (B,)
+    ratio : tuple of two ndarray, each of shape (degree + 1, B), or None
+        Numerator and denominator of the law, where it is a ratio of polynomials: with such a link
+        alone a response has finitely many poles still.
     """
 
     first: int
     second: int | None
     law: Callable[..., Complexes]
     values: tuple[Floats, ...]
+    ratio: tuple[Polynomial, Polynomial] | None = None
 
     def stiffness(self, s: Complexes) -> Complexes:
         """Force over stretch, shape (..., B)."""
@@ -39,7 +44,10 @@ class DynamicLink:
 
     def rows(self, index: Index) -> DynamicLink:
         """A part of the batch."""
-        return replace(self, values=tuple(value[index] for value in self.values))
+        ratio = self.ratio
+        if ratio is not None:
+            ratio = ratio[0][:, index], ratio[1][:, index]
+        return replace(self, values=tuple(value[index] for value in self.values), ratio=ratio)
 
 
 def delayed(s: NDArray[Any], delay_s: NDArray[Any]) -> Complexes:

@@ -13,12 +13,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.filtered import Filters
 from bayeshaptic.models.response.kernels.arrays import RationalArrays
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_and_residues
 from bayeshaptic.models.response.sampled import HIGH, ORDER, REACH, alias_tables
-from bayeshaptic.models.response.transfer import transfer
+from bayeshaptic.models.response.transfer import transfer, transfer_with_link
 from bayeshaptic.numerics.polynomial import roots
 from bayeshaptic.types import Complexes, Floats, Ints
 
@@ -46,13 +47,21 @@ class Nodes:
 
 
 def rational_form(
-    mechanism: Mechanism, filters: Filters, delay_s: Floats, frequency_hz: Floats, period_s: float
+    mechanism: Mechanism,
+    filters: Filters,
+    delay_s: Floats,
+    frequency_hz: Floats,
+    period_s: float,
+    link: DynamicLink | None = None,
 ) -> RationalArrays:
-    """Prepare a batch of mechanisms, each behind its filters and delay, for these frequencies."""
+    """Prepare a batch of mechanisms, each behind its filters and delay, for these frequencies.
+
+    `link` is one more whose law is a ratio of polynomials.
+    """
     from bayeshaptic.models.response.kernels.expansion import expand
 
     nodes = nodes_at(frequency_hz, period_s)
-    top, bottom = transfer(mechanism)
+    top, bottom = transfer(mechanism) if link is None else transfer_with_link(mechanism, link)
     turns = delay_s / period_s
     terms = PoleTerms(np.zeros(len(turns), int), np.zeros((len(turns), 0, 3, 2)))
     if filters:
@@ -71,7 +80,7 @@ def rational_form(
     bad = np.flatnonzero(~((fastest + nodes.reach) / (2 * np.pi) < REACH))
     if bad.size:
         own = tuple(factor.rows(bad) for factor in filters)
-        p, r = poles_and_residues(mechanism.rows(bad), own)
+        p, r = poles_and_residues(mechanism.rows(bad), own, link and link.rows(bad))
         terms = terms.alone(bad, _closed_form(p * period_s, r * period_s, turns[bad]))
     at, tables = (nodes.theta, nodes.hold, nodes.high), alias_tables()
     return RationalArrays(above, below, series, turns, terms.count, terms.table, *at, *tables)

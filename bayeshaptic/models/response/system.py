@@ -46,6 +46,13 @@ class LinearSystem:
         return not self.dynamic_links
 
     @property
+    def has_rational_form(self) -> bool:
+        """Whether `rational_form` is all there is: a single link may be a ratio of polynomials."""
+        return self.rational or (
+            len(self.dynamic_links) == 1 and self.dynamic_links[0].ratio is not None
+        )
+
+    @property
     def rational_part(self) -> LinearSystem:
         """The same without its dynamic links."""
         return replace(self, dynamic_links=()) if self.dynamic_links else self
@@ -101,7 +108,7 @@ class LinearSystem:
         """The exact sampled response at frequencies of shape (L,); shape (B, L)."""
         frequency_hz = np.asarray(frequency_hz, float)
         response = sampled_response(self.rational_form(frequency_hz, period_s))
-        if self.dynamic_links:
+        if not self.has_rational_form:
             remainder = self.remainder
             chunk = 64  # vectors at a time: the arrays of one chunk stay in the cache
             for start in range(0, self.batch, chunk):
@@ -112,5 +119,11 @@ class LinearSystem:
         return response
 
     def rational_form(self, frequency_hz: Floats, period_s: float) -> RationalArrays:
-        """The rational part, ready to be evaluated at frequencies of shape (L,)."""
-        return rational_form(self.mechanism, self.filters, self.delay_s, frequency_hz, period_s)
+        """The rational part, ready to be evaluated at frequencies of shape (L,).
+
+        With a link that is a ratio of polynomials.
+        """
+        link = self.dynamic_links[0] if self.dynamic_links and self.has_rational_form else None
+        return rational_form(
+            self.mechanism, self.filters, self.delay_s, frequency_hz, period_s, link
+        )

@@ -13,6 +13,7 @@ from functools import lru_cache, reduce
 
 import numpy as np
 
+from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.spanning import (
     GROUND,
@@ -22,12 +23,14 @@ from bayeshaptic.models.response.spanning import (
     spanning_trees,
     with_edge,
 )
-from bayeshaptic.numerics.polynomial import Polynomial, add
+from bayeshaptic.numerics.polynomial import Polynomial, add, multiply
 from bayeshaptic.types import Floats, Ints
 
 ADD, MULTIPLY = 0, 1
 _EDGE = 3  # coefficients: stiffness, damping, mass
 _WHOLE = (GROUND, GROUND)  # a node made one with itself: the network as it is
+Merge = Edge | tuple[Edge, Edge]
+"""Two nodes made one, or two such pairs."""
 Mass = tuple[int | None, int | None]
 """Two masses, or a mass and the ground (None)."""
 
@@ -103,6 +106,25 @@ def compliances(
     return numerators, denominator
 
 
+def transfer_with_link(mechanism: Mechanism, link: DynamicLink) -> tuple[Floats, Floats]:
+    """`transfer` with one more link whose law a/b is a ratio of polynomials.
+
+    A determinant is linear in the stiffness of a link, and what this multiplies is the network with
+    the link's ends made one: a sum over spanning trees again, without a subtraction.
+    """
+    assert link.ratio is not None
+    drive, ends = _ends(mechanism.drive), _ends((link.first, link.second))
+    both: tuple[Merge, ...] = () if set(drive) == set(ends) else ((drive, ends),)
+    top, bottom, more_bottom, *more_top = (
+        p.T for p in _trees(mechanism, (drive, _WHOLE, ends, *both))
+    )
+    above, below = link.ratio
+    top, bottom = multiply(below, top), multiply(below, bottom)
+    for more in more_top:  # none where the motor pushes on the link itself
+        top = add(top, multiply(above, more))
+    return top.T, add(bottom, multiply(above, more_bottom)).T
+
+
 def _parts(first: Edge, second: Edge) -> dict[Edge, float]:
     """Which nodes are made one for a compliance, and with which factor; see `Mechanism.mutual`."""
     (i, j), (k, m) = first, second
@@ -112,8 +134,8 @@ def _parts(first: Edge, second: Edge) -> dict[Edge, float]:
     return {pair: sign for pair, sign in signs.items() if pair[0] != pair[1]}
 
 
-def _trees(mechanism: Mechanism, merges: tuple[Edge, ...]) -> list[Floats]:
-    """The sum over the spanning trees with each pair of nodes made one, (B, degree + 1) each."""
+def _trees(mechanism: Mechanism, merges: tuple[Merge, ...]) -> list[Floats]:
+    """The sum over the spanning trees with nodes made one, (B, degree + 1) for each merge."""
     from bayeshaptic.models.response.kernels.transfer import run
 
     pairs = tuple((link.first, _node(link.second)) for link in mechanism.links)
@@ -132,7 +154,7 @@ def _trees(mechanism: Mechanism, merges: tuple[Edge, ...]) -> list[Floats]:
 
 
 @lru_cache(maxsize=256)
-def recorded(masses: int, links: tuple[Edge, ...], merges: tuple[Edge, ...]) -> Record:
+def recorded(masses: int, links: tuple[Edge, ...], merges: tuple[Merge, ...]) -> Record:
     """The record for an arrangement of masses and links, GROUND being one of the nodes."""
     ends = {(GROUND, mass): True for mass in range(masses)}
     for i, j in links:
@@ -142,7 +164,7 @@ def recorded(masses: int, links: tuple[Edge, ...], merges: tuple[Edge, ...]) -> 
     edges: Mapping[Edge, int] = {}
     for number, (i, j) in enumerate(ends):
         edges = with_edge(edges, i, j, number + 1, algebra)
-    wanted = [spanning_trees(merged(edges, pair, algebra), algebra) for pair in merges]
+    wanted = [spanning_trees(_merged(edges, merge, algebra), algebra) for merge in merges]
     steps = [(kind, out, a, b) for (kind, a, b), out in recorder.steps.items()]
     return Record(
         {pair: number for number, pair in enumerate(ends)},
@@ -150,6 +172,16 @@ def recorded(masses: int, links: tuple[Edge, ...], merges: tuple[Edge, ...]) -> 
         np.array(recorder.lengths),
         np.array(wanted),
     )
+
+
+def _merged(edges: Mapping[Edge, int], merge: Merge, algebra: Algebra[int]) -> Mapping[Edge, int]:
+    pairs = [pair for pair in merge if isinstance(pair, tuple)]
+    if not pairs:
+        return merged(edges, merge, algebra)  # type: ignore[arg-type]
+    first, second = pairs
+    if set(first) & set(second):
+        return merged(edges, tuple({*first, *second}), algebra)
+    return merged(merged(edges, first, algebra), second, algebra)
 
 
 def _ends(pair: Mass) -> Edge:
