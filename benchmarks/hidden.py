@@ -1,7 +1,7 @@
 """Does the limit hold where effects hide that no test can see?
 
-    python benchmarks/hidden.py [--recordings 400] [--seed 1] [--pairs] [--processes 2]
-        [--keep FOLDER]
+    python benchmarks/hidden.py [--recordings 400] [--seed 1] [--pairs] [--file with|without]
+        [--processes 2] [--keep FOLDER]
 
 Recordings of both devices, free and held, 10 and 30 s long, half of them without a device file,
 with effects drawn at random (`hidden_recordings.py`).  Printed beside the figures of the average
@@ -234,6 +234,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--pairs", action="store_true", help="two effects in every recording")
+    parser.add_argument("--file", choices=("with", "without"), help="only these of the recordings")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="folder for closed loops and outcomes")
     asked = parser.parse_args()
@@ -243,6 +244,7 @@ def main() -> None:
     outcomes = []
     with ProcessPoolExecutor(asked.processes) as pool:
         drawn = jobs(asked.recordings, asked.seed, asked.pairs)
+        drawn = [job for job in drawn if asked.file in (None, "with" if job.file else "without")]
         for number, outcome in enumerate(pool.map(partial(run, keep=keep), drawn), 1):
             outcomes.append(outcome)
             print(f"{number} {outcome.job.case} {outcome.job.effect}", end="\r", flush=True)

@@ -170,6 +170,30 @@ def test_two_recordings_rule_out_what_one_cannot(rigid: Posterior) -> None:
     assert one.nothing < found[0][1].nothing
 
 
+def test_a_study_tells_of_an_effect_what_the_recording_says_that_knows_most(
+    rigid: Posterior,
+) -> None:
+    """One that sees only what the others exclude knows nothing, and less than nothing of sizes."""
+    assert rigid.etfe is not None
+    prior = HiddenPrior(0.0, {"extra_delay": 0.1})
+    made = with_hidden(critical_stiffness(rigid), rigid, rigid.etfe, (), (), prior)
+    assert made is not None
+    fine = made[1]
+    coarse = [
+        replace(w, evidence=replace(w.evidence, size=1e4 * w.evidence.size), size=1e4 * w.size)
+        for w in fine.looked.weighed
+        if w.evidence is not None
+    ]
+    blunt = replace(
+        fine,
+        looked=replace(fine.looked, weighed=tuple(coarse)),
+        effects=tuple(replace(e, strength_q95=1e4 * e.strength_q95) for e in fine.effects),
+    )
+    (row,) = all_together([fine, blunt], [None] * 2)[1]
+    assert row.together is not None and row.together > 1e-3
+    assert 0 < row.strength_q95[1] <= 1.1 * row.strength_q95[0]
+
+
 def test_what_belongs_to_a_hand_or_a_configuration_is_not_shared(rigid: Posterior) -> None:
     assert rigid.etfe is not None
     prior = HiddenPrior(0.0, {"second_mode": 0.1, "extra_delay": 0.1})

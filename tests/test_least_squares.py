@@ -12,7 +12,7 @@ from linear_bench import LHIFAM_FREE, Device
 from bayeshaptic.inference.least_squares import _other_valleys, least_squares
 from bayeshaptic.models import LogNormal, free, grasped, rigid
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
-from bayeshaptic.numerics.truncated_normal import moments_above
+from bayeshaptic.numerics.truncated_normal import draw_above, moments_above
 from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -205,6 +205,29 @@ def test_moments_of_two_truncated_normals():
     draws = draws[np.all(draws > 0, axis=1)]
     assert found == pytest.approx(draws.mean(axis=0), abs=5 * draws.std() / np.sqrt(2000))
     assert spread == pytest.approx(np.cov(draws.T), rel=0.2)
+
+
+def test_a_wall_that_may_be_the_value_itself():
+    """Of two numbers whose sum is known, the smaller may be none."""
+    from scipy.stats import norm, truncnorm
+
+    rng = np.random.default_rng(1)
+    count, sd, spike = 20_000, 2.0, 3.0
+    small, large, sum_sd = -1.0, 30.0, 0.01  # their means, and the error of the sum
+    covariance = np.array([[sd**2, -(sd**2)], [-(sd**2), sd**2 + sum_sd**2]])
+    mean, every = np.tile([small, large], (count, 1)), np.tile(covariance, (count, 1, 1))
+    draws = draw_above(np.zeros(2), mean, every, rng, np.array([spike, 0.0]))
+    odds = spike * norm.pdf(small / sd) / norm.cdf(small / sd)
+    zero = odds / (1 + odds)
+    error = np.sqrt(zero * (1 - zero) / count)
+    assert np.mean(draws[:, 0] == 0.0) == pytest.approx(zero, abs=4 * error)
+    assert draws.min() == 0.0
+    left = draws.sum(axis=1) - small - large
+    assert left.mean() == pytest.approx(0.0, abs=4 * sum_sd / np.sqrt(count))
+    assert left.std() == pytest.approx(sum_sd, rel=0.03)
+    beside = draws[draws[:, 0] > 0, 0]
+    truth = truncnorm(-small / sd, np.inf, loc=small, scale=sd)
+    assert beside.mean() == pytest.approx(truth.mean(), abs=4 * truth.std() / np.sqrt(len(beside)))
 
 
 def test_valleys_where_several_starts_end_are_kept_beside_the_best():

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.stats import norm
 from toy_study import toy_model, toy_posterior
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.population.below import draw_below
 from bayeshaptic.inference.population.cavity import Cavity, cavity, described
-from bayeshaptic.inference.population.gaussian_likelihood import fit_quadratic
+from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, fit_quadratic
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.hyperparameters import LKJ, Unknowns
 from bayeshaptic.inference.population.infer import (
@@ -183,6 +187,52 @@ def test_against_sampling_everything_together() -> None:
     # 500 effective draws: an error of 0.045 sd of a mean, three times that for two chains.
     assert np.all(np.abs(fast.mean(axis=0) - slow.mean(axis=0)) < 0.2 * scale)
     np.testing.assert_allclose(fast.std(axis=0), scale, rtol=0.2)
+
+
+def test_a_damper_that_the_device_lacks_is_in_none_of_its_recordings() -> None:
+    rng = np.random.default_rng(8)
+    sd, count, draws = 0.3, 8, 4000
+    means = np.array([[0.0, 5.0, 1.0]]) + sd * rng.standard_normal((count, 3))
+    own = np.diag([sd**2] * 3)
+    own[0, 1] = own[1, 0] = -0.9 * sd**2  # a sum of dampers is known better than either
+    levels = Hierarchy(
+        [GaussianLikelihood(one, np.linalg.inv(own), own, 0.0) for one in means],
+        np.arange(count),
+        np.zeros(count, int),
+        np.array([2]),
+        np.array([0, 1]),
+        np.zeros(3),
+        np.full(3, 100.0),
+    )
+    phi = np.tile(levels.layout.guess(np.ones(1))[0], (draws, 1))
+    low, spike = np.array([0.0, 0.0, -np.inf]), np.array([3.0, 3.0, 0.0])
+    found = draw_below(levels, phi, low, rng, spike)
+    zero = found.beta[:, 1] == 0.0
+    seen, error = means[:, 0].mean(), sd / np.sqrt(count)
+    odds = 3.0 * norm.pdf(seen / error) / norm.cdf(seen / error)
+    # The spread between recordings, 0.15 %, adds next to nothing to the error.
+    assert zero.mean() == pytest.approx(odds / (1 + odds), abs=0.04)
+    assert np.all((found.recordings[:, :, 0] == 0.0) == zero[:, None])
+    assert not np.any(found.beta[:, 2] == 0.0)
+    # What a recording knows is the sum: the other damper has what this one has not.
+    whole = found.recordings[:, :, :2].sum(axis=2)
+    assert whole[zero].mean() == pytest.approx(whole[~zero].mean(), abs=0.02)
+
+
+def test_units_of_dampers_do_not_depend_on_how_wide_nobodys_knowledge_is() -> None:
+    model = toy_model("b1", "kh")
+    known = toy_posterior(model, study_coordinates(model).coordinate(model.values[None])[0],
+                          0.01 * np.eye(2), 3)  # fmt: skip
+    units = []
+    for scale in (0.1, 100.0):
+        wide = model.with_prior({"b1": bh.MaybeZero(scale)})
+        here = study_coordinates(wide, [replace(known, model=wide)] * 2)
+        units.append(here.scale[model.names.index("b1")])
+        assert prior_moments(wide, here)[1][model.names.index("b1")] * units[-1] == scale
+    assert units[0] == units[1]
+    assert units[0] == pytest.approx(
+        study_coordinates(model).scale[model.names.index("b1")], rel=0.1
+    )
 
 
 @pytest.fixture(scope="module")

@@ -79,6 +79,11 @@ def _near_zero(ratio: float, rise: float) -> tuple[float, Floats, Floats]:
     return float(below[-1]), factors, below / below[-1]
 
 
+def has_spike(prior: Prior) -> bool:
+    """Whether it believes in zero itself: a published zero, or nobody who knows."""
+    return isinstance(prior, MaybeZero) or (isinstance(prior, NearZero) and not prior.rise)
+
+
 @dataclass(frozen=True)
 class MaybeZero(Prior):
     """Half-normal of `scale`, or zero: a slab and a spike, for dampers that may not be there.

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bayeshaptic.inference.population.hierarchy import Hierarchy, inverse
+from bayeshaptic.inference.population.hierarchy import Conditionals, Hierarchy, inverse
 from bayeshaptic.inference.population.hyperparameters import Hyperparameters
 from bayeshaptic.numerics.truncated_normal import draw_above
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Bools, Floats
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,16 @@ class Below:
     recordings: Floats = field(repr=False)
 
 
-def draw_below(hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.Generator) -> Below:
+def draw_below(
+    hierarchy: Hierarchy,
+    phi: Floats,
+    walls: Floats,
+    rng: np.random.Generator,
+    spike: Floats | None = None,
+) -> Below:
     """One draw below each vector phi of shape (n, Q).
+
+    A damper that the device does not have is in none of the recordings of that configuration.
 
     Parameters
     ----------
@@ -41,10 +49,13 @@ def draw_below(hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.
     walls : ndarray, shape (D,)
         Lowest value of each coordinate of the mean; -inf where there is none.
     rng : numpy.random.Generator
+    spike : ndarray, shape (D,), optional
+        Standard deviations of what all recordings know that weigh as much as the wall itself does.
     """
+    spike = np.zeros(len(walls)) if spike is None else spike
     chunk = 256
     parts = [
-        _draw(hierarchy, phi[start : start + chunk], walls, rng)
+        _draw(hierarchy, phi[start : start + chunk], walls, rng, spike)
         for start in range(0, len(phi), chunk)
     ]
     beta, recordings = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -52,12 +63,12 @@ def draw_below(hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.
 
 
 def _draw(
-    hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.Generator
+    hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.Generator, spike: Floats
 ) -> tuple[Floats, Floats]:
     given = hierarchy.given(phi)
     order = np.concatenate([hierarchy.hand, *[hierarchy.device] * (int(hierarchy.place.max()) + 1)])
     low = (walls - hierarchy.prior_mean)[order]
-    beta = draw_above(low, given.beta, inverse(given.precision), rng)
+    beta = draw_above(low, given.beta, inverse(given.precision), rng, spike[order])
     people = given.draw_people(beta, rng)
     x = np.einsum("rip,bp->bri", hierarchy.design, beta)
     x[:, :, hierarchy.hand] += people[:, hierarchy.user]
@@ -68,4 +79,19 @@ def _draw(
     noise = np.einsum("rij,brj->bri", roots, rng.standard_normal(x.shape))
     off = np.einsum("brij,brj->bri", given.weight, hierarchy.mean - guess - noise)
     x = guess + given.spread[:, None, :] * off
+    if spike.any():
+        at_wall = np.einsum("rip,bp->bri", hierarchy.design, np.where(beta == low, 1.0, 0.0)) > 0
+        x = _at_walls(x, at_wall, walls - hierarchy.prior_mean, given)
     return beta + hierarchy.prior_mean[order], x + hierarchy.prior_mean
+
+
+def _at_walls(x: Floats, at_wall: Bools, low: Floats, given: Conditionals) -> Floats:
+    """Recordings with those coordinates at their walls, shape (B, R, D), the others given them."""
+    spread = given.spread[:, None, :]
+    left = -spread[..., None] * given.weight * spread[:, :, None, :]
+    left += spread[..., None] * np.eye(x.shape[2])  # covariance about the levels, (B, R, D, D)
+    for i in np.flatnonzero(at_wall.any(axis=(0, 1))):
+        gain = left[..., i] / left[..., i, i][..., None] * at_wall[..., i, None]
+        x = x + gain * (low[i] - x[..., i, None])
+        left = left - gain[..., None] * left[..., i, None, :]
+    return np.where(at_wall, low, x)

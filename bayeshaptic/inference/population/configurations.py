@@ -114,7 +114,7 @@ def infer_configurations(
             f"them; record at least {FEWEST}."
         )
     model = common_model(posteriors)
-    here = study_coordinates(model)
+    here = study_coordinates(model, posteriors)
     mean, sd = prior_moments(model, here)
     path = Trend(
         tuple(gaussian_likelihood(one, here) for one in posteriors),

@@ -24,7 +24,9 @@ from bayeshaptic.inference.population.reweighting import (
 from bayeshaptic.inference.population.sampler import sample_level
 from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.models import Model
+from bayeshaptic.models import HalfNormal, MaybeZero, Model
+from bayeshaptic.models.build import DAMPER_SCALE
+from bayeshaptic.models.prior_of_zero import SPIKE, has_spike
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.progress import told
 from bayeshaptic.threads import single_threaded
@@ -82,7 +84,8 @@ def infer_population(
     model = common_model(posteriors)
     if not any(name in HAND for name in model.names):
         raise InputError(f"the {model.name} model has no hand: give posteriors of held devices.")
-    here = study_coordinates(model)
+    here = study_coordinates(model, posteriors)
+    spike = np.array([SPIKE if has_spike(model.prior(name)) else 0.0 for name in model.names])
     hierarchy, names, spots = _hierarchy(posteriors, users, places or [None] * len(users), here)
     tune, again, run, first, last, rest = np.random.SeedSequence(seed).spawn(6)
     rng = np.random.default_rng(rest)
@@ -97,7 +100,7 @@ def infer_population(
     descriptions = 2  # rounds of describing recordings better, at most
     for own_seed in first.spawn(descriptions):
         phi = chains.thinned(some, rng)
-        better = redescribed(hierarchy, posteriors, users, phi, here, own_seed)
+        better = redescribed(hierarchy, posteriors, users, phi, here, spike, own_seed)
         if better is hierarchy:
             break
         hierarchy = better
@@ -106,7 +109,7 @@ def infer_population(
     chains = sample_level(hierarchy, run, chains)
     report(0.8, "population: users")
     phi, walkers = chains.in_order(DRAWS)
-    draws = draw_below(hierarchy, phi, here.low, rng)
+    draws = draw_below(hierarchy, phi, here.low, rng, spike)
     own = reweight(posteriors, users, hierarchy, draws, phi, here, last)
     draws = replace(draws, recordings=draws.recordings[:0])  # many, and no longer needed
     root = draws.level.correlation_root
@@ -129,12 +132,24 @@ def infer_population(
     )
 
 
-def study_coordinates(model: Model) -> Coordinates:
-    """Coordinates that recordings share: hands always as logarithms, the others by their priors."""
+def study_coordinates(model: Model, posteriors: Sequence[Posterior] = ()) -> Coordinates:
+    """Coordinates that recordings share: hands always as logarithms, the others by their priors.
+
+    Spreads of a device are shares of its parameters, of what is not a logarithm in units of its
+    prior's width.  The prior of dampers that may be zero is as wide as nobody knows of them: their
+    units are those of a device whose file gives what they are together, in the median of the
+    `posteriors`.
+    """
+    small = [name for name in model.names if isinstance(model.prior(name), MaybeZero)]
+    if small and posteriors:
+        columns = [model.names.index(name) for name in small]
+        whole = np.median([np.median(one.draws[:, columns].sum(axis=1)) for one in posteriors])
+        model = model.with_prior(dict.fromkeys(small, HalfNormal(DAMPER_SCALE * float(whole))))
     here = coordinates(model)
     hand = np.isin(model.names, HAND)
     low = np.where(hand, -np.inf, here.low)
-    return replace(here, log=here.log | hand, scale=np.where(hand, 1.0, here.scale), low=low)
+    scale = np.where(hand, 1.0, here.scale)
+    return replace(here, log=here.log | hand, scale=scale, low=low)
 
 
 def prior_moments(model: Model, here: Coordinates) -> tuple[Floats, Floats]:

@@ -110,16 +110,19 @@ def redescribed(
     users: Sequence[str],
     phi: Floats,
     here: Coordinates,
+    spike: Floats,
     seed: np.random.SeedSequence,
 ) -> Hierarchy:
     """The levels with a better description of each likelihood whose first one is poor.
 
     That is the Gaussian function which, with what the others say, has the moments of the exact
     distribution (one round of expectation propagation): near a wall, or on a ridge that is bent,
-    the model is not linear over the width of what is known.
+    the model is not linear over the width of what is known.  The likelihood goes on beyond a wall,
+    and so does its description: the wall is the device's, and counts once.
     """
     first, last = seed.spawn(2)
-    below = draw_below(hierarchy, phi, here.low, np.random.default_rng(first))
+    below = draw_below(hierarchy, phi, here.low, np.random.default_rng(first), spike)
+    here = replace(here, low=np.full(len(here.low), -np.inf))
     found, changed = list(hierarchy.likelihoods), False
     for r, own in enumerate(reweight(posteriors, users, hierarchy, below, phi, here, last)):
         if posteriors[r].windows is not None and own.how in (OWN, SAMPLED):
@@ -144,8 +147,10 @@ def _one(
     if posterior.windows is None or (first is not None and _enough(first, count)):
         return first or _alone(posterior, user, count)
     rest = cavity(hierarchy, r, phi, rng)
-    second = _from_own(posterior, user, rest, here, count, rng)
-    if _enough(second, count):
+    second = (
+        None if _cut_off(posterior, here) else _from_own(posterior, user, rest, here, count, rng)
+    )
+    if second is not None and _enough(second, count):
         return second
     third = _sampled(posterior, user, rest, here, count, rng, seed.spawn(1)[0])
     good = [one for one in (first, second, third) if one is not None and one.good]
@@ -194,6 +199,15 @@ def _from_own(
 def _own(posterior: Posterior, here: Coordinates, most: int) -> Floats:
     every = -(-len(posterior.draws) // most)
     return here.coordinate(posterior.draws[::every])
+
+
+def _cut_off(posterior: Posterior, here: Coordinates) -> bool:
+    """Whether its own draws end at a wall beyond which `here` goes on."""
+    x = _own(posterior, here, _FEW)
+    model = posterior.model
+    end = here.coordinate(np.array([model.prior(name).support[0] for name in model.names]))
+    leans = 3.0  # standard deviations
+    return bool(np.any((end > here.lowest) & (x.mean(axis=0) - end < leans * x.std(axis=0))))
 
 
 def _own_weight(posterior: Posterior, rest: Cavity, here: Coordinates, x: Floats) -> Floats:
