@@ -29,10 +29,14 @@ def lossy_stiffness(
     same loss factor everywhere, and stiffens a little with the frequency.
     """
     power = 2 / np.pi * np.arctan(loss_factor)
-    turn = np.exp(0.5j * np.pi * power)
-    turn = np.where(s.imag < 0, np.conj(turn), turn)
     size = stiffness * np.sqrt(1 + loss_factor**2)
-    return np.asarray(size * np.exp(power * (np.log(np.abs(s)) - np.log(rate))) * turn - stiffness)
+    grown = np.exp(power * (np.log(np.abs(s)) - np.log(rate))) * size
+    angle = 0.5 * np.pi * power
+    found = np.empty(grown.shape, complex)
+    np.multiply(grown, np.cos(angle), out=found.real)
+    found.real -= stiffness
+    np.multiply(grown, np.where(s.imag < 0, -1.0, 1.0) * np.sin(angle), out=found.imag)
+    return found
 
 
 def relaxing_spectrum(

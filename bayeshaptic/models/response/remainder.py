@@ -26,7 +26,7 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from bayeshaptic.models.response.dynamic_link import DynamicLink, Index, delayed
+from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
 from bayeshaptic.models.response.filter import Filter
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.sampled import fastest_pole, laurent, nodes_at
@@ -219,6 +219,8 @@ def sampled_remainder(
     remainder: Remainder, delay_s: Floats, frequency_hz: Floats, period_s: float
 ) -> Complexes:
     """Delta G at frequencies of shape (L,), with hold and delay; shape (B, L)."""
+    from bayeshaptic.models.response.kernels.remainder import hold_and_delay
+
     nodes = nodes_at(frequency_hz, period_s)
     omega = np.asarray(nodes.s.imag, float)
     theta = omega * period_s
@@ -240,11 +242,15 @@ def sampled_remainder(
             continue
         series = aliases(part, top, late, period_s, first)
         powers = chebyshev.chebvander(2 * theta / top - 1, _TERMS - 1)
-        total[:, rows] += powers @ series.coefficients
+        coefficients = np.ascontiguousarray(series.coefficients)
+        total[:, rows] += (powers @ coefficients.view(float)).view(complex)
         if first > 1:
             total[:, rows] += _shared_alias_sums(part, theta, late, period_s, 1, first - 1)
-    hold = nodes.hold[:, None] / period_s
-    return np.asarray((hold * delayed(s, delay_s) * total).T)
+    out = np.empty((len(delay_s), len(theta)), complex)
+    hold = np.ascontiguousarray(nodes.hold / period_s)
+    turns = np.ascontiguousarray(delay_s / period_s)
+    hold_and_delay(theta, _real(hold), turns, _real(np.ascontiguousarray(total)), _real(out))
+    return out
 
 
 def _real(values: Complexes) -> Floats:

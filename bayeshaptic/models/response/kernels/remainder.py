@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.compiled import kernel
+from bayeshaptic.numerics.cos_sin import cos_sin
 from bayeshaptic.types import Floats
 
 
@@ -65,3 +66,31 @@ def add_link(
             size = -1.0 / (below * below + below_j * below_j)
             out[line, b, 0] = size * (above * below + above_j * below_j)
             out[line, b, 1] = size * (above_j * below - above * below_j)
+
+
+@kernel
+def hold_and_delay(theta: Floats, hold: Floats, turns: Floats, total: Floats, out: Floats) -> None:
+    """`total` behind hold and delay.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (L,)
+        Angles w T.
+    hold : ndarray, shape (L, 2)
+    turns : ndarray, shape (B,)
+        Delay in periods.
+    total : ndarray, shape (L, B, 2)
+    out : ndarray, shape (B, L, 2)
+        Becomes the product.
+    """
+    c, s = np.empty(len(theta)), np.empty(len(theta))
+    for b in range(len(turns)):
+        if b == 0 or turns[b] != turns[b - 1]:
+            for line in range(len(theta)):
+                cosine, sine = cos_sin(theta[line] * turns[b])
+                c[line] = hold[line, 0] * cosine + hold[line, 1] * sine
+                s[line] = hold[line, 1] * cosine - hold[line, 0] * sine
+        for line in range(len(theta)):
+            re, im = total[line, b, 0], total[line, b, 1]
+            out[b, line, 0] = c[line] * re - s[line] * im
+            out[b, line, 1] = c[line] * im + s[line] * re
