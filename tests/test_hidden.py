@@ -13,7 +13,7 @@ from linear_bench import RIGID, Device
 from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average
 from bayeshaptic.diagnosis.hidden.average import average, looked_at
 from bayeshaptic.diagnosis.hidden.evidence import Evidence
-from bayeshaptic.diagnosis.hidden.forces import slope_of
+from bayeshaptic.diagnosis.hidden.forces import force_suspects, slope_of
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.regression import around
@@ -22,6 +22,8 @@ from bayeshaptic.diagnosis.hidden.sizes import sizes_of
 from bayeshaptic.diagnosis.hidden.suspects import ForceSaid, Suspect, linear_suspects
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed, weigh
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.residuals import residual
+from bayeshaptic.diagnosis.thresholds import two_sided
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference import least_squares, sample
@@ -255,6 +257,15 @@ def test_what_a_test_says_of_a_strength_is_its_likelihood() -> None:
     seen = ForceSaid(0.3, 0.1)
     strength = np.array([0.0, 0.3, 0.6])
     assert seen.log_likelihood(strength) == pytest.approx([0.0, 4.5, 0.0])
+
+
+def test_what_a_law_leaves_is_no_evidence_of_another_force() -> None:
+    model = build_model("rigid", "lhifam")
+    seen = residual.ForceSeen(0.3, 0.03, 1.0)
+    clean = residual.Test("sign(v)", "nonlinear", 10.0, two_sided(), None, "", seen)
+    after = replace(clean, threshold=5 * two_sided())
+    said = [force_suspects(model, [test], (), 1.0)[0].tested for test in (clean, after)]
+    assert [one.log_likelihood(np.array([0.3]))[0] for one in said if one] == pytest.approx([50, 2])
 
 
 def test_probabilities_of_a_study(tmp_path: Path) -> None:

@@ -16,8 +16,9 @@ from functools import cache
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.hidden.suspects import ForceSaid, Suspect
-from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.shapes import (
     COMMAND,
@@ -92,7 +93,7 @@ def force_suspects(
     force_rms : float
         Of the command: no hidden force is larger.
     """
-    seen = {test.name: test.force for test in tests if test.force is not None}
+    seen = {test.name: _said(test) for test in tests if test.force is not None}
     suspects: list[Suspect] = []
     looked: set[str] = set()
     least = 1e-3  # of a slope in units of force: an even force has none
@@ -106,7 +107,6 @@ def force_suspects(
         pulls = [(s, a) for s, a in zip(places, slopes, strict=True) if abs(a) > least]
         for shape, slope in pulls:
             force = seen[shape.name]
-            assert force is not None
             if not (force.sd > 0 and force.rms > 0):
                 continue
             power = _power_of(shape)
@@ -135,6 +135,17 @@ def force_suspects(
                 )
             )
     return tuple(suspects)
+
+
+def _said(test: Test) -> ForceSeen:
+    """What a test says of its force; where a law was taken off, no better than that law is.
+
+    A law is an approximation, and what it leaves raises the tests of other forces: their thresholds
+    are higher then, and what is below these tells of no second force.
+    """
+    assert test.force is not None
+    doubt = max(1.0, test.threshold / thresholds.two_sided())
+    return replace(test.force, sd=doubt * test.force.sd)
 
 
 def _power_of(shape: Shape) -> float:
