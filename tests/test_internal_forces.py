@@ -35,6 +35,13 @@ FORCES: tuple[tuple[str, dict[str, float], float, dict[str, float], Any], ...] =
         MOTOR,
     ),
     (
+        "rising_friction",
+        {"force": 0.8, "static": 0.32, "velocity": 0.02},
+        0.8,
+        {"lack_at_rest": 0.6, "rising_velocity": 0.02},
+        MOTOR,
+    ),
+    (
         "dahl_friction",
         {"force": 0.6, "stiffness": 1500.0},
         0.6,
@@ -47,6 +54,7 @@ FORCES: tuple[tuple[str, dict[str, float], float, dict[str, float], Any], ...] =
     ("actuator_saturation", {"limit": 5.0}, 5.0, {}, MOTOR),
 )
 OURS = {"hardening_connection": "hardening_spring"}
+BENCHS = {"rising_friction": "stribeck_friction"}  # with less at rest than in motion
 
 
 @cache
@@ -102,7 +110,7 @@ def test_added_motion_is_that_of_the_bench(
     place: Any,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with_force = recorded(LHIFAM.with_effect(name, **fields))
+    with_force = recorded(LHIFAM.with_effect(BENCHS.get(name, name), **fields))
     without = recorded(LHIFAM)
     etfe = estimate_etfe(with_force)
     model = build_model("free", "lhifam")

@@ -27,6 +27,7 @@ from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.effects.effect import Effect as BenchEffect
+from bayeshaptic.rig.effects.friction import StribeckFriction
 from bayeshaptic.stability import critical_stiffness
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -163,6 +164,14 @@ def best_of(effect: BenchEffect | str, raised: str) -> Trial:
     truth = 20 * np.log10(LHIFAM.true_critical_stiffness())
     assert limit_db(best.state) == pytest.approx(truth, abs=2.0)
     return best
+
+
+def test_friction_that_is_smaller_at_rest_is_sized(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Constant friction in its place is half as large, and the limit 5 dB too high."""
+    only(monkeypatch, "coulomb_friction", "rising_friction")
+    best = best_of(StribeckFriction(0.8, 0.3, 0.03), "sign(v)")
+    assert best.name == "rising_friction"
+    assert best.accepted.estimates["friction_force"].mean == pytest.approx(0.8, rel=0.1)
 
 
 def test_friction_on_the_other_mass_is_put_there() -> None:

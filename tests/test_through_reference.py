@@ -12,8 +12,10 @@ import pytest
 from bayeshaptic.diagnosis.begun import begin
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.errors import InputError
-from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.diagnosis.other_valley import other_valley
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.fit import summarise
+from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import join_recordings, read_recording, recording_from_arrays
@@ -21,9 +23,10 @@ from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import Feedback, has_feedback
 from bayeshaptic.recordings.followed import through_reference
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
 from bayeshaptic.recordings.signals.controller import followed
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
+from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
 
 SECONDS = 8.0
@@ -171,3 +174,25 @@ def test_one_mass_that_rubs_is_followed_in_time_although_its_reference_was_writt
     found = closed.analysis.posterior.summary()
     for name, truth in (("m", mass), ("b", bench.values["b"]), ("coulomb", 0.3 * force)):
         assert abs(found[name]["mean"] - truth) < 4 * found[name]["sd"], name
+
+
+def test_a_mode_among_few_windows_is_doubted_where_one_above_them_explains_as_much() -> None:
+    bench = Bench.from_device("phantom")
+    made = simulate(bench, WhiteNoise(0.05, 200.0, 0.7, 20.0), seed=2)
+    recording = recording_from_arrays(**made.signals, encoder_resolution=1e-5)
+    bare = build_model("free", None, bench.delay_s, 0.0, bench.period_s)
+    model = least_squares(bare, estimate_etfe(recording)).model  # whose priors are set
+    truth = np.array([max(bench.values[name], 1e-9) for name in model.names])
+
+    def doubts(etfe: Etfe, theta: Floats) -> tuple[Notice, ...]:
+        windows = compress(etfe, partial(model.response, truth))
+        fit = summarise(model, windows, polish(model, windows, theta))
+        limit = critical_stiffness(fit.model, fit.theta * np.linspace(0.99, 1.01, 50)[:, None])
+        return other_valley(fit, etfe, limit)
+
+    assert not doubts(estimate_etfe(recording), truth)  # with the mode itself among 80 windows
+    slow = estimate_etfe(recording, (1.0, 12.0))
+    inside = dict(zip(model.names, truth, strict=True))
+    inside |= {"kc": inside["m2"] * (2 * np.pi * 5.0) ** 2, "bc": 0.3 * inside["m2"] * 10 * np.pi}
+    found = doubts(slow, np.array([inside[name] for name in model.names]))
+    assert [notice.topic for notice in found] == ["valley"]

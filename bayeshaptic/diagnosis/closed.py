@@ -22,6 +22,7 @@ from bayeshaptic.diagnosis.feedback.explain import (
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.options import Options, options_from
+from bayeshaptic.diagnosis.other_valley import other_valley
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
@@ -170,6 +171,8 @@ def close_loop(
     limit, traced = with_rivals(analysis.limit, traced, chosen.seed)
     limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
     notices = analysis.notices + traced.notices
+    if state.etfe.through_reference:
+        notices += other_valley(state.fit, state.etfe, analysis.limit)
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
+from bayeshaptic.diagnosis.other_valley import VALLEY
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.effects.laws import tested, variables
+from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import estimate, percent, pure, quantity, rounded_down
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.loop.words import in_short
@@ -63,6 +66,11 @@ def headline(result: Result) -> Headline:
     """The recommendation of an analysis, or of what closing the loop returns."""
     analysis = result.analysis
     objections = _objections(analysis, result.closed.diagnosis if result.closed else None)
+    if result.closed and _rubs_otherwise(result.closed):
+        objections += (
+            "a force that goes with the velocity is left, which no law of friction explains, and "
+            "what the model takes for damping may be its part",
+        )
     if objections:
         return _untrusted(analysis, objections, result.closed)
     limit = analysis.limit
@@ -135,6 +143,13 @@ def _added(diagnosis: Any) -> tuple[str, ...]:
     return tuple(effect["name"] for effect in (diagnosis or {}).get("effects", ()))
 
 
+def _rubs_otherwise(closed: Closed) -> bool:
+    """Whether a force over the velocity stays unexplained: such a damping ends in small motions."""
+    left = {test.name for test in closed.traced.after if test.flagged}
+    over = variables(left & set(tested()))
+    return closed.verdict == "unexplained" and bool(over & {VELOCITY, LOAD_VELOCITY})
+
+
 def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
     """What is asked of a limit that was read through a controller's reference beyond the usual."""
     found = []
@@ -155,6 +170,8 @@ def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
             f"nothing moves the force above {quantity(analysis.etfe.band_hz[1], 'Hz')} but noise, "
             "and a vibration mode there may set a lower limit than that of one mass"
         )
+    if any(notice.topic == VALLEY for notice in analysis.notices):
+        found.append("a vibration mode elsewhere explains what the reference moves as well")
     low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
     if not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB):
         found.append("the recording leaves the limit open within more than a factor of two")

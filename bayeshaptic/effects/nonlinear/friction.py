@@ -132,6 +132,39 @@ def _stribeck(x, v, last, gain, before, step_s, constants):  # type: ignore[no-u
 
 
 @register
+class RisingFriction(NonlinearEffect):
+    """Dry friction that is smaller at rest than in motion, as of a seal or a film that shears.
+
+    Bound Fc (1 - lack exp(-(v/vs)^2)).
+    """
+
+    name = "rising_friction"
+    title = "dry friction that rises with velocity"
+    over = (VELOCITY,)
+    strength = ("friction_force", "force")
+    dimensions = {"lack_at_rest": "number", "rising_velocity": "velocity"}
+    tuned = ("lack_at_rest", "rising_velocity")
+    most = {"lack_at_rest": 1.0}
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        usual = float(motion[MOTOR].velocity.std())
+        return tuple(
+            cls(MOTOR, {"lack_at_rest": 0.7, "rising_velocity": share * usual})
+            for share in (0.2, 0.6)
+        )
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        shape = self.shape["lack_at_rest"], self.shape["rising_velocity"]
+        return Law(_stribeck, (strength, -shape[0], shape[1]))
+
+
+@register
 class DahlFriction(NonlinearEffect):
     """Dry friction that begins as a spring: F' = -s (v + |v| F / Fc) with s = Fc / distance.
 
