@@ -96,6 +96,10 @@ def test_unexplained_says_class_place_trials_widening_and_what_next(family: str)
     assert "was widened" in text
     assert "What to measure next" in text
     head = headline(closed)
+    if family == "nonlinear":  # over the velocity: damping that may be its part
+        assert head.status == "untrusted"
+        assert "no law of friction explains" in head.sentence
+        return
     assert head.status == "caution"
     assert "unexplained" in head.sentence
 
