@@ -22,22 +22,29 @@ def poles_and_residues(
     """
     parts = transfer(mechanism) if link is None else transfer_with_link(mechanism, link)
     top, bottom = (polynomial.T for polynomial in parts)
-    poles = [_eigenvalues(mechanism.state_matrix()) if link is None else _roots(bottom)]
-    poles += [roots(factor.denominator) for factor in filters]
-    p = moved_apart(np.concatenate(poles, axis=1))
+    p = moved_apart(poles_of(mechanism, bottom, filters, link))
     numerator, denominator = filtered(top, bottom, filters)
     return p, residues(numerator, denominator[-1], p)
 
 
-def _roots(bottom: Polynomial) -> Complexes:
-    """Relative to themselves; nan where a parameter is so far away that none are found."""
+def poles_of(
+    mechanism: Mechanism, bottom: Polynomial, filters: Filters, link: DynamicLink | None = None
+) -> Complexes:
+    """Poles, shape (B, n), of a mechanism with this denominator and of its filters.
+
+    By the denominator's roots, each relative to itself; eigenvalues where these do not settle.
+    """
     from bayeshaptic.numerics.polynomial_roots import find_roots
 
     own = np.empty((bottom.shape[1], len(bottom) - 1), complex)
     settled = np.empty(len(own), bool)
     find_roots(np.ascontiguousarray(bottom.T), own, settled)
-    own[~settled] = np.nan
-    return own
+    if not settled.all():
+        unsettled = np.flatnonzero(~settled)
+        own[unsettled] = np.nan
+        if link is None:
+            own[unsettled] = _eigenvalues(mechanism.rows(unsettled).state_matrix())
+    return np.concatenate([own, *(roots(factor.denominator) for factor in filters)], axis=1)
 
 
 def _eigenvalues(matrices: Floats) -> Complexes:

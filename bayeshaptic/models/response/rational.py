@@ -14,13 +14,13 @@ from functools import lru_cache
 import numpy as np
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink
-from bayeshaptic.models.response.filtered import Filters
+from bayeshaptic.models.response.filtered import Filters, filtered
 from bayeshaptic.models.response.kernels.arrays import RationalArrays
 from bayeshaptic.models.response.mechanism import Mechanism
-from bayeshaptic.models.response.poles import poles_and_residues
+from bayeshaptic.models.response.poles import poles_of
 from bayeshaptic.models.response.sampled import HIGH, ORDER, REACH, alias_tables
 from bayeshaptic.models.response.transfer import transfer, transfer_with_link
-from bayeshaptic.numerics.polynomial import roots
+from bayeshaptic.numerics.polynomial import Polynomial, roots
 from bayeshaptic.types import Complexes, Floats, Ints
 
 
@@ -61,7 +61,8 @@ def rational_form(
     from bayeshaptic.models.response.kernels.expansion import expand
 
     nodes = nodes_at(frequency_hz, period_s)
-    top, bottom = transfer(mechanism) if link is None else transfer_with_link(mechanism, link)
+    plain = transfer(mechanism) if link is None else transfer_with_link(mechanism, link)
+    top, bottom = plain
     turns = delay_s / period_s
     terms = PoleTerms(np.zeros(len(turns), int), np.zeros((len(turns), 0, 3, 2)))
     if filters:
@@ -80,8 +81,10 @@ def rational_form(
     bad = np.flatnonzero(~((fastest + nodes.reach) / (2 * np.pi) < REACH))
     if bad.size:
         own = tuple(factor.rows(bad) for factor in filters)
-        p, r = poles_and_residues(mechanism.rows(bad), own, link and link.rows(bad))
-        terms = terms.alone(bad, _closed_form(p * period_s, r * period_s, turns[bad]))
+        part = mechanism.rows(bad)
+        poles = poles_of(part, plain[1][bad].T, own, link and link.rows(bad))
+        whole = filtered(plain[0][bad].T, plain[1][bad].T, own)
+        terms = terms.alone(bad, _closed_form(*whole, poles, turns[bad], period_s))
     at, tables = (nodes.theta, nodes.hold, nodes.high), alias_tables()
     return RationalArrays(above, below, series, turns, terms.count, terms.table, *at, *tables)
 
@@ -169,12 +172,15 @@ def _together(polynomials: list[Floats], batch: int) -> tuple[Floats, Ints]:
     return out, lengths
 
 
-def _closed_form(p: Complexes, r: Complexes, turns: Floats) -> Floats:
-    """The table of poles and residues, (R, n), each times the period."""
+def _closed_form(
+    top: Polynomial, bottom: Polynomial, poles: Complexes, turns: Floats, period_s: float
+) -> Floats:
+    """The table of all poles, shape (R, n, 3, 2)."""
     from bayeshaptic.models.response.kernels.filters import close
 
-    table = np.empty((*p.shape, 3, 2))
-    close(np.ascontiguousarray(p), np.ascontiguousarray(r), turns, table)
+    table = np.empty((*poles.shape, 3, 2))
+    lead = np.ascontiguousarray(bottom[-1])
+    close(np.ascontiguousarray(top.T), lead, np.ascontiguousarray(poles), turns, period_s, table)
     return table
 
 

@@ -110,11 +110,34 @@ def _close(p: complex, r: complex, turns: float, out: Floats) -> None:
 
 
 @kernel
-def close(p: Complexes, r: Complexes, turns: Floats, out: Floats) -> None:
-    """The closed form of poles and residues, (R, n), both times the period; (R, n, 3, 2)."""
-    for row in range(len(p)):
-        for pole in range(p.shape[1]):
-            _close(p[row, pole], r[row, pole], turns[row], out[row, pole])
+def close(
+    top: Floats, lead: Floats, poles: Complexes, turns: Floats, period_s: float, out: Floats
+) -> None:
+    """The closed form of whole responses.
+
+    Parameters
+    ----------
+    top : ndarray, shape (R, m)
+        Numerators.
+    lead : ndarray, shape (R,)
+        Leading coefficients of the denominators.
+    poles : ndarray of complex, shape (R, n)
+    turns : ndarray, shape (R,)
+        Delay in periods.
+    out : ndarray, shape (R, n, 3, 2)
+        Becomes the table of the poles.
+    """
+    count = poles.shape[1]
+    q = np.empty(count, np.complex128)
+    for row in range(len(poles)):
+        _move_apart(poles[row], q)
+        for j in range(count):
+            gaps = complex(lead[row], 0.0)
+            for i in range(count):
+                if i != j:
+                    gaps *= q[j] - q[i]
+            part = _at(top[row], top.shape[1], q[j]) / gaps
+            _close(q[j] * period_s, part * period_s, turns[row], out[row, j])
 
 
 @kernel
