@@ -272,3 +272,15 @@ def test_the_continuous_approximation(structure):
     sinc = np.sinc(FREQUENCY * T)
     assert relative(approximation[low] * sinc[low], exact[low]) < 5e-3
     assert relative(approximation[~low], exact[~low]) > 0.1
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 1e-5, 1e-2])
+def test_poles_at_one_place_are_no_error(lag_s):
+    """Nothing holds it, and a mode is too fast for the series: two poles at zero, no number."""
+    one = np.ones(2)
+    links = (Link(0, 1, 0.1 * one, np.array([1e3, 1e9])), Link(0, None, 0 * one, 0 * one))
+    system = LinearSystem(Mechanism((one, one), links), 1e-3 * one)
+    if lag_s:
+        system = system.with_filter(one[None], np.stack([one, lag_s * one]))
+    found = system.sampled_response(FREQUENCY, T)
+    assert np.isfinite(found[0]).all() and not np.isfinite(found[1]).any()

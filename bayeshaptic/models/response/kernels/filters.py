@@ -50,6 +50,14 @@ def _at(c: Floats, count: int, s: complex) -> complex:
 
 
 @kernel(inline=True)
+def _over(a: complex, b: complex) -> complex:
+    """A quotient that is no number where the divisor is zero, and no error."""
+    size = 1.0 / (b.real * b.real + b.imag * b.imag)
+    real = (a.real * b.real + a.imag * b.imag) * size
+    return complex(real, (a.imag * b.real - a.real * b.imag) * size)
+
+
+@kernel(inline=True)
 def _move_apart(q: Complexes, out: Complexes) -> None:
     """As `numerics.partial_fractions.moved_apart`."""
     for i in range(len(q)):
@@ -91,7 +99,7 @@ def _expm1(x: complex) -> complex:
 
 @kernel(inline=True)
 def _phi(x: complex) -> complex:
-    return 1.0 + 0.5 * x if abs(x) < _TINY else _expm1(x) / x
+    return 1.0 + 0.5 * x if abs(x) < _TINY else _over(_expm1(x), x)
 
 
 @kernel(inline=True)
@@ -136,7 +144,7 @@ def close(
             for i in range(count):
                 if i != j:
                     gaps *= q[j] - q[i]
-            part = _at(top[row], top.shape[1], q[j]) / gaps
+            part = _over(_at(top[row], top.shape[1], q[j]), gaps)
             _close(q[j] * period_s, part * period_s, turns[row], out[row, j])
 
 
@@ -196,7 +204,7 @@ def part(
             for i in range(poles):
                 if i != j:
                     gaps *= q[j] - q[i]
-            parts[j] = _at(whole, above, q[j]) / gaps / _at(bottom[row], size, q[j])
+            parts[j] = _over(_over(_at(whole, above, q[j]), gaps), _at(bottom[row], size, q[j]))
             _close(q[j] * period_s, parts[j] * period_s, turns[row], terms[row, j])
         _add_up(q, parts, factor[below - 1], term, total)
         out_top[row] = 0.0
