@@ -30,9 +30,9 @@ def fit(name: str, chi_square: float, further: int = 0) -> Any:
     )
 
 
-def traced(name: str, verdict: str, chi_square: float, *sizes: int) -> Any:
+def traced(name: str, verdict: str, chi_square: float, *sizes: int, family: str = "linear") -> Any:
     """A loop that accepted effects with so many parameters each."""
-    effects = tuple(SimpleNamespace(title="effect", estimates={}) for _ in sizes)
+    effects = tuple(SimpleNamespace(title="effect", estimates={}, family=family) for _ in sizes)
     state = SimpleNamespace(fit=fit(name, chi_square, sum(sizes)), accepted=effects)
     return SimpleNamespace(verdict=verdict, state=state)
 
@@ -138,6 +138,19 @@ def test_what_a_chain_leaves_may_be_a_hand_that_hardly_holds(
     misfits, scores = {"free": 200.0, "chain-2": 1.0, "grasped": 1.0}, {"grasped": behind}
     name, seen = chosen_of(monkeypatch, "chain-2", misfits, found, scores=scores)
     assert (name, seen) == (best, ["chain-2", "grasped"] if best == "grasped" else ["chain-2"])
+
+
+@pytest.mark.parametrize(("family", "best"), [("nonlinear", "free"), ("linear", "grasped")])
+def test_strong_friction_makes_a_free_device_look_held(monkeypatch, family, best) -> None:
+    """A hand that fits was chosen before the friction was known; something is left of it."""
+    found = {
+        "grasped": traced("grasped", UNEXPLAINED, 1.0, 1, 3, family=family),
+        "free": traced("free", EXPLAINED, 1.0, 1, family="nonlinear"),
+    }
+    misfits = {"free": 9.0, "grasped": 1.0}
+    tried = ["grasped", "free"] if best == "free" else ["grasped"]
+    scores = {"free": 50.0}
+    assert chosen_of(monkeypatch, "grasped", misfits, found, scores=scores) == (best, tried)
 
 
 def test_of_base_models_that_explain_alike_the_one_with_fewest_effects(monkeypatch) -> None:

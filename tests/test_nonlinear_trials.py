@@ -16,10 +16,12 @@ from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
+from bayeshaptic.diagnosis.trials.force_fit import spread
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
@@ -93,6 +95,47 @@ def test_the_damping_that_hid_the_friction_is_given_back() -> None:
     # 0.5 N of friction over some 0.1 m/s act as several N s/m.
     assert damping[0] > truth + 1.0
     assert damping[1] == pytest.approx(truth, abs=0.15 * truth)
+
+
+def test_strong_friction_that_the_linear_model_took_for_a_damper_is_found() -> None:
+    """Six tenths of the force: the linear model's motion is so slow that friction looks faint.
+
+    A dead zone came first then, and a limit seven times too high.
+    """
+    state, trials = rubbed(2.4)
+    best = max(trials, key=lambda trial: trial.score)
+    truth, found = LHIFAM.true_critical_stiffness(), best.accepted
+    assert critical_stiffness(state.model, state.fit.theta).value > 4 * truth
+    assert found.estimates["friction_force"].mean == pytest.approx(2.4, rel=0.02)
+    limit = critical_stiffness(best.state.model, best.state.fit.theta).value
+    assert abs(np.log(limit / truth)) < 3 * found.limit_log_sd < 3
+
+
+def test_what_goes_with_a_friction_is_where_the_rest_fits_best() -> None:
+    """A little more of it, the linear parameters moved along: the fit is that much worse."""
+    state, trials = rubbed(0.5)
+    best = max(trials, key=lambda trial: trial.score)
+    recording = state.etfe.unbroken
+    assert recording is not None
+    bench = ForceBench(state, recording)
+    strength = best.accepted.estimates["friction_force"].mean
+    found = bench.point(CoulombFriction(MOTOR), strength, best.state.fit.theta, rounds=3)
+    covariance, along = spread(bench, found)
+    here, low, high = search_box(bench.model)
+    phi, sd = here.coordinate(found.theta[None]), np.sqrt(covariance[0, 0])
+
+    def gain(log: float, moved: bool) -> float:
+        theta = here.natural(np.clip(phi + log * moved * along.T, low, high))[0]
+        return bench.as_it_is(found.effect, strength * np.exp(log), theta).gain_fit
+
+    def fall(moved: bool) -> float:
+        """From four standard deviations to eight, either way."""
+        near, far = (sum(gain(s * n * sd, moved) for s in (-1, 1)) / 2 for n in (4, 8))
+        return near - far
+
+    # Half of the windows were fitted: half of (64 - 16) / 2; the slopes are good to some percent.
+    assert fall(moved=True) == pytest.approx(12.0, rel=0.25)
+    assert fall(moved=False) > 3 * fall(moved=True)
 
 
 def test_the_gain_is_on_windows_that_were_not_fitted() -> None:

@@ -15,9 +15,10 @@ from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.of_the_loop import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
-from bayeshaptic.inference.choose import information_criterion
+from bayeshaptic.inference.choose import Choice, ScoredFit, information_criterion
 from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.models import Model
+from bayeshaptic.numerics.spending import RATE, metered
 
 # Differences of BIC: evidence "not worth more than a bare mention", and "very strong" evidence
 # (R. E. Kass and A. E. Raftery, JASA 90, 1995).
@@ -68,9 +69,10 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
     """
     rivals, doubted = _rivals(begun), _hardly_worse(begun)
     share = _OWN if rivals or doubted else 1.0
-    own = trace(begun.etfe, begun.fit, options.report, share * options.budget_s)
-    if not rivals:
-        rivals = doubted if own.verdict == UNEXPLAINED else ()
+    with metered() as meter:
+        own = trace(begun.etfe, begun.fit, options.report, share * options.budget_s)
+    if not rivals and own.verdict == UNEXPLAINED:
+        rivals = doubted or _beside_a_force(begun, own)
     elif not own.state.accepted or _is_the_least(own, begun, rivals):
         rivals = ()
     if not rivals:
@@ -78,7 +80,7 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
     begins, found = {begun.fit.model.name: begun}, {begun.fit.model.name: own}
     for name in rivals:
         other = replace(begun, fit=begun.choice.candidates[name].fit)  # type: ignore[union-attr]
-        rest = (1 - share) * options.budget_s / len(rivals)
+        rest = (options.budget_s - meter.spent / RATE) / len(rivals)
         begins[name] = other
         found[name] = trace(other.etfe, other.fit, options.report, rest)
     noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
@@ -106,10 +108,31 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
     others = {name: one for name, one in choice.candidates.items() if name != "rigid"}
     if begun.fit.model.name == "rigid":
         return tuple(name for name in others if name != "chain-2")
-    there = [name for name, one in others.items() if one.held != chosen.held]
-    best = sorted(there, key=lambda name: others[name].score)[:1]
+    best = _best_other(choice, chosen)
     beside = ["free"] if begun.fit.model.name == "chain-2" and "free" in others else []
     return (*best, *beside)
+
+
+def _best_other(choice: Choice, chosen: ScoredFit) -> tuple[str, ...]:
+    """The best with a hand where the chosen one has none, and the other way round."""
+    there = [
+        (one.score, name)
+        for name, one in choice.candidates.items()
+        if one.held != chosen.held and name != "rigid"
+    ]
+    return tuple(name for _, name in sorted(there)[:1])
+
+
+def _beside_a_force(begun: Begun, own: Traced) -> tuple[str, ...]:
+    """The best other base model where a force was found that the choice did not know of.
+
+    Strong friction makes a free device look held: the choice was made on a motion that is not
+    linear.
+    """
+    choice = begun.choice
+    if choice is None or not any(one.family == "nonlinear" for one in own.state.accepted):
+        return ()
+    return _best_other(choice, choice.candidates[begun.fit.model.name])
 
 
 def _hardly_worse(begun: Begun) -> tuple[str, ...]:

@@ -13,12 +13,12 @@ import numpy as np
 
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_fit import fit_force
+from bayeshaptic.diagnosis.trials.force_fit import fit_force, spread
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
-from bayeshaptic.inference.fit import Fit, summarise
+from bayeshaptic.inference.fit import Fit, search_box, summarise
 from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.models.structures import GROUND_DAMPERS
@@ -131,9 +131,8 @@ def _search(
             points += beside
             continue
         firsts = effect.first_strengths(bench.model, theta, motion[effect.place])
-        points += _scan(bench, effect, firsts, theta)
-        if effect.signed:
-            points += _scan(bench, effect, -firsts, theta)
+        for strengths in (firsts, -firsts) if effect.signed else (firsts,):
+            points += _scan(bench, effect, strengths, theta, beyond=8)
     return max(points, key=lambda point: point.gain_fit)
 
 
@@ -148,15 +147,21 @@ def _damped(bench: ForceBench, theta: Floats) -> Floats:
 
 
 def _scan(
-    bench: ForceBench, effect: NonlinearEffect, strengths: Floats, theta: Floats
+    bench: ForceBench, effect: NonlinearEffect, strengths: Floats, theta: Floats, beyond: int = 0
 ) -> list[Point]:
-    """From faint to strong, until it is clearly too strong."""
+    """From faint to strong, until it is clearly too strong.
+
+    Where the strongest is still the best, up to `beyond` more, each three times the last: friction
+    that the linear model took for a damper leaves a motion from which it looks faint.
+    """
     points: list[Point] = []
     too_strong = 10.0  # drop of the log likelihood at which a scan stops
-    for strength in strengths:
+    further = strengths[-1] * 3.0 ** np.arange(1, beyond + 1)
+    for number, strength in enumerate([*strengths, *further]):
         start = points[-1].theta if points else theta
         points.append(bench.point(effect, float(strength), start))
-        if len(points) > 1 and points[-1].gain_fit < points[-2].gain_fit - too_strong:
+        gained = points[-1].gain_fit - points[-2].gain_fit if len(points) > 1 else np.inf
+        if gained < -too_strong or (number >= len(strengths) - 1 and not gained > 0):
             break
     return points
 
@@ -172,24 +177,19 @@ def _trial(bench: ForceBench, point: Point) -> Trial:
 
 
 def _spread(bench: ForceBench, point: Point) -> tuple[float, float]:
-    """Standard deviations of the strength, and of log K_CR because of it.
-
-    From the curvature of the profile, each side simulated and fitted anew.
-    """
-    step = 0.03
-    low, high = (
-        bench.point(point.effect, point.strength * factor, point.theta, rounds=2)
-        for factor in (1 - step, 1 + step)
-    )
-    drop = point.gain_fit - 0.5 * (low.gain_fit + high.gain_fit)
-    # Half of the windows were used: the whole recording has twice the information.
-    relative = step / np.sqrt(2 * 2 * max(drop, 1e-3))
+    """Standard deviations of the strength, and of log K_CR because of strength and shape."""
+    covariance, along = spread(bench, point)
     # Neither the law nor its shape is known better than this.
     law_sd = 0.03  # relative; how well a law and its shape are known at best
-    relative = float(np.clip(np.hypot(relative, law_sd), 0.0, 0.5))
-    limits = critical_stiffness(bench.model, np.stack([low.theta, high.theta])).samples
-    slope = abs(float(np.log(max(limits[1], 1e-9) / max(limits[0], 1e-9)))) / (2 * step)
-    return relative * abs(point.strength), min(slope * relative, 1.0)
+    covariance[0, 0] += law_sd**2
+    here, low, high = search_box(bench.model)
+    step = 1e-3
+    sides = here.coordinate(point.theta[None]) + step * np.concatenate([along.T, -along.T])
+    limits = critical_stiffness(bench.model, here.natural(np.clip(sides, low, high))).samples
+    more, less = np.log(np.maximum(limits, 1e-9)).reshape(2, -1)
+    slope = (more - less) / (2 * step)
+    relative = min(float(np.sqrt(covariance[0, 0])), 0.5)
+    return relative * abs(point.strength), min(float(np.sqrt(slope @ covariance @ slope)), 1.0)
 
 
 def _accepted(bench: ForceBench, point: Point, sd: float, limit_log_sd: float) -> Accepted:
