@@ -198,6 +198,12 @@ def test_unstable_by_itself():
     assert spectral_radius(system, T, np.array([1e-3])) > 1
 
 
+def test_a_delay_that_rounding_took_below_zero_is_none():
+    walls = np.array([10.0, 100.0])
+    none, below = (spectral_radius(rigid_system(0.5, 2.0, delay=d), T, walls) for d in (0, -1e-19))
+    np.testing.assert_allclose(below, none, rtol=1e-12)
+
+
 def test_undamped_mode_is_unstable_with_delay():
     assert find_crossings(rigid_system(1.0, 0.0, k=1e4, delay=1e-4), T).critical == 0
 

@@ -74,7 +74,8 @@ def _sampled_loop(system: LinearSystem, period_s: float) -> tuple[Floats, Floats
     """Matrix of the states and past forces, where u[k] enters, and how y[k] is read."""
     a, b, c = _state_space(system)
     batch, n = b.shape
-    whole = np.floor(system.delay_s / period_s).astype(int)
+    # What takes a whole delay away may leave less than nothing, by rounding.
+    whole = np.maximum(np.floor(system.delay_s / period_s), 0).astype(int)
     late = np.clip(system.delay_s - whole * period_s, 0.0, period_s)
     early = period_s - late
     step_early, force_early = _hold(a, b, early)
