@@ -108,7 +108,7 @@ class LinearSystem:
         """The exact sampled response at frequencies of shape (L,); shape (B, L)."""
         frequency_hz = np.asarray(frequency_hz, float)
         response = sampled_response(self.rational_form(frequency_hz, period_s))
-        if not self.has_rational_form:
+        if self.dynamic_links and not self.has_rational_form:
             remainder = self.remainder
             chunk = 64  # vectors at a time: the arrays of one chunk stay in the cache
             for start in range(0, self.batch, chunk):
