@@ -200,7 +200,9 @@ def _first_symbol(unit: str) -> tuple[str, str]:
 def _decimals(value: float, sd: float | None, digits: int, least: int) -> int:
     """Decimal places: two digits of `sd`, but at least `least` and at most nine of `value`."""
     if value == 0.0:
-        return 0 if not sd else max(1 - math.floor(math.log10(sd)), 0)
+        if sd is None or not 0.0 < sd < math.inf:
+            return 0
+        return max(1 - math.floor(math.log10(sd)), 0)
     # Of the rounded number: 0.09998 is written 0.100.
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if sd is None or not math.isfinite(sd) or sd <= 0.0:

@@ -87,6 +87,11 @@ def test_percentages_are_never_rounded_to_certainty() -> None:
     ]
 
 
+def test_a_zero_without_an_error_is_a_zero() -> None:
+    """A damper at its bound, in what a fit prints."""
+    assert scale(0.0, "N s/m").with_error(0.0, float("nan")) == "0"
+
+
 def test_a_row_has_one_scale() -> None:
     row = scale([950.0, 12_000.0], "N/m")
     assert [row.number(v, 30.0) for v in (950.0, 12_000.0)] == ["0.950", "12.000"]
