@@ -145,3 +145,9 @@ def test_one_and_two_roots_in_closed_form_are_as_exact_as_the_coefficients() -> 
         found = roots(c).T
         sizes = evaluate(np.abs(c), np.abs(found).astype(complex)).real
         assert np.all(np.abs(evaluate(c, found)) <= 1e-15 * sizes)
+
+
+def test_roots_of_what_is_no_number_are_none_and_warn_of_nothing():
+    found = roots(np.array([[np.nan, np.inf, 2.0], [1.0, np.inf, 3.0], [1.0, 1.0, 1.0]]))
+    assert not np.isfinite(found[:2]).all(axis=1).any()
+    np.testing.assert_allclose(np.sort(found[2].real), [-2.0, -1.0], rtol=1e-12)

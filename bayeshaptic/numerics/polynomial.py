@@ -56,10 +56,11 @@ def roots(polynomial: Polynomial) -> NDArray[np.complex128]:
 
 def _two_roots(c: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Roots of s^2 + b s + c, shape (B, 2), neither by a difference of nearly equal numbers."""
-    half = 0.5 * b
-    discriminant = half * half - c
-    root = np.sqrt(discriminant.astype(complex))
-    larger = -half - np.where(half < 0, -root, root)
-    some = np.where(larger == 0, 1.0, larger)
-    smaller = np.where(discriminant < 0, np.conj(larger), np.where(larger == 0, 0.0, c / some))
+    with np.errstate(all="ignore"):  # of a fit far off: no number, and no warning
+        half = 0.5 * b
+        discriminant = half * half - c
+        root = np.sqrt(discriminant.astype(complex))
+        larger = -half - np.where(half < 0, -root, root)
+        some = np.where(larger == 0, 1.0, larger)
+        smaller = np.where(discriminant < 0, np.conj(larger), np.where(larger == 0, 0.0, c / some))
     return np.stack([larger, smaller], axis=1)
