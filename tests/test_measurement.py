@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.clipped import clipped
+from bayeshaptic.diagnosis.samples.faults import faults
 from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
 from bayeshaptic.diagnosis.samples.prediction import as_recorded
 from bayeshaptic.diagnosis.samples.tones import find_tones
@@ -79,6 +81,15 @@ def test_coarse_counts_are_measured_and_nothing_is_changed() -> None:
     assert finding.estimates["resolution"].mean == pytest.approx(8 * COUNT, rel=1e-6)
     assert look.mended.encoder_resolution == pytest.approx(8 * COUNT, rel=1e-6)
     assert np.array_equal(look.mended.position, recording.position)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_motion_of_less_than_a_count_a_sample_has_lost_no_rows(seed: int) -> None:
+    """Jumps by a count were taken for rows that are missing, and what was put back for jitter."""
+    force = np.random.default_rng(seed).standard_normal(8000)
+    motion = lfilter(*butter(2, 0.04), force)
+    counts = np.round(0.1 * motion / np.std(np.diff(motion)))
+    assert faults(as_recorded(recording_from_arrays(force, counts, 1e-3))).lost == 0
 
 
 def test_a_mains_tone_is_sized_and_subtracted() -> None:

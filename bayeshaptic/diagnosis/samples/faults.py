@@ -115,9 +115,13 @@ def _look(samples: Samples, predictor: Predictor) -> _Look:
 
 
 def _suspects(samples: Samples, predictor: Predictor) -> NDArray[np.intp]:
-    """Badly predicted samples that follow no other one closely."""
+    """Samples predicted worse than rounding explains, that follow no other one closely.
+
+    A motion of less than a count a sample jumps by one now and then: as many spreads as a fault.
+    """
     errors = predictor.errors(samples.position, samples.recording.force)
-    bad = np.flatnonzero(np.abs(errors) > _ERRORS * predictor.spread)
+    rounding = 0.5 * samples.unit * np.sum(np.abs(predictor.past))
+    bad = np.flatnonzero(np.abs(errors) > max(_ERRORS * predictor.spread, rounding))
     bad = bad[(bad > predictor.order + 2) & (bad < len(errors) - max(_EQUATIONS) - 2)]
     apart = 12  # samples badly predicted closer to each other have one cause
     return bad[np.diff(bad, prepend=-apart) >= apart]

@@ -56,7 +56,7 @@ class Samples:
     @cached_property
     def unit(self) -> float:
         """What the recorded positions are multiples of, zero where they are of nothing."""
-        return increment_unit(self.recording.position) or 0.0
+        return increment_unit(self.recording.position[~self.missing]) or 0.0
 
     def without(self, wrong: Bools) -> Samples:
         """The same with more samples known to be wrong; itself where there are no more."""
