@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
-from bayeshaptic.diagnosis.residuals.drift import drift_tests
+from bayeshaptic.diagnosis.residuals.drift import drift_tests, halves_test
 from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
 from bayeshaptic.diagnosis.residuals.residual import (
     Test,
@@ -37,7 +37,7 @@ def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tupl
         What the samples showed, where they were looked at before.
     """
     if is_periodic(etfe):
-        return periodic_tests(fit)
+        return periodic_tests(fit, etfe)
     if etfe.through_reference:
         return (*frequency_tests(fit), *nonlinear_tests(fit, etfe))
     return (*model_tests(fit, etfe), *measurement_tests(fit, etfe, look))
@@ -53,10 +53,11 @@ def model_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     )
 
 
-def periodic_tests(fit: Fit) -> tuple[Test, ...]:
-    """The tests over frequency, and one of what changes from line to line.
+def periodic_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """The tests over frequency, of what changes from line to line, and of what changes in time.
 
-    No linear dynamics do that outside narrow resonances; harmonics that beat with each other do.
+    No linear dynamics change from line to line outside narrow resonances; harmonics that beat with
+    each other do.
     """
     columns, residual, _ = smooth_columns(fit)
     rest = float(residual @ residual - sum((columns.T @ residual) ** 2))
@@ -67,4 +68,4 @@ def periodic_tests(fit: Fit) -> tuple[Test, ...]:
         "deviations above noise, and repeats from period to period"
     )
     jagged = Test("line to line", "nonlinear", score, thresholds.normal(), None, text)
-    return (*frequency_tests(fit), jagged)
+    return (*frequency_tests(fit), jagged, *halves_test(etfe))

@@ -75,7 +75,8 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
         scatter = (
             "The noise is Gaussian: at each excited line it is what does not repeat from period to "
             "period, and its variance is integrated out. The device has settled in the periods "
-            "that were kept."
+            "that were kept; whether it changes from one to the next is tested where there are "
+            "four or more."
         )
     else:
         scatter = (

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.other_valley import VALLEY
+from bayeshaptic.diagnosis.residuals.drift import CHANGE
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import tested, variables
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
@@ -70,6 +71,11 @@ def headline(result: Result) -> Headline:
         objections += (
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part",
+        )
+    if result.closed and _changes_meanwhile(result.closed):
+        objections += (
+            "the last periods of the force show another device than the first ones, and what "
+            "changed is followed only where the force is random",
         )
     if objections:
         return _untrusted(analysis, objections, result.closed)
@@ -149,6 +155,11 @@ def _rubs_otherwise(closed: Closed) -> bool:
         return False
     left = {test.name for test in closed.traced.after if test.flagged}
     return bool(variables(left & set(tested())) & {VELOCITY, LOAD_VELOCITY})
+
+
+def _changes_meanwhile(closed: Closed) -> bool:
+    """Whether the response differs between the periods of the force."""
+    return any(test.flagged and test.name == CHANGE for test in closed.traced.after)
 
 
 def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:

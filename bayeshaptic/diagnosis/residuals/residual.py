@@ -172,6 +172,7 @@ def smooth_columns(fit: Fit) -> tuple[Floats, Floats, Floats]:
 
 def chi_square_score(value: float, freedom: int) -> float:
     """A chi-square value as a standard normal score."""
-    if value < 1400:
-        return float(-norm.ppf(chi2.sf(value, freedom)))
+    chance = chi2.sf(value, freedom)
+    if value < 1400 and chance < 1:
+        return float(-norm.ppf(chance))
     return float(np.sqrt(2 * value) - np.sqrt(2 * freedom - 1))
