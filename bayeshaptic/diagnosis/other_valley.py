@@ -2,7 +2,8 @@
 
 What a reference moves may be a few windows of slow motion.  A mode among them can follow their
 noise better than the device does, whose own mode lies above the band; draws around the one never
-see the other.
+see the other. Of 96 free devices in closed loop 57 are read through the reference; three are
+doubted for it, whose intervals all lay wholly above the truth.
 """
 
 from __future__ import annotations
@@ -44,7 +45,6 @@ def other_valley(fit: Fit, etfe: Etfe, limit: CriticalStiffness) -> tuple[Notice
     top, mass = etfe.band_hz[1], own["m1"] + own["m2"]
     least = fit.likelihood(theta[None])[0] - 0.5 * float(chi2.ppf(_CHANCE, model.size))
     low, high = (float(limit.quantile(p)) for p in (0.05, 0.95))
-    low, high = low * low / high, high * high / low  # as far beyond as it is wide
     for share in _LOADS:
         for factor in _ABOVE:
             between = share * (1 - share) * mass
