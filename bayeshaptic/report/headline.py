@@ -72,7 +72,7 @@ def headline(result: Result) -> Headline:
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part",
         )
-    if result.closed and _changes_meanwhile(result.closed):
+    if result.closed and CHANGE in _left(result.closed):
         objections += (
             "the last periods of the force show another device than the first ones, and what "
             "changed is followed only where the force is random",
@@ -149,17 +149,16 @@ def _added(diagnosis: Any) -> tuple[str, ...]:
     return tuple(effect["name"] for effect in (diagnosis or {}).get("effects", ()))
 
 
+def _left(closed: Closed) -> set[str]:
+    """Names of the tests that stay where something is unexplained."""
+    if closed.diagnosis["verdict"] != "unexplained":
+        return set()
+    return {test.name for test in closed.traced.after if test.flagged}
+
+
 def _rubs_otherwise(closed: Closed) -> bool:
     """Whether a force over the velocity stays unexplained: such a damping ends in small motions."""
-    if closed.diagnosis["verdict"] != "unexplained":
-        return False
-    left = {test.name for test in closed.traced.after if test.flagged}
-    return bool(variables(left & set(tested())) & {VELOCITY, LOAD_VELOCITY})
-
-
-def _changes_meanwhile(closed: Closed) -> bool:
-    """Whether the response differs between the periods of the force."""
-    return any(test.flagged and test.name == CHANGE for test in closed.traced.after)
+    return bool(variables(_left(closed) & set(tested())) & {VELOCITY, LOAD_VELOCITY})
 
 
 def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
