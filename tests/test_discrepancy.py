@@ -110,7 +110,7 @@ def test_a_law_that_leaves_what_would_pass_for_noise_is_not_quite_right_either()
     [(90.0, 45.0, 0.5), (90.0, 120.0, 1.0), (90.0, -np.inf, 0.0), (0.0, 5.0, 1.0)],
 )
 def test_what_is_left_is_a_share(before: float, after: float, share: float) -> None:
-    """Tests that have nothing to say after an effect give minus infinity: nothing is left."""
+    """A test far below its threshold is below zero after an effect: nothing is left."""
     traced = fake_closed("explained", "nonlinear").traced
     traced = replace(traced, before=_tests(before, "nonlinear"), after=_tests(after, "nonlinear"))
     assert share_left(traced, "nonlinear") == share

@@ -11,8 +11,8 @@ import pytest
 
 from bayeshaptic.diagnosis.begun import begin
 from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.feedback.other_valley import other_valley
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.diagnosis.other_valley import other_valley
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.least_squares import least_squares, polish

@@ -19,10 +19,10 @@ from bayeshaptic.diagnosis.feedback.explain import (
     left_alone,
     trace_force,
 )
+from bayeshaptic.diagnosis.feedback.other_valley import other_valley
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.options import Options, options_from
-from bayeshaptic.diagnosis.other_valley import other_valley
 from bayeshaptic.diagnosis.state import Accepted, held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
-from bayeshaptic.diagnosis.other_valley import VALLEY
+from bayeshaptic.diagnosis.feedback.other_valley import VALLEY
 from bayeshaptic.diagnosis.residuals.drift import CHANGE
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import tested, variables

@@ -36,8 +36,17 @@ def _against(v: Floats) -> Floats:
     return -np.sign(v)
 
 
+class _DryFriction(NonlinearEffect):
+    """A force against the motion: one mass has one, by whichever law."""
+
+    strength = ("friction_force", "force")
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
+
+
 @register
-class CoulombFriction(NonlinearEffect):
+class CoulombFriction(_DryFriction):
     """A force of constant size against the motion; it sticks where that holds the mass still."""
 
     name = "coulomb_friction"
@@ -48,7 +57,6 @@ class CoulombFriction(NonlinearEffect):
     )
     # Where it holds the mass most of the time, all that is left of it is noise.
     over = (VELOCITY, LOAD_VELOCITY, EXCESS_NOISE)
-    strength = ("friction_force", "force")
 
     @classmethod
     def candidates(
@@ -64,9 +72,6 @@ class CoulombFriction(NonlinearEffect):
         title = f"{cls.title} {{where}}"
         return (Shape("coulomb", title, VELOCITY, force, positive=True, jumps=True),)
 
-    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
-
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         return Law(_coulomb, (strength,))
 
@@ -78,7 +83,7 @@ def _coulomb(x, v, last, gain, before, step_s, constants):  # type: ignore[no-un
 
 
 @register
-class StribeckFriction(NonlinearEffect):
+class StribeckFriction(_DryFriction):
     """Dry friction that falls from a larger static value as the velocity grows.
 
     Bound Fc (1 + excess exp(-(v/vs)^2)); R. Stribeck, 1902.
@@ -87,7 +92,6 @@ class StribeckFriction(NonlinearEffect):
     name = "stribeck_friction"
     title = "dry friction that falls with velocity (Stribeck)"
     over = (VELOCITY,)
-    strength = ("friction_force", "force")
     dimensions = {"static_excess": "number", "stribeck_velocity": "velocity"}
     tuned = ("static_excess", "stribeck_velocity")
 
@@ -105,9 +109,6 @@ class StribeckFriction(NonlinearEffect):
     @classmethod
     def corrections(cls, usual: Usual) -> tuple[Shape, ...]:
         return tuple(_slow_friction(part, usual) for part in (0.03, 0.1, 0.3, 1.0))
-
-    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         shape = self.shape["static_excess"], self.shape["stribeck_velocity"]
@@ -132,7 +133,7 @@ def _stribeck(x, v, last, gain, before, step_s, constants):  # type: ignore[no-u
 
 
 @register
-class RisingFriction(NonlinearEffect):
+class RisingFriction(_DryFriction):
     """Dry friction that is smaller at rest than in motion, as of a seal or a film that shears.
 
     Bound Fc (1 - lack exp(-(v/vs)^2)).
@@ -141,7 +142,6 @@ class RisingFriction(NonlinearEffect):
     name = "rising_friction"
     title = "dry friction that rises with velocity"
     over = (VELOCITY,)
-    strength = ("friction_force", "force")
     dimensions = {"lack_at_rest": "number", "rising_velocity": "velocity"}
     tuned = ("lack_at_rest", "rising_velocity")
     most = {"lack_at_rest": 1.0}
@@ -156,16 +156,13 @@ class RisingFriction(NonlinearEffect):
             for share in (0.2, 0.6)
         )
 
-    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
-
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         shape = self.shape["lack_at_rest"], self.shape["rising_velocity"]
         return Law(_stribeck, (strength, -shape[0], shape[1]))
 
 
 @register
-class DahlFriction(NonlinearEffect):
+class DahlFriction(_DryFriction):
     """Dry friction that begins as a spring: F' = -s (v + |v| F / Fc) with s = Fc / distance.
 
     P. R. Dahl, "A solid friction model", Aerospace Corporation, TOR-0158, 1968.
@@ -175,7 +172,6 @@ class DahlFriction(NonlinearEffect):
     title = "dry friction that begins as a spring (Dahl)"
     # It may look like a spring, or like nothing but noise.
     over = (VELOCITY, POSITION, STRETCH, EXCESS_NOISE)
-    strength = ("friction_force", "force")
     dimensions = {"presliding_distance": "position"}
     tuned = ("presliding_distance",)
 
@@ -187,9 +183,6 @@ class DahlFriction(NonlinearEffect):
         return tuple(
             cls(MOTOR, {"presliding_distance": share * usual}) for share in (0.1, 0.3, 1.0, 3.0)
         )
-
-    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         return Law(_dahl, (strength, self.shape["presliding_distance"]))
