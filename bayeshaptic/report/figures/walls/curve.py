@@ -139,4 +139,5 @@ def _marks(axes: Axes, table: LimitTable, factor: float) -> None:
                 label=f"{rounded_down(stiffness, table.unit, low, high).text} at {percent(risk)}",
             )
     if axes.get_legend_handles_labels()[0]:
-        style.legend(axes, loc="upper left", handlelength=1.0)
+        # Where the risk has not risen yet, or is below the curve: that corner is free.
+        style.legend(axes, loc="lower right", handlelength=1.0)
