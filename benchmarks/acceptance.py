@@ -27,7 +27,7 @@ from blind_recordings import CASES, LISTED, SINGLE, cases_for
 from bayeshaptic.diagnosis import acceptance, thresholds
 from bayeshaptic.diagnosis.loop import trials_for
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.state import FIT, Trial, compared_errors, share
+from bayeshaptic.diagnosis.state import FIT, Trial, compared_errors, share, worth
 from bayeshaptic.diagnosis.trials.linear import sieve
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import BUDGET_S, RATE, metered
@@ -82,7 +82,11 @@ def decided(job: Job) -> dict[str, Decided]:
             for trial, errors in zip(trials, errors_of, strict=True)
             if trial.convincing and not any(map(acceptance.raises_error, *errors))
         ]
-        chosen = acceptance.choose(open_, lambda trial: acceptance.excess(left(trial)))
+        chosen = acceptance.choose(
+            open_,
+            lambda trial: acceptance.excess(left(trial)),
+            lambda trial: worth(trial.state.fit),
+        )
         if chosen is None:
             return Decided("", (), acceptance.verdict_of((), before)[0])
         ties = acceptance.with_ties(chosen, open_).accepted[-1].ties

@@ -72,8 +72,15 @@ def test_convincing(gain_fit: float, gain_choose: float, size: int, good: bool) 
         ([trial("a", 100), trial("b", 95)], {"a": 9.0, "b": 0.0}, "b"),
         # What is far behind is no rival, whatever it leaves.
         ([trial("a", 100), trial("b", 50)], {"a": 9.0, "b": 0.0}, "a"),
-        # Alike in all: the one with fewer parameters.
+        # Alike on what they were not fitted to: the one that is worth more on all windows.
         ([trial("a", 100, size=3), trial("b", 95, size=1)], {"a": 0.0, "b": 0.0}, "b"),
+        ([trial("b", 98, size=2), trial("a", 100, size=1)], {"a": 0.0, "b": 0.0}, "b"),
+        # Of laws of a force the one with fewer parameters.
+        (
+            [trial("a", 100, "nonlinear", size=1), trial("b", 99, "nonlinear", size=2)],
+            {"a": 0.0, "b": 0.0},
+            "a",
+        ),
         # Laws of a force may leave more by chance.
         (
             [trial("a", 100, "nonlinear"), trial("b", 92, "nonlinear")],
@@ -84,7 +91,7 @@ def test_convincing(gain_fit: float, gain_choose: float, size: int, good: bool) 
     ],
 )
 def test_choice(trials: list[Trial], left: dict[str, float], expected: str | None) -> None:
-    chosen = choose(trials, lambda trial: left[trial.name])
+    chosen = choose(trials, lambda trial: left[trial.name], lambda trial: ord(trial.name))
     assert (chosen.name if chosen else None) == expected
 
 

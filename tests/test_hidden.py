@@ -14,7 +14,7 @@ from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average
 from bayeshaptic.diagnosis.hidden.average import average, looked_at
 from bayeshaptic.diagnosis.hidden.evidence import Evidence
 from bayeshaptic.diagnosis.hidden.forces import force_suspects, slope_of
-from bayeshaptic.diagnosis.hidden.hidden import with_hidden
+from bayeshaptic.diagnosis.hidden.hidden import averaged, with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.regression import around
 from bayeshaptic.diagnosis.hidden.several import all_together
@@ -37,6 +37,7 @@ from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.stability.mixed import mixed
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +140,21 @@ def test_with_no_probability_the_limit_is_the_declared_one(rigid: Posterior) -> 
     tiny = with_hidden(limit, rigid, rigid.etfe, (), (), HiddenPrior(1e-9))
     assert tiny is not None
     assert np.array_equal(tiny[0].samples, limit.samples) and tiny[1].nothing > 0.999999
+
+
+def test_a_rival_does_not_hide_beside_itself(rigid: Posterior) -> None:
+    known = around(rigid, 200, np.random.default_rng(1))
+    right = np.linalg.svd(known.pull)[2]
+    looked = looked_at([weighed("extra_delay", 9.0, right[-1], -0.5)], known)
+    own = critical_stiffness(rigid)
+    rng = np.random.default_rng(2)
+    other = replace(own, samples=10 * own.samples)
+    limit = mixed(own, [other], [0.5], ["extra_delay"], rng)
+    found, hidden = averaged(limit, looked, HiddenPrior(0.5), rng)
+    moved = np.log(found.samples / limit.samples)
+    rival = limit.explained_by == 1
+    assert np.all(moved[rival] == 0) and np.mean(moved[~rival] == -0.5) > 0.99
+    assert hidden.effects[0].probability == pytest.approx(0.5, abs=0.01)
 
 
 def test_sizes_of_another_recording_are_read_off_its_evidence() -> None:

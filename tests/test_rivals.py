@@ -102,7 +102,7 @@ def test_a_mixture_has_the_draws_and_the_crossings_of_both(etfe: Etfe) -> None:
         samples=2 * low.samples,
         crossings=tuple(replace(c, label="another at 99 Hz") for c in low.crossings),
     )
-    both = mixed(low, [high], [0.3], rng)
+    both = mixed(low, [high], [0.3], ["another"], rng)
     between = 1.5 * float(np.median(low.samples))
     assert np.mean(both.samples > between) == pytest.approx(0.3, abs=0.001)
     assert [c.label for c in both.crossings][1] == "another at 99 Hz"

@@ -21,17 +21,22 @@ from bayeshaptic.stability.critical import critical_stiffness
 _OF_THE_DATA = {"nonlinear", "measurement", "time-varying"}  # families that change the recording
 
 
-def choose(trials: Sequence[Trial], left: Callable[[Trial], float]) -> Trial | None:
+def choose(
+    trials: Sequence[Trial], left: Callable[[Trial], float], worth: Callable[[Trial], float]
+) -> Trial | None:
     """The convincing trial that leaves least; of those that leave nothing, the best.
 
     A wrong effect can gain nearly as much as the right one and then need another to mend it: an
-    alternative is better than an addition.
+    alternative is better than an addition.  Of linear effects that do as well on windows that they
+    were not fitted to, that which is worth most on all windows.
 
     Parameters
     ----------
     trials : sequence of Trial
     left : callable
         How far the tests of a trial's state are over their thresholds, all together.
+    worth : callable
+        Of a linear trial, `bayeshaptic.diagnosis.state.worth` of its fit.
 
     Returns
     -------
@@ -47,6 +52,8 @@ def choose(trials: Sequence[Trial], left: Callable[[Trial], float]) -> Trial | N
     most = thresholds.LEAST * min(rests) + more
     best = [trial for trial, rest in zip(rivals, rests, strict=True) if rest <= most]
     close = [trial for trial in best if ties(best[0], trial)]
+    if best[0].accepted.family == "linear":
+        return max(close, key=worth)
     return min(close, key=lambda trial: (trial.size, -trial.score))
 
 

@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis import acceptance
 from bayeshaptic.diagnosis.battery import is_periodic
 from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.state import State, Trial, compared_errors
+from bayeshaptic.diagnosis.state import State, Trial, compared_errors, worth
 from bayeshaptic.diagnosis.traced import Candidate, Traced
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.inference.fit import Fit
@@ -151,7 +151,11 @@ class _Loop:
             return left[id(trial)]
 
         open_ = [t for t in trials if t.convincing and not _raises(state, t.state)]
-        chosen = acceptance.choose(open_, lambda trial: acceptance.excess(remaining(trial)))
+        chosen = acceptance.choose(
+            open_,
+            lambda trial: acceptance.excess(remaining(trial)),
+            lambda trial: worth(trial.state.fit),
+        )
         self.candidates += [
             Candidate(t.name, t.accepted.title, t.score, t is chosen, self.number)
             for t in sorted(trials, key=lambda trial: -trial.score)

@@ -160,6 +160,21 @@ class Trial:
         return thresholds.convincing(self.gain_fit, self.gain_choose, self.size)
 
 
+def worth(fit: Fit) -> float:
+    """Log likelihood on all windows, less half the log of their number a parameter of an effect.
+
+    G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
+    """
+    value = Likelihood(fit.model, fit.windows)(fit.theta[None])[0]
+    return float(value) - cost(fit)
+
+
+def cost(fit: Fit) -> float:
+    """What `worth` takes off for the parameters of effects."""
+    own = sum(len(effect.parameters) for effect in fit.model.effects)
+    return 0.5 * float(np.log(len(fit.windows.scatter))) * own
+
+
 def share(windows: Windows, parts: tuple[int, ...]) -> NDArray[np.bool_]:
     """Which windows belong to the given parts of every four."""
     return np.isin(np.arange(len(windows.scatter)) % 4, parts)

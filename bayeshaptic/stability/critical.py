@@ -46,6 +46,10 @@ class CriticalStiffness(Shown):
         Draws whose limit was checked by the spectral radius just below and above, and how many
         of them hold.
     notices : tuple of Notice
+    explanations : tuple of str
+        What else explains the recording, where draws of that are among these.
+    explained_by : ndarray of int, shape (n,), or None
+        0 where a draw is of the model itself, else one more than the index of its explanation.
     """
 
     samples: Floats = field(repr=False)
@@ -57,6 +61,8 @@ class CriticalStiffness(Shown):
     checked: int = 0
     confirmed: int = 0
     notices: tuple[Notice, ...] = ()
+    explanations: tuple[str, ...] = ()
+    explained_by: Ints | None = field(default=None, repr=False)
 
     @property
     def value(self) -> float:

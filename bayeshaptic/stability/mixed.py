@@ -16,6 +16,7 @@ def mixed(
     limit: CriticalStiffness,
     others: Sequence[CriticalStiffness],
     shares: Sequence[float],
+    names: Sequence[str],
     rng: np.random.Generator,
 ) -> CriticalStiffness:
     """`limit` with as many draws of the others in the place of its own as their shares say.
@@ -27,15 +28,18 @@ def mixed(
     others : sequence of CriticalStiffness
     shares : sequence of float
         Probabilities of the others; the rest is that of `limit`.
+    names : sequence of str
+        Of the others.
     rng : numpy.random.Generator
     """
     count = len(limit.samples)
     samples, frequency, group = limit.samples.copy(), limit.frequency_hz.copy(), limit.group.copy()
     crossings = list(limit.crossings)
-    places = rng.permutation(count)
+    explained_by, places = np.zeros(count, int), rng.permutation(count)
     edges = np.rint(count * np.concatenate([[0.0], np.cumsum(shares)])).astype(int)
-    for other, first, last in zip(others, edges[:-1], edges[1:], strict=True):
-        rows = places[first:last]
+    for which, (other, first) in enumerate(zip(others, edges[:-1], strict=True)):
+        rows = places[first : edges[which + 1]]
+        explained_by[rows] = which + 1
         drawn = rng.integers(len(other.samples), size=len(rows))
         samples[rows], frequency[rows] = other.samples[drawn], other.frequency_hz[drawn]
         group[rows] = _numbers(crossings, other)[other.group[drawn]]
@@ -46,7 +50,13 @@ def mixed(
     number[order] = np.arange(len(order))
     named = tuple(replace(crossings[i], probability=float(share[i])) for i in order)
     return replace(
-        limit, samples=samples, frequency_hz=frequency, crossings=named, group=number[group]
+        limit,
+        samples=samples,
+        frequency_hz=frequency,
+        crossings=named,
+        group=number[group],
+        explanations=tuple(names),
+        explained_by=explained_by,
     )
 
 

@@ -20,7 +20,7 @@ from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown, listed
 from bayeshaptic.stability.critical import CriticalStiffness
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Bools, Floats
 
 DRAWS = 400  # of the posterior that every effect is weighed with
 SENSITIVITY = (0.5, 2.0)  # factors on the prior probabilities
@@ -143,16 +143,42 @@ def averaged(
     prior : HiddenPrior
     rng : numpy.random.Generator
     """
-    own = average(looked, prior)
-    samples = limit.samples * np.exp(own.log_factors(len(limit.samples), rng))
+    own = _parts(limit, looked, prior)
+    samples = _moved(limit, own, rng)
     sensitivity = {}
     for factor in SENSITIVITY:
-        other = average(looked, prior.times(factor))
-        moved = limit.samples * np.exp(other.log_factors(len(limit.samples), rng))
+        moved = _moved(limit, _parts(limit, looked, prior.times(factor)), rng)
         levels = replace(limit, samples=moved).quantile([0.01, 0.05, 0.5, 0.95])
         sensitivity[factor] = tuple(float(level) for level in levels)
-    found = Hidden(limit, own.nothing, _effects(own, prior), prior, sensitivity, looked)
+    shares = np.array([np.mean(rows) for rows, _ in own])
+    nothing = float(shares @ [one.nothing for _, one in own])
+    present = shares @ [one.present for _, one in own]
+    found = Hidden(limit, nothing, _effects(looked, present, prior), prior, sensitivity, looked)
     return replace(limit, samples=samples), found
+
+
+def _parts(
+    limit: CriticalStiffness, looked: Looked, prior: HiddenPrior
+) -> list[tuple[Bools, Average]]:
+    """What hides beside each explanation, and the draws of the limit that are of it.
+
+    A rival of the accepted effect does not hide beside itself: without this it counts twice.
+    """
+    which = limit.explained_by
+    if which is None:
+        return [(np.ones(len(limit.samples), bool), average(looked, prior))]
+    priors = [prior, *(prior.without(name) for name in limit.explanations)]
+    return [(which == number, average(looked, own)) for number, own in enumerate(priors)]
+
+
+def _moved(
+    limit: CriticalStiffness, parts: Sequence[tuple[Bools, Average]], rng: np.random.Generator
+) -> Floats:
+    """Draws of the limit with what hides beside each."""
+    log = np.zeros(len(limit.samples))
+    for rows, own in parts:
+        log[rows] = own.log_factors(int(rows.sum()), rng)
+    return np.asarray(limit.samples * np.exp(log))
 
 
 def _weighed(
@@ -174,9 +200,9 @@ def _weighed(
     ]
 
 
-def _effects(average: Average, prior: HiddenPrior) -> tuple[HiddenEffect, ...]:
+def _effects(looked: Looked, present: Floats, prior: HiddenPrior) -> tuple[HiddenEffect, ...]:
     """One row an effect, its places together."""
-    present, rows, weighed = average.present, [], average.looked.weighed
+    rows, weighed = [], looked.weighed
     for name in dict.fromkeys(one.name for one in weighed):
         places = [i for i, one in enumerate(weighed) if one.name == name]
         share = present[places] / max(float(present[places].sum()), 1e-300)

@@ -50,6 +50,10 @@ class HiddenPrior:
         """The probability of the effect called `name`."""
         return float(self.named.get(name, self.each))
 
+    def without(self, name: str) -> HiddenPrior:
+        """With none for the effect called `name`."""
+        return HiddenPrior(self.each, {**self.named, name: 0.0})
+
     def times(self, factor: float) -> HiddenPrior:
         """With every probability multiplied, at most a half."""
         named = {name: min(factor * p, 0.5) for name, p in self.named.items()}

@@ -218,9 +218,7 @@ def _with_linear(
     crossings = tuple(
         replace(c, probability=float(np.mean(group == i))) for i, c in enumerate(limit.crossings)
     )
-    return replace(
-        limit, samples=samples, frequency_hz=places, group=group, crossings=crossings, chains=1
-    )
+    return CriticalStiffness(samples, places, limit.unit, crossings, group, notices=limit.notices)
 
 
 def _lowest_crossing(g: Complexes, frequency: Floats) -> tuple[Floats, Floats]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bayeshaptic.diagnosis.state import cost, worth
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.inference.coordinates import Coordinates, sampling_coordinates
 from bayeshaptic.inference.fit import Fit
@@ -79,7 +80,8 @@ def with_rivals(
     if found:
         names = [one.name for one in found]
         own = replace(own, probabilities=dict(zip(names, shares.tolist(), strict=True)))
-        limit = mixed(limit, [one.limit for one in found[1:]], shares[1:].tolist(), rng)
+        limits = [one.limit for one in found[1:]]
+        limit = mixed(limit, limits, shares[1:].tolist(), names[1:], rng)
     state = replace(traced.state, accepted=(*earlier, own))
     return limit, replace(traced, state=state)
 
@@ -99,7 +101,7 @@ def rivals(name: str, traced: Traced, rng: np.random.Generator) -> list[Rival] |
     here = traced.state.fit
     others = [t for t in traced.rejected if t.accepted.family == "linear"]
     fits = [here, *(t.state.fit for t in others)]
-    value = np.array([_penalised(fit, here.windows) for fit in fits])
+    value = np.array([worth(replace(fit, windows=here.windows)) for fit in fits])
     near = np.flatnonzero(value > value.max() - _NEAR)
     chosen = sorted({0, *near.tolist()})
     if len(chosen) < 2:
@@ -112,15 +114,6 @@ def rivals(name: str, traced: Traced, rng: np.random.Generator) -> list[Rival] |
 def _own(model: Model) -> list[str]:
     """Parameters of effects."""
     return [p.name for effect in model.effects for p in effect.parameters]
-
-
-def _cost(model: Model, windows: Windows) -> float:
-    return 0.5 * float(np.log(len(windows.scatter))) * len(_own(model))
-
-
-def _penalised(fit: Fit, windows: Windows) -> float:
-    value = Likelihood(fit.model, windows)(fit.theta[None])[0]
-    return float(value) - _cost(fit.model, windows)
 
 
 def _rival(name: str, fit: Fit, windows: Windows, rng: np.random.Generator) -> Rival | None:
@@ -139,7 +132,7 @@ def _rival(name: str, fit: Fit, windows: Windows, rng: np.random.Generator) -> R
     top = log_weight.max()
     evidence = float(top + np.log(np.mean(np.exp(log_weight - top)))) + _constant(here)
     phi = phi[systematic(np.exp(log_weight - top), kept, rng)]
-    evidence -= _taken(fit.model, here, phi) + _cost(fit.model, windows)
+    evidence -= _taken(fit.model, here, phi) + cost(replace(fit, windows=windows))
     return Rival(name, evidence, k, critical_stiffness(fit.model, here.natural(phi)))
 
 
