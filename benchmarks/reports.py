@@ -1,13 +1,14 @@
 """CPU time of whole reports beside an older version of the package, recording by recording.
 
-    python benchmarks/reports.py [--old PATH] [--old-limit S] [--count 60] [--seconds S] [-o FILE]
+    python benchmarks/reports.py [--old PATH] [--old-limit S] [--only new] [--count 60] [--seconds S]
+                                 [-o FILE]
 
 60 simulated recordings of 30 s, in an order that makes the first few like the rest: 14 clean, 30 of
 the effects that the library promises, 16 of pairs; every other one without a device file.  Each is
 analysed by `bayeshaptic report` of this version and of the checkout at PATH, one after the other;
 an older report that takes longer than its limit counts as that long, "at least".
 FILE (by default reports.jsonl) gets a line each, and what is in it already is not done again: the
-benchmark may be stopped, or given some SECONDS, and gone on with.
+benchmark may be stopped, or given some SECONDS, and gone on with; one version alone may be run.
 """
 
 from __future__ import annotations
@@ -90,11 +91,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--old", type=Path, help="a checkout of an older version")
     parser.add_argument("--old-limit", type=float, default=OLD_LIMIT_S, help="CPU s a report of it")
+    parser.add_argument("--only", choices=("new", "old"), help="this version alone")
     parser.add_argument("--count", type=int, default=60, help="so many recordings")
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin none after that")
     parser.add_argument("-o", "--output", type=Path, default=HERE / "reports.jsonl")
     asked = parser.parse_args()
     versions = {"new": HERE.parent} | ({"old": asked.old.resolve()} if asked.old else {})
+    versions = {name: at for name, at in versions.items() if asked.only in (None, name)}
     limits = {"new": MOST_S, "old": asked.old_limit}
     rows: dict[tuple[int, str], dict[str, Any]] = {}
     if asked.output.exists():

@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
 from bayeshaptic.inference import choose
 from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
 from bayeshaptic.models.hand import from_a_hand
+from bayeshaptic.numerics.spending import Meter
 
 SIZES = {"rigid": 2, "free": 6, "chain-2": 10, "grasped": 11}
 
@@ -32,7 +33,9 @@ def fit(name: str, chi_square: float, further: int = 0) -> Any:
 
 def traced(name: str, verdict: str, chi_square: float, *sizes: int, family: str = "linear") -> Any:
     """A loop that accepted effects with so many parameters each."""
-    effects = tuple(SimpleNamespace(title="effect", estimates={}, family=family) for _ in sizes)
+    effects = tuple(
+        SimpleNamespace(title="effect", estimates={}, family=family, size=size) for size in sizes
+    )
     state = SimpleNamespace(fit=fit(name, chi_square, sum(sizes)), accepted=effects)
     return SimpleNamespace(verdict=verdict, state=state)
 
@@ -46,17 +49,58 @@ def chosen_of(
     scores: dict[str, float] | None = None,
 ) -> tuple[str, list[str]]:
     """The base model in the end, and those that the loop was closed on."""
+    best, rounds = rounds_of(monkeypatch, chosen, misfits, loops, from_a_hand, scores)
+    return best, list(dict.fromkeys(rounds))
+
+
+def rounds_of(
+    monkeypatch: pytest.MonkeyPatch,
+    chosen: str,
+    misfits: dict[str, float],
+    loops: dict[str, Any],
+    from_a_hand: float = 0.0,
+    scores: dict[str, float] | None = None,
+) -> tuple[str, list[str]]:
+    """The base model in the end, and whose rounds the loop went through."""
     seen = []
 
     def deviance(of: Any, noise: float) -> tuple[float, float]:
         far = from_a_hand * of.model.held
         return 2 * np.sum(of.residual**2) / noise + far, far
 
-    def trace(etfe: Any, fitted: Any, *_: Any) -> Any:
-        seen.append(fitted.model.name)
-        return loops[fitted.model.name]
+    class Loop:
+        """One that takes as many rounds as it accepts effects, and one at least."""
 
-    monkeypatch.setattr(base_model, "trace", trace)
+        def __init__(self, etfe: Any, fitted: Any, budget_s: float, *_: Any) -> None:
+            self.end, self.rounds = loops[fitted.model.name], 0
+            self.meter = Meter(budget_s)
+            self.fitted, self.name = fitted, fitted.model.name
+
+        @property
+        def traced(self) -> Any:
+            verdict = self.end.verdict if self.done else UNEXPLAINED
+            return SimpleNamespace(verdict=verdict, state=self.end.state)
+
+        @property
+        def done(self) -> bool:
+            return self.rounds >= max(len(self.end.state.accepted), 1)
+
+        @property
+        def misfits(self) -> bool:
+            return not self.done or self.end.verdict == UNEXPLAINED
+
+        @property
+        def state(self) -> Any:
+            effects = self.end.state.accepted[: self.rounds]
+            size = self.fitted.model.size + sum(effect.size for effect in effects)
+            own = SimpleNamespace(model=SimpleNamespace(size=size))
+            return SimpleNamespace(fit=own, accepted=effects)
+
+        def go_on(self) -> None:
+            seen.append(self.name)
+            self.rounds += 1
+
+    monkeypatch.setattr(base_model, "Loop", Loop)
     monkeypatch.setattr(choose, "deviance", deviance)
     monkeypatch.setattr(base_model, "replace", lambda old, **new: _changed(old, new))
     fits = {name: fit(name, value) for name, value in misfits.items()}
@@ -162,6 +206,24 @@ def test_of_base_models_that_explain_alike_the_one_with_fewest_effects(monkeypat
     }
     misfits = {"free": 200.0, "chain-2": 50.0, "grasped": 51.0}
     assert chosen_of(monkeypatch, "chain-2", misfits, found)[0] == "grasped"
+
+
+def test_what_would_need_no_fewer_parameters_than_what_explains_is_given_up(monkeypatch) -> None:
+    """A chain that misfits is at 12 after a round, where a hand with one effect explains with 13.
+
+    A free device is at 8 after one round, and goes on.
+    """
+    found = {
+        "chain-2": traced("chain-2", EXPLAINED, 1.0, 1, 1),
+        "grasped": traced("grasped", EXPLAINED, 1.0, 1),
+        "free": traced("free", EXPLAINED, 1.0, 1, 1),
+    }
+    misfits = {"free": 200.0, "chain-2": 50.0, "grasped": 51.0}
+    best, rounds = rounds_of(monkeypatch, "chain-2", misfits, found)
+    assert (best, rounds) == ("free", ["chain-2", "grasped", "free", "free"])
+    found["free"] = traced("free", EXPLAINED, 1.0, 4, 1)
+    best, rounds = rounds_of(monkeypatch, "chain-2", misfits, found)
+    assert (best, rounds) == ("grasped", ["chain-2", "grasped", "free"])
 
 
 def test_beside_a_chain_that_misfits_a_mode_may_be_on_the_motor(monkeypatch) -> None:

@@ -8,17 +8,19 @@ compared with their effects.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from bayeshaptic.diagnosis.begun import Begun, Opened, refitted
-from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.diagnosis.loop import Loop
 from bayeshaptic.diagnosis.of_the_loop import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import Choice, ScoredFit, information_criterion
 from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.models import Model
-from bayeshaptic.numerics.spending import RATE, metered
+from bayeshaptic.numerics.spending import RATE
 
 # Differences of BIC: evidence "not worth more than a bare mention", and "very strong" evidence
 # (R. E. Kass and A. E. Raftery, JASA 90, 1995).
@@ -69,26 +71,104 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
     """
     rivals, doubted = _rivals(begun), _hardly_worse(begun)
     share = _OWN if rivals or doubted else 1.0
-    with metered() as meter:
-        own = trace(begun.etfe, begun.fit, options.report, share * options.budget_s)
-    if not rivals and own.verdict == UNEXPLAINED:
-        rivals = doubted or _beside_a_force(begun, own)
-    elif not own.state.accepted or _is_the_least(own, begun, rivals):
+    loops = _Loops(begun, options)
+    own = loops.begin(begun.fit.model.name, share * options.budget_s)
+    own.go_on()
+    while not (rivals or own.done):
+        own.go_on()
+    if not rivals and own.traced.verdict == UNEXPLAINED:
+        rivals = doubted or _beside_a_force(begun, own.traced)
+    elif own.done and (not own.state.accepted or _is_the_least(own.traced, begun, rivals)):
         rivals = ()
     if not rivals:
-        return begun, own
-    begins, found = {begun.fit.model.name: begun}, {begun.fit.model.name: own}
-    for name in rivals:
-        other = replace(begun, fit=begun.choice.candidates[name].fit)  # type: ignore[union-attr]
-        rest = (options.budget_s - meter.spent / RATE) / len(rivals)
-        begins[name] = other
-        found[name] = trace(other.etfe, other.fit, options.report, rest)
+        return begun, own.traced
+    loops.take_turns(rivals)
+    found = {name: loop.traced for name, loop in loops.running.items()}
     noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
     best = _best(found, noise)
-    fit = begins[best].fit
     assert begun.choice is not None
-    choice = replace(begun.choice, fit=fit, reason=begun.choice.reason + _said(best, found, noise))
-    return replace(begins[best], choice=choice), found[best]
+    fit = begun.choice.candidates[best].fit if best in rivals else begun.fit
+    said = _said(best, found, noise, loops.given_up)
+    choice = replace(begun.choice, fit=fit, reason=begun.choice.reason + said)
+    return replace(begun, fit=fit, choice=choice), found[best]
+
+
+class _Loops:
+    """The loops on all base models in question, a round of each at a time.
+
+    What explains with few parameters ends the search on what would need more.
+
+    Parameters
+    ----------
+    begun : Begun
+    options : Options
+
+    Attributes
+    ----------
+    running : mapping
+        Name of a base model to its loop; the one that was chosen first.
+    given_up : set of str
+    """
+
+    def __init__(self, begun: Begun, options: Options) -> None:
+        self._begun, self._options = begun, options
+        self.running: dict[str, Loop] = {}
+        self.given_up: set[str] = set()
+
+    def begin(self, name: str, budget_s: float) -> Loop:
+        """The loop on a base model, which has not gone anywhere yet."""
+        begun = self._begun
+        fit = begun.fit
+        if name != fit.model.name:
+            fit = begun.choice.candidates[name].fit  # type: ignore[union-attr]
+        self.running[name] = Loop(begun.etfe, fit, budget_s, self._options.report)
+        return self.running[name]
+
+    def take_turns(self, rivals: Sequence[str]) -> None:
+        """Go on with all of them, until each is done or given up.
+
+        The chosen one is a round ahead: the others come first.
+        """
+        ((chosen, own),) = self.running.items()
+        others = [self.begin(name, 0.0) for name in rivals]
+        order = (*rivals, chosen)
+        whole = self._options.budget_s * RATE
+        own_share = own.meter.limit
+        while open_ := [name for name in order if not self._ended(name)]:
+            for name in open_:
+                if self._needs_no_less(name):
+                    self.given_up.add(name)
+                    continue
+                for other in others:
+                    other.meter.limit = (whole - own.meter.spent) / len(others)
+                spent = sum(other.meter.spent for other in others)
+                own.meter.limit = min(own_share, whole - spent)
+                self.running[name].go_on()
+
+    def _ended(self, name: str) -> bool:
+        return self.running[name].done or name in self.given_up
+
+    def _needs_no_less(self, name: str) -> bool:
+        """Whether it would need as many parameters as what explains everything already has.
+
+        An effect counts as one parameter more: which one it is was chosen, too.
+        """
+        loop = self.running[name]
+        if not loop.misfits:
+            return False
+        explained = [
+            _parameters(other.state)
+            for other in self.running.values()
+            if other.done and other.traced.verdict != UNEXPLAINED
+        ]
+        least_effect = 2  # one parameter, and that it is this one
+        return any(_parameters(loop.state) + least_effect >= size for size in explained)
+
+
+def _parameters(state: State) -> int:
+    """Of the model, of the forces beside it, and one for the choice of each effect."""
+    beside = sum(len(effect.estimates) + 1 for effect in state.accepted)
+    return int(state.fit.model.size) + beside
 
 
 def _rivals(begun: Begun) -> tuple[str, ...]:
@@ -158,7 +238,7 @@ def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
     return simple and all(begun.fit.model.size < size for size in sizes)
 
 
-def _comparable(found: dict[str, Traced]) -> dict[str, Traced]:
+def _comparable(found: Mapping[str, Traced]) -> Mapping[str, Traced]:
     """What explains; where nothing does, all."""
     return {name: one for name, one in found.items() if one.verdict != UNEXPLAINED} or found
 
@@ -176,7 +256,7 @@ def _criterion(traced: Traced, noise: float) -> float:
     return information_criterion(traced.state.fit, noise, beside)
 
 
-def _said(best: str, found: dict[str, Traced], noise: float) -> str:
+def _said(best: str, found: Mapping[str, Traced], noise: float, given_up: Collection[str]) -> str:
     behind = {
         name: _criterion(traced, noise) - _criterion(found[best], noise)
         for name, traced in found.items()
@@ -186,7 +266,10 @@ def _said(best: str, found: dict[str, Traced], noise: float) -> str:
         effects = ", ".join(effect.title for effect in traced.state.accepted) or "no effect"
         side = "worse" if behind[name] > 0 else "lower"
         compared = "" if name == best else f", BIC {abs(behind[name]):,.0f} {side}"
-        words.append(f"{name} with {effects} ({traced.verdict}{compared})")
+        verdict = f"{traced.verdict}{compared}"
+        if name in given_up:
+            verdict = "given up: more would be no simpler than what explains"
+        words.append(f"{name} with {effects} ({verdict})")
     least = min(_comparable(found), key=lambda name: behind[name])
     most = "as much with fewer effects" if behind[least] < 0 else "the most"
     return f" With what each of them lacks, {best} explains {most}: {'; '.join(words)}."

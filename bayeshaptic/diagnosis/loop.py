@@ -6,7 +6,8 @@ that of a `Trials`; what is accepted is in `bayeshaptic.diagnosis.acceptance`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from functools import cached_property
 from typing import Protocol
 
 from bayeshaptic.diagnosis import acceptance
@@ -17,7 +18,7 @@ from bayeshaptic.diagnosis.state import State, Trial, compared_errors, worth
 from bayeshaptic.diagnosis.traced import Candidate, Traced
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.numerics.spending import BUDGET_S, RATE, Meter, metered
+from bayeshaptic.numerics.spending import BUDGET_S, RATE, Meter, counting
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Progress, Tick
 
@@ -80,69 +81,114 @@ def trace(
     -------
     Traced
     """
-    with metered(budget_s * RATE) as meter:
-        return _Loop(trials or trials_for(etfe, fit), meter, progress).run()
+    loop = Loop(etfe, fit, budget_s, progress, trials)
+    while not loop.done:
+        loop.go_on()
+    return loop.traced
 
 
-@dataclass
-class _Loop:
-    """The loop's own memory."""
+class Loop:
+    """The loop on one base model, a round at a time.
 
-    kind: Trials
-    meter: Meter
-    progress: Progress | None
-    seen: tuple[Test, ...] = ()
-    candidates: list[Candidate] = field(default_factory=list)
-    rejected: tuple[Trial, ...] = ()
-    path: list[State] = field(default_factory=list)
-    number: int = 0
-    told: int = 0  # the round that progress was told of last, and how many candidates of it
-    tried: int = 0
+    Parameters
+    ----------
+    etfe, fit, budget_s, progress, trials
+        Those of `trace`.
 
-    def run(self) -> Traced:
-        state = self.kind.first
-        before = self.seen = self.kind.tests(state)
-        self.path = [state]
-        state, tests = self._mended(state, before)
-        while any(test.flagged for test in tests):
-            self.number += 1
-            found = self._round(state, tests)
-            if found is None:
-                break
-            state, tests = self._mended(*found)
-        tests = acceptance.with_misfit(tests, state)
-        verdict, residual_class = acceptance.verdict_of(state.accepted, tests)
+    Attributes
+    ----------
+    meter : Meter
+        What it has cost, and may.
+    state : State
+        With what has been accepted so far.
+    done : bool
+        Nothing is left, or nothing convinces.
+    """
+
+    def __init__(
+        self,
+        etfe: Etfe,
+        fit: Fit,
+        budget_s: float,
+        progress: Progress | None = None,
+        trials: Trials | None = None,
+    ) -> None:
+        self.meter = Meter(budget_s * RATE)
+        self.state, self.done = State(etfe, fit), False
+        self._given, self._progress = trials, progress
+        self._path: list[State] = []
+        self._before: tuple[Test, ...] = ()
+        self._tests: tuple[Test, ...] = ()  # of what is left
+        self._seen: tuple[Test, ...] = ()
+        self._candidates: list[Candidate] = []
+        self._rejected: tuple[Trial, ...] = ()
+        self._number = 0
+        self._told, self._tried = 0, 0  # the round that was told of, how many candidates of it
+
+    def go_on(self) -> None:
+        """One more round."""
+        with counting(self.meter):
+            if not self._path:
+                self._begin()
+            if self.misfits:
+                self._number += 1
+                if self._round():
+                    self._mend()
+                else:
+                    self.done = True
+            self.done |= not self.misfits
+
+    @property
+    def misfits(self) -> bool:
+        """Whether something is left that an effect is wanted for."""
+        if not self._path:
+            return self.state.fit.misfits
+        return any(test.flagged for test in self._tests)
+
+    @property
+    def traced(self) -> Traced:
+        """What has been found so far."""
+        tests = acceptance.with_misfit(self._tests, self.state)
+        verdict, residual_class = acceptance.verdict_of(self.state.accepted, tests)
         return Traced(
             verdict,
             residual_class,
-            state,
-            before,
+            self.state,
+            self._before,
             tests,
-            tuple(self.candidates),
-            self.rejected,
-            tuple(self.path),
+            tuple(self._candidates),
+            self._rejected,
+            tuple(self._path),
             tuple(self.meter.skipped),
         )
 
-    def _mended(self, state: State, tests: tuple[Test, ...]) -> tuple[State, tuple[Test, ...]]:
+    @cached_property
+    def _kind(self) -> Trials:
+        return self._given or trials_for(self.state.etfe, self.state.fit)
+
+    def _begin(self) -> None:
+        self.state = self._kind.first
+        self._path = [self.state]
+        self._before = self._tests = self._seen = self._kind.tests(self.state)
+        self._mend()
+
+    def _mend(self) -> None:
         """With the samples mended, where that does not raise the held-out error.
 
         Tried again after every round: what the model lacked may have looked like a fault.
         """
-        mended = self.kind.mended(state)
-        if mended is state or _raises(state, mended):
-            return state, tests
-        new = mended.accepted[len(state.accepted) :]
-        self.candidates += [
-            Candidate(e.name, e.title, _statistic(e.name, tests), True, self.number) for e in new
+        mended = self._kind.mended(self.state)
+        if mended is self.state or _raises(self.state, mended):
+            return
+        self._candidates += [
+            Candidate(e.name, e.title, _statistic(e.name, self._tests), True, self._number)
+            for e in mended.accepted[len(self.state.accepted) :]
         ]
-        return self._accepted(mended, self._remaining(mended))
+        self._accept(mended, self._remaining(mended))
 
-    def _round(
-        self, state: State, tests: tuple[Test, ...]
-    ) -> tuple[State, tuple[Test, ...]] | None:
-        """The state with one more effect, and what is left; None where nothing convinces."""
-        trials = self.kind.trials(state, tests, self.meter, self._tick)
+    def _round(self) -> bool:
+        """Go on to one more effect, and what is left; False where nothing convinces."""
+        trials = self._kind.trials(self.state, self._tests, self.meter, self._tick)
         left: dict[int, tuple[Test, ...]] = {}
 
         def remaining(trial: Trial) -> tuple[Test, ...]:
@@ -150,45 +196,46 @@ class _Loop:
                 left[id(trial)] = self._remaining(trial.state)
             return left[id(trial)]
 
-        open_ = [t for t in trials if t.convincing and not _raises(state, t.state)]
+        open_ = [t for t in trials if t.convincing and not _raises(self.state, t.state)]
         chosen = acceptance.choose(
             open_,
             lambda trial: acceptance.excess(remaining(trial)),
             lambda trial: worth(trial.state.fit),
         )
-        self.candidates += [
-            Candidate(t.name, t.accepted.title, t.score, t is chosen, self.number)
+        self._candidates += [
+            Candidate(t.name, t.accepted.title, t.score, t is chosen, self._number)
             for t in sorted(trials, key=lambda trial: -trial.score)
         ]
-        self.rejected = tuple(trial for trial in open_ if trial is not chosen)
+        self._rejected = tuple(trial for trial in open_ if trial is not chosen)
         if chosen is None:
-            return None
+            return False
         found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
-        lighter, gone = self.kind.without_needless(found)
+        lighter, gone = self._kind.without_needless(found)
         if gone is not None:
             found, tests = lighter, self._remaining(lighter)
-            self.candidates = [
+            self._candidates = [
                 replace(c, taken_out=c.taken_out or (c.accepted and c.name == gone))
-                for c in self.candidates
+                for c in self._candidates
             ]
-        return self._accepted(found, tests)
+        self._accept(found, tests)
+        return True
 
-    def _accepted(self, state: State, tests: tuple[Test, ...]) -> tuple[State, tuple[Test, ...]]:
-        self.seen = (*self.seen, *tests)
-        self.path.append(state)
-        return state, tests
+    def _accept(self, state: State, tests: tuple[Test, ...]) -> None:
+        self._seen = (*self._seen, *tests)
+        self._path.append(state)
+        self.state, self._tests = state, tests
 
     def _remaining(self, state: State) -> tuple[Test, ...]:
-        return acceptance.remaining(self.kind.tests(state), state.accepted, self.seen)
+        return acceptance.remaining(self._kind.tests(state), state.accepted, self._seen)
 
     def _tick(self, what: str) -> None:
-        if self.progress:
+        if self._progress:
             # Each round is half of what is left, and each candidate a fifth of what is left of it:
             # nobody knows how many there will be.
-            self.tried = 1 if self.number != self.told else self.tried + 1
-            self.told = self.number
-            share = 1 - 0.5 ** (self.number - 1) * (1 - 0.5 * (1 - 0.8 ** (self.tried - 1)))
-            self.progress(share, f"round {self.number}: trying {what}")
+            self._tried = 1 if self._number != self._told else self._tried + 1
+            self._told = self._number
+            share = 1 - 0.5 ** (self._number - 1) * (1 - 0.5 * (1 - 0.8 ** (self._tried - 1)))
+            self._progress(share, f"round {self._number}: trying {what}")
 
 
 def _raises(before: State, after: State) -> bool:

@@ -55,12 +55,19 @@ def spend(evaluations: float) -> None:
 
 
 @contextmanager
-def metered(limit: float = float("inf")) -> Iterator[Meter]:
-    """Count what is spent inside; it counts for whoever counts around this, too."""
-    meter = Meter(limit)
-    token = _meter.set(meter)
+def counting(meter: Meter) -> Iterator[None]:
+    """Count what is spent inside with `meter`; it counts for whoever counts around this, too."""
+    token, before = _meter.set(meter), meter.spent
     try:
-        yield meter
+        yield
     finally:
         _meter.reset(token)
-        spend(meter.spent)
+        spend(meter.spent - before)
+
+
+@contextmanager
+def metered(limit: float = float("inf")) -> Iterator[Meter]:
+    """Count what is spent inside with a new meter."""
+    meter = Meter(limit)
+    with counting(meter):
+        yield meter
