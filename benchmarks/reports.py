@@ -1,7 +1,7 @@
 """CPU time of whole reports beside an older version of the package, recording by recording.
 
-    python benchmarks/reports.py [--old PATH] [--old-limit S] [--only new] [--count 60] [--seconds S]
-                                 [-o FILE]
+    python benchmarks/reports.py [--old PATH] [--old-limit S] [--only new] [--count 60]
+                                 [--seconds S] [-o FILE]
 
 60 simulated recordings of 30 s, in an order that makes the first few like the rest: 14 clean, 30 of
 the effects that the library promises, 16 of pairs; every other one without a device file.  Each is
