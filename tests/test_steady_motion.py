@@ -9,7 +9,6 @@ import bayeshaptic as bh
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
 from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Following, one_period
-from bayeshaptic.diagnosis.residuals.drift import halves_test
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, Multisine, simulate
 
@@ -62,22 +61,3 @@ def test_short_steps_have_not_arrived() -> None:
         force = following.toward({LOAD: sign * np.ones(4)})[LOAD]
     assert following.share < 1e-3 and abs(force[0]) < 1.1
     assert not following.arrived
-
-
-@pytest.mark.parametrize("held", [False, True])
-@pytest.mark.parametrize("drifts", [False, True])
-def test_a_change_between_the_periods_is_seen(held: bool, drifts: bool) -> None:
-    """Of a device that warms up the loop said "consistent", with a limit too high."""
-    bench = Bench.from_device("lhifam", held=held)
-    changed = bench.with_effect("gain_drift") if drifts else bench
-    made = simulate(changed, Multisine(bench.force_rms, 1.0, 150.0, 0.5, 10), seed=3)
-    recording = bh.recording_from_arrays(made.force, made.position, period_s=bench.period_s)
-    (test,) = halves_test(bh.estimate_etfe(recording))
-    assert test.family == "time-varying" and test.flagged == drifts
-
-
-def test_three_periods_do_not_tell_a_change() -> None:
-    bench = Bench.from_device("lhifam", held=True)
-    made = simulate(bench, Multisine(bench.force_rms, 1.0, 150.0, 0.5, 3), seed=3)
-    recording = bh.recording_from_arrays(made.force, made.position, period_s=bench.period_s)
-    assert halves_test(bh.estimate_etfe(recording)) == ()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
-from bayeshaptic.diagnosis.residuals.drift import drift_tests, halves_test
+from bayeshaptic.diagnosis.residuals.drift import drift_tests
 from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
+from bayeshaptic.diagnosis.residuals.periods import change_tests
 from bayeshaptic.diagnosis.residuals.residual import (
     Test,
     chi_square_score,
@@ -68,4 +69,4 @@ def periodic_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
         "deviations above noise, and repeats from period to period"
     )
     jagged = Test("line to line", "nonlinear", score, thresholds.normal(), None, text)
-    return (*frequency_tests(fit), jagged, *halves_test(etfe))
+    return (*frequency_tests(fit), jagged, *change_tests(fit, etfe))

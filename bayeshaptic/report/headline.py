@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.feedback.other_valley import VALLEY
-from bayeshaptic.diagnosis.residuals.drift import CHANGE
+from bayeshaptic.diagnosis.residuals.periods import CHANGES
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import tested, variables
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
@@ -72,10 +72,10 @@ def headline(result: Result) -> Headline:
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part",
         )
-    if result.closed and CHANGE in _left(result.closed):
+    if result.closed and _left(result.closed) & set(CHANGES):
         objections += (
-            "the last periods of the force show another device than the first ones, and what "
-            "changed is followed only where the force is random",
+            "the device is not the same from the first period of the force to the last, and what "
+            "changes is followed only where the force is random",
         )
     if objections:
         return _untrusted(analysis, objections, result.closed)
