@@ -267,6 +267,25 @@ def test_periodic_error_over_sd_has_unit_variance(chain, force, encoder, periods
     assert_unit_variance([np.concatenate(squares)[::share]], [np.concatenate(freedom)[::share]])
 
 
+@pytest.mark.parametrize("applied", [False, True])
+@pytest.mark.parametrize("periods", [2, 5])
+def test_noise_of_a_force_that_repeats_is_noise_of_the_response(periods, applied):
+    """Of the force's sensor, and of the amplifier, which the device answers to."""
+    device, squares, freedom = Device(LHIFAM_FREE), [], []
+    for seed in range(6):
+        rng = np.random.default_rng(100 + seed)
+        repeats = np.tile(multisine(rng, 2000, np.arange(2, 400)), periods)
+        noisy = repeats + 0.1 * repeats.std() * rng.standard_normal(len(repeats))
+        position = answer(device, noisy if applied else repeats, rng, 5e-7, 0.0)
+        etfe = estimate_etfe(Recording(noisy, position, device.period))
+        assert etfe.period_lines
+        error = etfe.value - device.response(etfe.frequency_hz)
+        squares.append(np.abs(error) ** 2 / etfe.variance)
+        freedom.append(etfe.spectra.freedom - 1)
+    share = 10 if periods == 2 else 4
+    assert_unit_variance([np.concatenate(squares)[::share]], [np.concatenate(freedom)[::share]])
+
+
 def test_transient_periods_are_dropped_and_said():
     """A mode with a time constant of 0.4 s rings through the first periods of 0.5 s."""
     chain = {"masses": [1.0], "ground": [(5.0, 4e3)], "links": []}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import chirp
 
-from bayeshaptic.recordings.signals.excitation import is_sweep
+from bayeshaptic.recordings.signals.excitation import find_repetition, is_sweep
 
 RNG = np.random.default_rng(5)
 T = 1e-3 * np.arange(20_000)
@@ -36,3 +36,16 @@ def test_one_tone_at_a_time_is_a_sweep(name: str) -> None:
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_forces_are_none(name: str) -> None:
     assert not is_sweep(OTHERS[name])
+
+
+def test_a_force_repeats_but_for_its_noise() -> None:
+    noise = RNG.standard_normal(len(T))
+    one = np.cos(2 * np.pi * np.outer(T, np.arange(1, 101) / 3) + RNG.uniform(0, 7, 100)).sum(1)
+    found = find_repetition(one + 0.1 * one.std() * noise)
+    assert found is not None and (found.period, found.noisy) == (3000, True)
+    assert find_repetition(one + 0.2 * one.std() * noise) is None
+    assert find_repetition(one + 0.1 * one.std() * noise, noise=0.0) is None
+
+
+def test_sweeps_of_a_part_of_a_sample_more_do_not_repeat() -> None:
+    assert find_repetition(chirp(T % 3.33333, 0.5, 3.33333, 200.0)) is None

@@ -104,7 +104,7 @@ def one_period(etfe: Etfe, witness: Floats | None = None) -> Period:
     stop = min(repetition.stop + 1, recording.samples)
     first = stop - spectra.periods * samples
     position = recording.position if witness is None else witness
-    force = recording.force[first : first + samples]
+    force = repetition.periods_of(recording.force, first, spectra.periods).mean(axis=0)
     excited = np.rint(spectra.frequency_hz * samples * recording.period_s).astype(int)
     overtones = 2.0  # harmonics of the motion up to so many times the highest excited one
     last = min(int(overtones * excited[-1]), (samples - 1) // 2)

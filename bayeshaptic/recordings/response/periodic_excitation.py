@@ -54,7 +54,7 @@ def estimate_periodic(
     force, position = _periods(recording, repetition)
     if len(position) < 2:
         return None
-    harmonics = excited_lines(force)
+    harmonics = excited_lines(force.mean(axis=0), _noise_of(force))
     frequency = harmonics / (repetition.period * recording.period_s)
     if band_hz is not None:
         inside = (frequency >= band_hz[0] * (1 - 1e-9)) & (frequency <= band_hz[1] * (1 + 1e-9))
@@ -62,7 +62,7 @@ def estimate_periodic(
     _check_count(recording, harmonics, band_hz)
     transient = transient_periods(position, harmonics)
     kept = position[transient:]
-    spectra = _spectra(recording, force, kept, harmonics)
+    spectra = _spectra(recording, force[transient:], kept, harmonics)
     if band_hz is None:
         spectra = _responding(spectra, recording)
     return spectra, points(spectra), _notices(recording, spectra, repetition, position, transient)
@@ -114,7 +114,7 @@ def transient_periods(position: NDArray[Any], harmonics: NDArray[np.int64]) -> i
 
 
 def _periods(recording: Recording, repetition: Repetition) -> tuple[NDArray[Any], NDArray[Any]]:
-    """One period of the force, shape (p,), and whole periods of the position, shape (M, p).
+    """Whole periods of the force and of the position, shapes (M, p).
 
     The position of a sample answers the forces before it: it may go on for one sample more.
     """
@@ -122,7 +122,7 @@ def _periods(recording: Recording, repetition: Repetition) -> tuple[NDArray[Any]
     stop = min(repetition.stop + 1, recording.samples)
     count = (stop - start) // period
     first = stop - count * period
-    force = recording.force[first : first + period]
+    force = repetition.periods_of(recording.force, first, count)
     return force, recording.position[first:stop].reshape(count, period)
 
 
@@ -146,10 +146,9 @@ def _spectra(
     harmonics: NDArray[np.int64],
 ) -> PeriodicSpectra:
     count, samples = position.shape
-    whole = position.ravel() - position.mean()
-    spectrum = np.fft.rfft(whole) / np.sqrt(whole.size)
+    drive, spectrum = _whole_spectrum(force), _whole_spectrum(position)
     line = harmonics * count
-    between = np.arange(1, (whole.size + 1) // 2)
+    between = np.arange(1, (position.size + 1) // 2)
     between = between[between % count != 0]
     width = int(np.clip(count - 1, FEWEST_BETWEEN, MOST_BETWEEN))
     if len(between) < width:
@@ -160,6 +159,10 @@ def _spectra(
     first = np.searchsorted(between, line) - width // 2
     near = between[np.clip(first, 0, len(between) - width)[:, None] + np.arange(width)]
     below, residual, leverage = _leakage(spectrum[near], near, line)
+    if np.any(drive[near]):  # what the force has there is answered, or is noise of its sensor
+        response = (spectrum[line] - below) / drive[line]
+        left = spectrum[near] - np.interp(near, line, response) * drive[near]
+        below, residual, leverage = _leakage(left, near, line)
     # Leakage is known from the lines between only: its error adds to the noise of the line.
     shrink = 1 / np.sqrt(1 + leverage)
     freedom = width - LEAKAGE_TERMS + 1
@@ -168,12 +171,36 @@ def _spectra(
     floor = rounding + (REPEATS_TO * np.abs(answer)) ** 2
     return PeriodicSpectra(
         frequency_hz=harmonics / (samples * recording.period_s),
-        force=np.fft.rfft(force)[harmonics] * np.sqrt(count / samples) * shrink,
+        force=drive[line] * shrink,
         position=answer,
         scatter=np.sum(np.abs(residual) ** 2, axis=1) + (freedom - 1) * floor,
         freedom=np.full(len(line), float(freedom)),
         periods=count,
     )
+
+
+def _whole_spectrum(periods: NDArray[Any]) -> NDArray[Any]:
+    """DFT of all periods; of those that are the same in every bit, exactly zero between lines."""
+    count, samples = periods.shape
+    if np.all(periods == periods[0]):
+        found = np.zeros(count * samples // 2 + 1, complex)
+        found[::count] = (np.fft.rfft(periods[0] - periods[0].mean()) * count)[
+            : len(found[::count])
+        ]
+    else:
+        found = np.fft.rfft(periods.ravel() - periods.mean())
+    return found / np.sqrt(periods.size)
+
+
+def _noise_of(force: NDArray[Any]) -> NDArray[Any] | float:
+    """Power of the noise in every line of the mean of periods (M, p), as its neighbours have it."""
+    if np.all(force == force[0]):
+        return 0.0
+    count = len(force)
+    apart = np.fft.rfft(force - force.mean(axis=0), axis=1)
+    power = np.sum(np.abs(apart) ** 2, axis=0) / (count * (count - 1))
+    width = min(FEWEST_BETWEEN + 1, len(power))
+    return np.convolve(power, np.ones(width) / width, mode="same")
 
 
 def _leakage(

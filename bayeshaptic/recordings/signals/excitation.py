@@ -13,25 +13,44 @@ from bayeshaptic.types import Floats
 EXCITED = 1e-5
 
 
+# Of a force that was measured, the share of its power that may be noise: a seventh of its size.
+NOISE = 0.02
+
+
 class Repetition(NamedTuple):
-    """The samples start:stop of a force repeat themselves every `period` samples."""
+    """The samples start:stop of a force repeat themselves every `period` samples, or all but."""
 
     start: int
     stop: int
     period: int
+    noisy: bool = False
+
+    def periods_of(self, force: NDArray[Any], first: int, count: int) -> NDArray[Any]:
+        """`count` periods of the force from a sample on, shape (count, p); all the same or noisy.
+
+        The sample after the last that repeats may be asked for: it is taken to repeat.
+        """
+        if self.noisy:
+            return force[first : first + count * self.period].reshape(count, self.period)
+        return np.broadcast_to(force[first : first + self.period], (count, self.period))
 
 
-def find_repetition(force: NDArray[Any], tolerance: float = 1e-3) -> Repetition | None:
+def find_repetition(
+    force: NDArray[Any], tolerance: float = 1e-3, noise: float = NOISE
+) -> Repetition | None:
     """Find where and with what period a force repeats itself.
 
     Candidates are the peaks of the autocorrelation; the shortest that repeats every sample over
     at least two periods and half of the record is taken. Something else may come first or last.
+    A force that was measured repeats itself but for its noise: then all of it must.
 
     Parameters
     ----------
     force : ndarray, shape (N,)
     tolerance : float
         Largest difference between repeated samples, in standard deviations of the force.
+    noise : float
+        Largest share of the power that may not repeat; 0 allows for none.
 
     Returns
     -------
@@ -42,14 +61,37 @@ def find_repetition(force: NDArray[Any], tolerance: float = 1e-3) -> Repetition 
     samples, sd = len(centred), centred.std()
     if sd == 0:
         return None
-    for period in _candidates(centred):
+    candidates = _candidates(centred)
+    for period in candidates:
         same = np.abs(centred[period:] - centred[:-period]) <= tolerance * sd
         start, run = _longest_run(same)
         stop = start + run + period
         enough = run >= period and stop - start >= samples / 2
         if enough and centred[start:stop].std() > 0.1 * sd:
             return Repetition(start, stop, int(period))
+    for period in candidates if noise > 0 else ():
+        count = samples // period
+        start = samples - count * period
+        if count < 2 or _between(centred[start:], count) > noise:
+            continue
+        if not _shifted(centred[start:], period):
+            return Repetition(start, samples, int(period), noisy=True)
     return None
+
+
+def _between(signal: NDArray[Any], periods: int) -> float:
+    """Share of the power of whole periods that does not repeat, as the lines between have it."""
+    power = np.abs(np.fft.rfft(signal - signal.mean())) ** 2
+    return (1 - float(power[::periods].sum() / power.sum())) * periods / (periods - 1)
+
+
+def _shifted(signal: NDArray[Any], period: int) -> bool:
+    """Whether what differs a period later is a part of a sample's shift: no noise, but a sweep.
+
+    Of 80 forces with noise none correlates by more than 0.08, of 63 sweeps none by less than 0.93.
+    """
+    apart, slope = signal[period:] - signal[:-period], np.gradient(signal)[period:]
+    return bool(abs(np.corrcoef(apart, slope)[0, 1]) > 0.5)
 
 
 def _candidates(centred: NDArray[Any], most: int = 200) -> NDArray[np.int64]:
@@ -78,21 +120,25 @@ def _longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
     return int(starts[longest]), int(lengths[longest])
 
 
-def excited_lines(period: NDArray[Any]) -> NDArray[np.int64]:
+def excited_lines(period: NDArray[Any], noise: NDArray[Any] | float = 0.0) -> NDArray[np.int64]:
     """Harmonics that one period of a force excites, below the Nyquist frequency.
 
     Parameters
     ----------
     period : ndarray, shape (p,)
+    noise : ndarray, shape (p // 2 + 1,), or float
+        Power of the noise in every line: what a line holds must be fifty times as much.
 
     Returns
     -------
     ndarray of int
         Harmonic numbers within 50 dB of the strongest.
     """
-    power = np.abs(np.fft.rfft(period - period.mean())) ** 2
-    power = power[: (len(period) + 1) // 2]
-    return np.flatnonzero(power > EXCITED * power.max())
+    beyond = 50.0  # times the noise, which then biases a response by a hundredth of its error
+    below = (len(period) + 1) // 2
+    power = (np.abs(np.fft.rfft(period - period.mean())) ** 2)[:below]
+    own = np.broadcast_to(noise, (len(period) // 2 + 1,))[:below]
+    return np.flatnonzero(power > np.maximum(EXCITED * power.max(), beyond * own))
 
 
 def is_sweep(force: Floats) -> bool:
