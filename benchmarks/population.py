@@ -1,13 +1,16 @@
 """Is what a study says of people true?  Simulated studies of people from a known population.
 
     python benchmarks/population.py [--studies 5] [--ess 500] [--first 1] [--device phantom ...]
-        [--known]
+        [--without-device] [--damper 0.05] [--keep FOLDER] [--known]
 
 Each study has 12 users, 30 s each, on the virtual bench; hands are drawn around the paper's Table
 I (PHANToM) or II (LHIfAM), with correlations, the device is the same for all.  Shown are how many
 population means lie in their 90 % intervals, how many of 40 further people have their critical
-stiffness in the predictive 90 % interval, how many have it below the stiffness of 1 % risk, and the
-time from 12 recordings to the critical stiffness of a new person, in one process.
+stiffness in the predictive 90 % interval, how many have it below the stiffness of 1 % risk, how
+many of a crowd of 4000 lie in that interval, how the users' own limits stand to theirs, and the
+time from 12 recordings to the critical stiffness of a new person, in one process.  With --damper
+the load's damper is that share of the tables' sum (the PHANToM-like device has none).  With --keep
+a run that was stopped goes on.
 
 With --known nothing is recorded: the hands of the same users are known exactly, and so is the
 device.  That is what twelve people by themselves say of others, by the same hierarchy and priors,
@@ -18,8 +21,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import pickle
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
@@ -32,6 +39,7 @@ from bayeshaptic.inference.population.below import draw_below  # noqa: E402
 from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood  # noqa: E402
 from bayeshaptic.inference.population.hierarchy import Hierarchy  # noqa: E402
 from bayeshaptic.inference.population.sampler import sample_level  # noqa: E402
+from bayeshaptic.models import build_model  # noqa: E402
 from bayeshaptic.rig import Bench, simulate  # noqa: E402
 from bayeshaptic.rig.recording import SimulatedRecording  # noqa: E402
 
@@ -41,6 +49,7 @@ CORRELATION = {
     ("mh", "kh"): 0.4, ("bh", "kh"): 0.5, ("bs", "ks"): 0.5, ("mh", "ks"): 0.2, ("mh", "bh"): 0.3
 }  # fmt: skip
 USERS, FURTHER, EACH = 12, 40, 1
+DRAWS = 4000  # of a user's own limit
 CROWD, KNOWN_DRAWS, KNOWN_STEPS = 4000, 4000, 300  # of what --known does
 
 
@@ -55,6 +64,13 @@ class Outcome:
         Which means and standard deviations of the population lie in their 90 % intervals.
     covered, below : float
         Share of further people in the predictive interval, and below the 1 % safe stiffness.
+    crowd : float
+        Share of `CROWD` further people in the predictive interval, by the model's own limits: forty
+        people know the coverage of one study to five points, a crowd knows it.
+    users : float
+        Share of the users whose critical stiffness lies in their own 90 % interval.
+    pull : float
+        Of the users' limits: mean of (mean - truth) / sd.
     true_db : (low, high)
         5 and 95 % quantiles of the further people's critical stiffness, dB.
     predicted_db : (low, high)
@@ -69,6 +85,9 @@ class Outcome:
     spreads: np.ndarray
     covered: float
     below: float
+    crowd: float
+    users: float
+    pull: float
     true_db: tuple[float, float]
     predicted_db: tuple[float, float]
     pareto_k: float
@@ -76,9 +95,14 @@ class Outcome:
     processor_s: float
 
 
-def people(device: str, seed: int, further: int = FURTHER) -> tuple[Bench, np.ndarray]:
+def people(
+    device: str, seed: int, further: int = FURTHER, damper: float | None = None
+) -> tuple[Bench, np.ndarray]:
     """The held bench, and the hands of the users and of further people: (USERS + further, 5)."""
     bench = Bench.from_device(device, held=True)
+    if damper is not None:
+        whole = bench.values["b1"] + bench.values["b2"]
+        bench = replace(bench, values=dict(bench.values) | {"b2": damper * whole})
     correlation = np.eye(len(HAND))
     for (one, other), value in CORRELATION.items():
         i, j = HAND.index(one), HAND.index(other)
@@ -94,23 +118,29 @@ def held_by(bench: Bench, hand: np.ndarray) -> Bench:
     return replace(bench, values=dict(bench.values) | dict(zip(HAND, hand.tolist(), strict=True)))
 
 
-def run(device: str, seed: int, ess: float) -> Outcome:
+def run(device: str, seed: int, ess: float, file: bool, damper: float | None) -> Outcome:
     """Simulate one study, analyse it, and compare it with the truth."""
-    bench, hands = people(device, seed)
+    bench, hands = people(device, seed, CROWD, damper)
     recordings = [
         simulate(held_by(bench, hand), seed=1000 * seed + number)
         for number, hand in enumerate(hands[:USERS])
     ]
-    truth = np.array([held_by(bench, hand).true_critical_stiffness() for hand in hands[USERS:]])
+    seen = hands[: USERS + FURTHER]
+    limits = np.array([held_by(bench, hand).true_critical_stiffness() for hand in seen])
+    truth = limits[USERS:]
+    told = {"device": device} if file else {"delay_s": bench.delay_s, "period_s": bench.period_s}
+    model = build_model("grasped", **told)
     began, processor = time.perf_counter(), time.process_time()
-    posteriors = [posterior(one, device, ess, seed) for one in recordings]
+    posteriors = [posterior(one, model, ess, seed) for one in recordings]
     between = time.perf_counter()
     population = bh.infer_population(posteriors, [str(n) for n in range(USERS)], seed=seed)
     draws = population.new_person(np.random.default_rng(seed), EACH)
     limit = replace(bh.critical_stiffness(population.model, draws), chains=population.walkers)
     seconds = (between - began, time.perf_counter() - between)
+    users, pull = own_limits(population, limits[:USERS])
     low, high = limit.quantile(np.array([0.05, 0.95]))
     safe = limit.safe(0.01)
+    crowd = np.exp(log_limits(population.model, held(population.model, bench, hands[USERS:])))
     middle = np.log([bench.values[name] for name in population.parameters])
     return Outcome(
         device,
@@ -118,6 +148,9 @@ def run(device: str, seed: int, ess: float) -> Outcome:
         inside(population.log_sd, np.full(len(HAND), LOG_SD[device])),
         float(np.mean((truth >= low) & (truth <= high))),
         float(np.mean(truth < safe)) if safe is not None else float("nan"),
+        float(np.mean((crowd >= low) & (crowd <= high))),
+        users,
+        pull,
         decibels(np.quantile(truth, [0.05, 0.95])),
         decibels(np.array([low, high])),
         max(one.pareto_k for one in population.recordings),
@@ -163,6 +196,9 @@ def run_known(device: str, seed: int, ess: float) -> Outcome:
         inside(draws.level.hand_sd, np.full(len(HAND), LOG_SD[device])),
         float(np.mean((truth >= low) & (truth <= high))),
         float(np.mean(truth < low1)),
+        float(np.mean((truth >= low) & (truth <= high))),
+        float("nan"),
+        float("nan"),
         decibels(np.quantile(truth, [0.05, 0.95])),
         decibels(np.array([low, high])),
         float("nan"),
@@ -178,12 +214,22 @@ def held(model: bh.Model, bench: Bench, hands: np.ndarray) -> np.ndarray:
     return vectors
 
 
-def posterior(recorded: SimulatedRecording, device: str, ess: float, seed: int) -> bh.Posterior:
+def posterior(recorded: SimulatedRecording, model: bh.Model, ess: float, seed: int) -> bh.Posterior:
     """The posterior of one recording, as `analyse` finds it."""
-    recording = bh.recording_from_arrays(**recorded.signals)
-    etfe = bh.estimate_etfe(recording)
-    model = bh.grasped(device=device)
-    return bh.sample(model, etfe, bh.least_squares(model, etfe, seed=seed), ess=ess, seed=seed)
+    etfe = bh.estimate_etfe(bh.recording_from_arrays(**recorded.signals))
+    fit = bh.least_squares(model, etfe, seed=seed)
+    return bh.sample(fit.model, etfe, fit, ess=ess, seed=seed)
+
+
+def own_limits(population: bh.Population, truth: np.ndarray) -> tuple[float, float]:
+    """How the limits of the users stand to their truths: share held, mean pull."""
+    samples = [
+        bh.critical_stiffness(population.model, one.draws[:DRAWS]).samples
+        for one in population.recordings
+    ]
+    low, high = np.quantile(samples, [0.05, 0.95], axis=1)
+    pull = (np.mean(samples, axis=1) - truth) / np.std(samples, axis=1)
+    return float(np.mean((low <= truth) & (truth <= high))), float(np.mean(pull))
 
 
 def inside(draws: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -210,10 +256,26 @@ def row(name: str, outcomes: list[Outcome]) -> str:
         f"{name:12s} {len(outcomes):3d}   {means:6.1%}  {spreads:6.1%}   "
         f"{np.mean([one.covered for one in outcomes]):6.1%}   "
         f"{np.mean([one.below for one in outcomes]):5.1%}   "
+        f"{np.mean([one.crowd for one in outcomes]):6.1%}  "
+        f"{np.mean([one.users for one in outcomes]):6.1%}  "
+        f"{np.mean([one.pull for one in outcomes]):+5.2f}   "
         f"{true[0]:.2f}..{true[1]:.2f}   {predicted[0]:.2f}..{predicted[1]:.2f}   "
         f"{max(one.pareto_k for one in outcomes):5.2f}   {seconds[0]:4.0f} + {seconds[1]:3.0f}"
         f"   {np.mean([one.processor_s for one in outcomes]):4.0f}"
     )
+
+
+def kept(folder: Path | None, study: Callable[[], Outcome], device: str, seed: int) -> Outcome:
+    """The outcome of a study: from the folder where it is there."""
+    if folder is None:
+        return study()
+    file = folder / f"{device}-{seed}.pickle"
+    if not file.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part")
+        part.write_bytes(pickle.dumps(study()))
+        part.replace(file)
+    return pickle.loads(file.read_bytes())
 
 
 def main() -> None:
@@ -222,18 +284,22 @@ def main() -> None:
     parser.add_argument("--ess", type=float, default=500, help="effective draws a recording")
     parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--device", nargs="+", default=["phantom", "lhifam"])
+    parser.add_argument("--without-device", action="store_true", help="the analysis has no file")
+    parser.add_argument("--damper", type=float, help="b2 as a share of the tables' b1 + b2")
+    parser.add_argument("--keep", type=Path, help="folder for the outcomes: goes on from there")
     parser.add_argument("--known", action="store_true", help="the users' hands, without recordings")
     asked = parser.parse_args()
-    study = run_known if asked.known else run
+    alike = partial(run, file=not asked.without_device, damper=asked.damper)
+    study = run_known if asked.known else alike
     print(
-        "study        n    means   spreads  K_CR 90 %  < 1 %   true 90 %, dB  predicted, dB"
-        "    worst k   seconds   processor",
+        "study        n    means   spreads  K_CR 90 %  < 1 %   crowd   users   pull   "
+        "true 90 %, dB  predicted, dB   worst k   seconds   processor",
         flush=True,
     )
     outcomes = []
     for seed in range(asked.first, asked.first + asked.studies):
         for device in asked.device:
-            outcomes.append(study(device, seed, asked.ess))
+            outcomes.append(kept(asked.keep, partial(study, device, seed, asked.ess), device, seed))
             print(row(f"{device} {seed}", outcomes[-1:]), flush=True)
     for device in asked.device:
         print(row(device, [one for one in outcomes if one.device == device]))

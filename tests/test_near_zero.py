@@ -285,12 +285,14 @@ def test_two_small_dampers_whose_sum_is_known_are_sampled_over_all_of_it():
     assert low < 0.01 and high > 0.23  # 0.04 and 0.15 in logarithms of each
 
 
-def test_zero_weighs_as_much_as_three_standard_deviations():
-    prior = bh.MaybeZero(2.0, 0.01)
+@pytest.mark.parametrize(
+    ("prior", "weight"), [(bh.MaybeZero(2.0, 0.01), 3), (bh.MaybeZero(2.0, 0.01, 1.5), 1.5)]
+)
+def test_zero_weighs_as_much_as_so_many_standard_deviations(prior, weight):
     near, far = np.array([0.0, *np.geomspace(1e-9, 0.002, 20_001)]), np.linspace(0.5, 0.53, 301)
     at_zero = np.trapezoid(np.exp(prior.log_density(near)), near)
     slab = np.exp(prior.log_density(0.03))
-    assert at_zero == pytest.approx(3 * 0.01 * slab + 0.002 * slab, rel=1e-2)
+    assert at_zero == pytest.approx(weight * 0.01 * slab + 0.002 * slab, rel=1e-2)
     shape = prior.log_density(far) - bh.HalfNormal(2.0).log_density(far)
     assert shape == pytest.approx(np.log1p(-prior.zero), abs=1e-9)
     assert np.all(bh.MaybeZero(2.0).log_density(far) == bh.HalfNormal(2.0).log_density(far))
@@ -305,3 +307,8 @@ def test_sampling_takes_what_is_seen_from_the_fit():
     assert prior.seen == pytest.approx(fit.sd[index], rel=0.3)
     own = fit.model.with_prior({"b1": bh.MaybeZero(1.0, 0.5)})
     assert resolved(replace(fit, model=own)).model.prior("b1").seen == 0.5
+
+
+def test_a_motor_is_less_likely_without_damping_than_what_it_moves():
+    _, fit, _ = without_file({**LIGHT, "b1": 0.1, "b2": 0.2}, 10.0)
+    assert [fit.model.prior(name).weight for name in ("b1", "b2")] == [1.5, 3.0]

@@ -33,6 +33,7 @@ PRIORS = [
     MaybeZero(2.5),
     MaybeZero(2.5, 0.1),
     MaybeZero(0.1, 0.5),
+    MaybeZero(2.5, 0.1, 1.5),
     Normal(200e-6, 20e-6),
     Normal(1.0, 2.0, low=0.0),
     Normal(-1.0, 0.5, low=0.0),  # all but cut off
@@ -187,6 +188,7 @@ def test_reach_of_a_fit_is_the_priors():
         ({"scale": 2}, HalfNormal(2.0)),
         ({"scale": 2, "floor": 1e-3}, NearZero(2.0, 1e-3)),
         ({"scale": 2, "seen": 1e-3}, MaybeZero(2.0, 1e-3)),
+        ({"scale": 2, "seen": 1e-3, "weight": 1}, MaybeZero(2.0, 1e-3, 1.0)),
         ({"scale": 2, "floor": 1e-3, "rise": 0.5}, NearZero(2.0, 1e-3, 0.5)),
         ({"mean": 1.0, "sd": 0.1}, Normal(1.0, 0.1)),
         ({"mean": 1.0, "sd": 0.1, "low": 0}, Normal(1.0, 0.1, 0.0)),
@@ -224,6 +226,7 @@ def test_bad_tables_name_the_parameter(table):
         (HalfNormal, (-1.0,)),
         (MaybeZero, (0.0,)),
         (MaybeZero, (1.0, 0.0)),
+        (MaybeZero, (1.0, 0.1, 0.0)),
         (NearZero, (1.0, 0.0)),
         (NearZero, (1.0, 2.0)),
         (NearZero, (1.0, 1e-3, 1.0)),

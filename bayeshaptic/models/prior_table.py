@@ -21,6 +21,7 @@ _FORMS: dict[frozenset[str], type] = {
     frozenset({"scale", "floor"}): NearZero,
     frozenset({"scale", "floor", "rise"}): NearZero,
     frozenset({"scale", "seen"}): MaybeZero,
+    frozenset({"scale", "seen", "weight"}): MaybeZero,
     frozenset({"mean", "sd"}): Normal,
     frozenset({"mean", "sd", "low"}): Normal,
     frozenset({"low", "high"}): Uniform,
@@ -31,8 +32,8 @@ def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
     """The prior that a ``[prior]`` table of a study declares for the parameter `name`.
 
     ``{median, log_sd}`` is log-normal, ``{scale}`` half-normal, ``{scale, floor}`` (and ``rise``)
-    near zero, ``{scale, seen}`` half-normal or zero, ``{mean, sd}`` (and ``low``) normal, ``{low,
-    high}`` uniform, and ``{low, high, log = true}`` log-uniform.
+    near zero, ``{scale, seen}`` (and ``weight``) half-normal or zero, ``{mean, sd}`` (and ``low``)
+    normal, ``{low, high}`` uniform, and ``{low, high, log = true}`` log-uniform.
 
     Raises
     ------

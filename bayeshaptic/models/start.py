@@ -10,8 +10,8 @@ from bayeshaptic.models.build import delay_prior
 from bayeshaptic.models.hand import KILOGRAMS, hand_priors
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.prior import LogNormal, Prior, draw
-from bayeshaptic.models.prior_of_zero import MaybeZero
-from bayeshaptic.models.structures import GROUND_DAMPERS, HAND
+from bayeshaptic.models.prior_of_zero import SPIKE, SPIKE_OF_MOTOR, MaybeZero
+from bayeshaptic.models.structures import GROUND_DAMPERS, HAND, MOTOR_DAMPERS
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
 
@@ -86,7 +86,8 @@ def informed(model: Model, etfe: Etfe) -> Model:
 
 def _weak_prior(name: str, dimension: str, found: ResponseScales, period_s: float) -> Prior:
     if name in GROUND_DAMPERS:
-        return MaybeZero(0.5 * found.mass * found.middle)
+        weight = SPIKE_OF_MOTOR if name in MOTOR_DAMPERS else SPIKE
+        return MaybeZero(0.5 * found.mass * found.middle, weight=weight)
     if dimension == "mass":
         return LogNormal(found.mass, 2.0)
     if dimension == "damping":

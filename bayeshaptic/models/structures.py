@@ -43,6 +43,7 @@ for _number in range(3, MOST_MODES + 2):
 HAND = ("bs", "ks", "mh", "bh", "kh")
 # Hardly seen by the data, and zero in the paper's tables.
 GROUND_DAMPERS = ("b", *(f"b{number}" for number in range(1, MOST_MODES + 2)))
+MOTOR_DAMPERS = ("b", "b1")  # these hold the motor's own bearings
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import HalfNormal, MaybeZero, Model
 from bayeshaptic.models.build import DAMPER_SCALE
-from bayeshaptic.models.prior_of_zero import SPIKE, has_spike
+from bayeshaptic.models.prior_of_zero import weight_of_zero
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.progress import told
 from bayeshaptic.threads import single_threaded
@@ -85,7 +85,7 @@ def infer_population(
     if not any(name in HAND for name in model.names):
         raise InputError(f"the {model.name} model has no hand: give posteriors of held devices.")
     here = study_coordinates(model, posteriors)
-    spike = np.array([SPIKE if has_spike(model.prior(name)) else 0.0 for name in model.names])
+    spike = np.array([weight_of_zero(model.prior(name)) for name in model.names])
     hierarchy, names, spots = _hierarchy(posteriors, users, places or [None] * len(users), here)
     tune, again, run, first, last, rest = np.random.SeedSequence(seed).spawn(6)
     rng = np.random.default_rng(rest)
