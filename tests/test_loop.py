@@ -13,11 +13,13 @@ from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.residuals.residual import smooth_columns
 from bayeshaptic.diagnosis.state import Accepted, State, compared_errors, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.diagnosis.trials import linear
 from bayeshaptic.inference.coordinates import coordinates
-from bayeshaptic.inference.fit import Fit, summarise, weighted_residuals
+from bayeshaptic.inference.fit import MISFIT, Fit, summarise, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -38,6 +40,31 @@ def fitted(held: bool, seconds: float, effects: Effects) -> tuple[Bench, Etfe, F
         recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
     )
     return bench, etfe, least_squares(build_model("grasped" if held else "free", "lhifam"), etfe)
+
+
+def test_candidates_begin_afresh_only_while_nothing_explains(monkeypatch) -> None:
+    """Starting points that no fit has bent are for where the way from the present fit is barred."""
+    _, etfe, fit = fitted(False, 8.0, MODE)
+    ends: list[tuple[str, float]] = []
+
+    def watched(name: str) -> Any:
+        own = getattr(linear, name)
+
+        def fits(*given: Any) -> Any:
+            ends.append((name, own(*given).reduced_chi_square))
+            return own(*given)
+
+        return fits
+
+    for name in ("refine", "refine_anew"):
+        monkeypatch.setattr(linear, name, watched(name))
+    linear.linear_trials(State(etfe, fit), Meter())
+    ends = ends[1:]  # the first is of the model without an effect
+    explained = [left <= MISFIT for _, left in ends]
+    assert any(explained)
+    first = explained.index(True)
+    assert {name for name, _ in ends[: first + 1]} == {"refine_anew"}
+    assert all(name == "refine" for name, _ in ends[first + 1 :])
 
 
 def one(name: str, **fields: Any) -> Effects:

@@ -97,6 +97,10 @@ class Posterior(Shown):
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Mean, sd, quantiles, unit and diagnostics of every parameter, by name."""
+        return {name: dict(row) for name, row in self._summary.items()}
+
+    @cached_property
+    def _summary(self) -> dict[str, dict[str, Any]]:
         q05, q50, q95 = self.quantile(np.array([0.05, 0.5, 0.95]))
         return {
             name: {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ class CriticalStiffness(Shown):
         """K_CR of the one model; the median of a distribution."""
         return float(self.quantile(0.5))
 
-    @property
+    @cached_property
     def effective(self) -> float:
         """Effective number of draws of K_CR (of its ranks), each walker a chain."""
         ranks = np.unique(self.samples, return_inverse=True)[1]
@@ -79,7 +80,7 @@ class CriticalStiffness(Shown):
     def quantile(self, p: ArrayLike) -> Any:
         """The stiffness that K_CR is below with probability `p`; a float, or an array as `p`."""
         levels = np.asarray(p, float)
-        found = quantiles(self.samples, levels)
+        found = quantiles(self._ordered, levels)
         return float(found) if levels.ndim == 0 else found
 
     @at_the_door
@@ -91,7 +92,7 @@ class CriticalStiffness(Shown):
     @at_the_door
     def probability_unstable(self, stiffness: ArrayLike) -> Any:
         """P(K_CR < stiffness), a float, or an array as `stiffness`."""
-        below = np.searchsorted(np.sort(self.samples), stiffness, side="left")
+        below = np.searchsorted(self._ordered, stiffness, side="left")
         return below / len(self.samples)
 
     @at_the_door
@@ -113,7 +114,9 @@ class CriticalStiffness(Shown):
         ----------
         risk : float
         """
-        return low_quantile(self.samples, risk, self.effective_at)
+        if risk not in self._low_quantiles:
+            self._low_quantiles[risk] = low_quantile(self._ordered, risk, self.effective_at)
+        return self._low_quantiles[risk]
 
     @at_the_door
     def effective_at(self, stiffness: float) -> float:
@@ -159,6 +162,15 @@ class CriticalStiffness(Shown):
             }
             for i in range(len(self.samples))
         )
+
+    # A page asks for the same few numbers some fifty times.
+    @cached_property
+    def _ordered(self) -> Floats:
+        return np.sort(self.samples)
+
+    @cached_property
+    def _low_quantiles(self) -> dict[float, LowQuantile | None]:
+        return {}
 
     def _lines(self) -> tuple[str, ...]:
         low, middle, high = (float(self.quantile(p)) for p in (0.05, 0.5, 0.95))

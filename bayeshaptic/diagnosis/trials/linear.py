@@ -25,7 +25,7 @@ from bayeshaptic.diagnosis.state import (
 )
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
-from bayeshaptic.inference.fit import search_box, weighted_residuals
+from bayeshaptic.inference.fit import MISFIT, search_box, weighted_residuals
 from bayeshaptic.inference.least_squares import Optimum, least_squares, refine, refine_anew
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.screening import promising_starts, starting_bases
@@ -93,13 +93,17 @@ def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[
     bases = starting_bases(state.model, state.fit.theta, state.fit.elsewhere)
     found = sieve(state.model, state.etfe, windows.part(share(windows, FIT)), bases)
     best: dict[str, Trial] = {}
+    explained = False
     for one in found:
         effect = one.effect
+        optimum: Optimum | None = None
         near = one.gain >= thresholds.REACH * found[0].gain
-        followed = near and meter.affords(effect.title)
-        if followed and tick:
-            tick(effect.title)
-        trial = _try(state, windows, one, base, followed)
+        if near and meter.affords(effect.title):
+            if tick:
+                tick(effect.title)
+            optimum = _followed(state, windows, one, anew=not explained)
+            explained |= optimum.reduced_chi_square <= MISFIT
+        trial = _try(state, windows, one, base, optimum)
         if effect.name not in best or trial.score > best[effect.name].score:
             best[effect.name] = trial
     return list(best.values())
@@ -137,12 +141,23 @@ def sieve(model: Model, etfe: Etfe, windows: Windows, bases: Floats) -> list[Sie
     return sorted(found, key=lambda one: -one.gain)
 
 
-def _try(state: State, windows: Windows, one: Sieved, base: Floats, followed: bool) -> Trial:
-    """The trial of a candidate, fitted in full or as the sieve left it."""
+def _followed(state: State, windows: Windows, one: Sieved, anew: bool) -> Optimum:
+    """A candidate fitted in full.
+
+    From points that no fit has bent (`anew`) only while nothing explains it: whatever explains it
+    was reached from the present fit, and then no way is barred.
+    """
+    model, part = state.model.with_effect(one.effect), windows.part(share(windows, FIT))
+    if anew:
+        return refine_anew(model, state.etfe, part, one.starts)
+    return refine(model, part, one.starts)
+
+
+def _try(state: State, windows: Windows, one: Sieved, base: Floats, first: Optimum | None) -> Trial:
+    """The trial of a candidate, followed to an optimum, or as the sieve left it."""
     effect, model = one.effect, state.model.with_effect(one.effect)
     theta = one.starts[0]
-    if followed:
-        first = refine_anew(model, state.etfe, windows.part(share(windows, FIT)), one.starts)
+    if first is not None:
         theta, windows = _around(model, state.etfe, first)
     gain_fit, gain_choose = (log_likelihoods(model, windows, theta) - base).tolist()
     accepted = Accepted(
@@ -155,10 +170,10 @@ def _try(state: State, windows: Windows, one: Sieved, base: Floats, followed: bo
         change=Change(effect),
     )
     size, changed = len(effect.parameters), state
-    if followed and thresholds.convincing(gain_fit, gain_choose, size):
+    if first is not None and thresholds.convincing(gain_fit, gain_choose, size):
         changed = replace(state, fit=least_squares(model, state.etfe, start=theta))
     changed = replace(changed, accepted=(*state.accepted, accepted))
-    return Trial(accepted, changed, gain_fit, gain_choose if followed else 0.0, size)
+    return Trial(accepted, changed, gain_fit, gain_choose if first is not None else 0.0, size)
 
 
 def _around(model: Model, etfe: Etfe, first: Optimum) -> tuple[Floats, Windows]:
