@@ -267,6 +267,9 @@ def test_a_ratio_of_polynomials_is_one_more_pole(ends, based):
         mine.rows(rows).sampled_response(FREQUENCY_HZ, T),
         mine.sampled_response(FREQUENCY_HZ, T)[rows],
     )
+    mine, summed = find_crossings(mine, T), find_crossings(summed, T)
+    np.testing.assert_allclose(mine.critical, summed.critical, rtol=1e-7)
+    np.testing.assert_allclose(mine.binding_hz, summed.binding_hz, rtol=1e-6)
 
 
 @pytest.mark.parametrize("approximation", ["exact", "continuous"])

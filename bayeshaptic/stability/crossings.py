@@ -71,8 +71,10 @@ def response_of(
     system: LinearSystem | EvaluableSystem, period_s: float, exact: bool = True
 ) -> Response:
     """The response of a batch of loops in the form that its kind of system allows."""
-    if isinstance(system, LinearSystem) and rational(system):
-        return pole_response(system, period_s, exact)
+    if isinstance(system, LinearSystem) and system.has_rational_form:
+        found = pole_response(system, period_s, exact)
+        if np.isfinite(found.poles).all():
+            return found
     if isinstance(system, LinearSystem) and system.dynamic_links:
         return linked_response(system, period_s, exact)
     return EvaluatedResponse(system, period_s, exact)

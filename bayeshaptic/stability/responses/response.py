@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from bayeshaptic.models.response.filtered import filtered
 from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.models.response.transfer import transfer
+from bayeshaptic.models.response.transfer import transfer, transfer_with_link
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.numerics.polynomial import Polynomial
 from bayeshaptic.types import Complexes, Floats, Ints
@@ -142,7 +142,10 @@ class PoleResponse:
 
 
 def pole_response(system: LinearSystem, period_s: float, exact: bool = True) -> PoleResponse:
-    """The response of `system` from its poles: exact, or the continuous approximation."""
+    """The response of `system` from its poles: exact, or the continuous approximation.
+
+    A link that is a ratio of polynomials has poles, too; where they do not settle they are nan.
+    """
     poles, parts, integrators = _simple_poles(system, period_s)
     p, r = poles * period_s, parts * period_s
     delay = system.delay_s / period_s
@@ -161,7 +164,12 @@ def _simple_poles(
     system: LinearSystem, period_s: float
 ) -> tuple[Complexes, Complexes, NDArray[np.int_]]:
     """Poles, residues and the number of integrators, with double poles moved apart."""
-    top, bottom = (polynomial.T for polynomial in transfer(system.mechanism))
+    link = system.dynamic_links[0] if system.dynamic_links else None
+    if link is None:
+        parts = transfer(system.mechanism)
+    else:
+        parts = transfer_with_link(system.mechanism, link)
+    top, bottom = (polynomial.T for polynomial in parts)
     numerator, denominator = filtered(top, bottom, system.filters)
     poles = _poles(system, bottom)
     poles = np.take_along_axis(poles, np.argsort(np.abs(poles), axis=1), axis=1)
@@ -178,7 +186,7 @@ def _simple_poles(
 def _poles(system: LinearSystem, denominator: Polynomial) -> Complexes:
     """Poles, shape (B, n): roots of the mechanism's `denominator` and of the filters'.
 
-    Eigenvalues where these do not settle.
+    Eigenvalues where these do not settle; with a link nan.
     """
     from bayeshaptic.numerics.polynomial_roots import find_roots
 
@@ -193,6 +201,8 @@ def _poles(system: LinearSystem, denominator: Polynomial) -> Complexes:
         find_roots(np.ascontiguousarray(factor.T), own, fine)
         poles[:, end - degree : end] = own
     unsettled = np.flatnonzero(~settled.all(axis=0))
-    if unsettled.size:
+    if system.dynamic_links:
+        poles[unsettled] = np.nan
+    elif unsettled.size:
         poles[unsettled] = system.rows(unsettled).poles()[0]
     return poles
