@@ -20,10 +20,15 @@ from bayeshaptic.recordings.response.band import responds_until
 from bayeshaptic.recordings.response.local_polynomial import LEAKAGE_TERMS, leakage_terms
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, PeriodicSpectra
-from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
+from bayeshaptic.recordings.signals.excitation import (
+    FEWEST_LINES,
+    Repetition,
+    excited_lines,
+    find_repetition,
+    noise_of,
+)
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
 
-FEWEST_LINES = 5
 FEWEST_BETWEEN, MOST_BETWEEN = 20, 60
 
 
@@ -54,7 +59,7 @@ def estimate_periodic(
     force, position = _periods(recording, repetition)
     if len(position) < 2:
         return None
-    harmonics = excited_lines(force.mean(axis=0), _noise_of(force))
+    harmonics = excited_lines(force.mean(axis=0), noise_of(force))
     frequency = harmonics / (repetition.period * recording.period_s)
     if band_hz is not None:
         inside = (frequency >= band_hz[0] * (1 - 1e-9)) & (frequency <= band_hz[1] * (1 + 1e-9))
@@ -190,17 +195,6 @@ def _whole_spectrum(periods: NDArray[Any]) -> NDArray[Any]:
     else:
         found = np.fft.rfft(periods.ravel() - periods.mean())
     return found / np.sqrt(periods.size)
-
-
-def _noise_of(force: NDArray[Any]) -> NDArray[Any] | float:
-    """Power of the noise in every line of the mean of periods (M, p), as its neighbours have it."""
-    if np.all(force == force[0]):
-        return 0.0
-    count = len(force)
-    apart = np.fft.rfft(force - force.mean(axis=0), axis=1)
-    power = np.sum(np.abs(apart) ** 2, axis=0) / (count * (count - 1))
-    width = min(FEWEST_BETWEEN + 1, len(power))
-    return np.convolve(power, np.ones(width) / width, mode="same")
 
 
 def _leakage(

@@ -13,6 +13,7 @@ from bayeshaptic.types import Floats
 EXCITED = 1e-5
 
 
+FEWEST_LINES = 5  # from which masses and springs can be told apart
 # Of a force that was measured, the share of its power that may be noise: a seventh of its size.
 NOISE = 0.02
 
@@ -74,8 +75,9 @@ def find_repetition(
         start = samples - count * period
         if count < 2 or _between(centred[start:], count) > noise:
             continue
-        if not _shifted(centred[start:], period):
-            return Repetition(start, samples, int(period), noisy=True)
+        found = Repetition(start, samples, int(period), noisy=True)
+        if _excites_enough(found, centred) and not _shifted(centred[start:], period):
+            return found
     return None
 
 
@@ -83,6 +85,13 @@ def _between(signal: NDArray[Any], periods: int) -> float:
     """Share of the power of whole periods that does not repeat, as the lines between have it."""
     power = np.abs(np.fft.rfft(signal - signal.mean())) ** 2
     return (1 - float(power[::periods].sum() / power.sum())) * periods / (periods - 1)
+
+
+def _excites_enough(found: Repetition, force: NDArray[Any]) -> bool:
+    """A tone or two with noise are a force whose noise may be all that there is to go on."""
+    count = (found.stop - found.start) // found.period
+    periods = found.periods_of(force, found.start, count)
+    return len(excited_lines(periods.mean(axis=0), noise_of(periods))) >= FEWEST_LINES
 
 
 def _shifted(signal: NDArray[Any], period: int) -> bool:
@@ -139,6 +148,27 @@ def excited_lines(period: NDArray[Any], noise: NDArray[Any] | float = 0.0) -> ND
     power = (np.abs(np.fft.rfft(period - period.mean())) ** 2)[:below]
     own = np.broadcast_to(noise, (len(period) // 2 + 1,))[:below]
     return np.flatnonzero(power > np.maximum(EXCITED * power.max(), beyond * own))
+
+
+def noise_of(force: NDArray[Any]) -> NDArray[Any] | float:
+    """Power of the noise in every line of the mean of periods, as its neighbours have it.
+
+    Parameters
+    ----------
+    force : ndarray, shape (M, p)
+
+    Returns
+    -------
+    ndarray, shape (p // 2 + 1,), or 0.0
+        Zero where all periods are the same in every bit.
+    """
+    if np.all(force == force[0]):
+        return 0.0
+    count = len(force)
+    apart = np.fft.rfft(force - force.mean(axis=0), axis=1)
+    power = np.sum(np.abs(apart) ** 2, axis=0) / (count * (count - 1))
+    width = min(21, len(power))
+    return np.convolve(power, np.ones(width) / width, mode="same")
 
 
 def is_sweep(force: Floats) -> bool:
