@@ -6,35 +6,25 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
-from bayeshaptic.diagnosis.feedback.other_valley import VALLEY
-from bayeshaptic.diagnosis.residuals.periods import CHANGES
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.effects.laws import tested, variables
-from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import estimate, percent, pure, quantity, rounded_down
-from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
 from bayeshaptic.report.numbers.misfit import (
-    is_far_off,
-    misfit_factor,
-    misfit_is_clear,
     misfit_is_faint,
-    residual_is_noticed,
 )
-from bayeshaptic.report.numbers.result import may_be_held, tip_limit
+from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
+from bayeshaptic.report.objections import HEADLINE_RISKS, why_none
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
 
-HEADLINE_RISKS = (0.01, 0.05)
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001
-_LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 
 
 @dataclass(frozen=True)
@@ -66,17 +56,7 @@ class Headline:
 def headline(result: Result) -> Headline:
     """The recommendation of an analysis, or of what closing the loop returns."""
     analysis = result.analysis
-    objections = _objections(analysis, result.closed.diagnosis if result.closed else None)
-    if result.closed and _rubs_otherwise(result.closed):
-        objections += (
-            "a force that goes with the velocity is left, which no law of friction explains, and "
-            "what the model takes for damping may be its part",
-        )
-    if result.closed and _left(result.closed) & set(CHANGES):
-        objections += (
-            "the device is not the same from the first period of the force to the last, and what "
-            "changes is followed only where the force is random",
-        )
+    objections = why_none(result)
     if objections:
         return _untrusted(analysis, objections, result.closed)
     limit = analysis.limit
@@ -93,100 +73,6 @@ def headline(result: Result) -> Headline:
         return Headline("caution", unlimited, ())
     diagnosis = result.closed.diagnosis if result.closed else {}
     return _recommended(analysis, risk, diagnosis, result.closed)
-
-
-def _objections(analysis: Analysis, diagnosis: Any) -> tuple[str, ...]:
-    """Why no stiffness can be recommended; empty where one can."""
-    found = []
-    verdict = (diagnosis or {}).get("verdict")
-    if verdict == "unexplained" and is_far_off(analysis) and not has_feedback(analysis.notices):
-        found.append(
-            f"what the model leaves over is {misfit_factor(analysis)} times the noise, and no "
-            "effect that was tried explains it"
-        )
-    if verdict != "unexplained" and analysis.sampled and misfit_is_clear(analysis):
-        found.append(
-            "the model does not explain the data (what it leaves over is "
-            f"{misfit_factor(analysis)} times the noise, reduced chi-square "
-            f"{pure(analysis.fit.reduced_chi_square)})"
-        )
-    if verdict is None and analysis.sampled and residual_is_noticed(analysis):
-        found.append(
-            "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
-        )
-    if analysis.in_loop is not None:
-        found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
-    if has_feedback(analysis.notices) and analysis.in_loop is None:
-        how = "was" if is_certain(analysis.notices) else "may have been"
-        found.append(
-            f"the force {how} computed from the motion (feedback), which biases the response that "
-            "everything here is read from"
-        )
-    if analysis.etfe.through_reference:
-        found += _in_closed_loop(analysis, verdict)
-    recording = analysis.recording
-    if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
-        found.append(
-            "what was sensed lags beyond the delay that is known, and whether that is in the loop "
-            "or in the sensor of force or motion, which the loop does without, nobody can tell"
-        )
-    if analysis.sampled and (far := unstated(analysis)) is not None:
-        found.append(far)
-    if not analysis.posterior.converged:
-        found.append("the sampler has not converged, so the interval may be too narrow")
-    if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
-        found.append("the closed loop's poles do not confirm some of the limits")
-    never = float((analysis.limit.samples <= 0).mean())
-    if never > min(HEADLINE_RISKS):
-        found.append(
-            f"with probability {percent(never)} the loop is unstable however soft the wall is"
-        )
-    return tuple(found)
-
-
-def _added(diagnosis: Any) -> tuple[str, ...]:
-    """Names of the effects that were found."""
-    return tuple(effect["name"] for effect in (diagnosis or {}).get("effects", ()))
-
-
-def _left(closed: Closed) -> set[str]:
-    """Names of the tests that stay where something is unexplained."""
-    if closed.diagnosis["verdict"] != "unexplained":
-        return set()
-    return {test.name for test in closed.traced.after if test.flagged}
-
-
-def _rubs_otherwise(closed: Closed) -> bool:
-    """Whether a force over the velocity stays unexplained: such a damping ends in small motions."""
-    return bool(variables(_left(closed) & set(tested())) & {VELOCITY, LOAD_VELOCITY})
-
-
-def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
-    """What is asked of a limit that was read through a controller's reference beyond the usual."""
-    found = []
-    if verdict == "unexplained":
-        found.append(
-            "something is left that is not noise, and what a force that is not linear does in "
-            "closed loop is not simulated"
-        )
-    if analysis.model.held:
-        found.append(
-            "somebody holds the device, and in closed loop another hand on another device explains "
-            "the motion as well"
-        )
-    elif may_be_held(analysis):
-        found.append("nobody said whether somebody holds the device, which closed loops hide")
-    if analysis.choice is not None and analysis.model.name == "rigid":
-        found.append(
-            f"nothing moves the force above {quantity(analysis.etfe.band_hz[1], 'Hz')} but noise, "
-            "and a vibration mode there may set a lower limit than that of one mass"
-        )
-    if any(notice.topic == VALLEY for notice in analysis.notices):
-        found.append("a vibration mode elsewhere explains what the reference moves as well")
-    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
-    if not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB):
-        found.append("the recording leaves the limit open within more than a factor of two")
-    return found
 
 
 def _untrusted(

@@ -1,0 +1,148 @@
+"""Why a report recommends no stiffness."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
+from bayeshaptic.diagnosis.feedback.other_valley import VALLEY
+from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.diagnosis.trials.drift import PARTS
+from bayeshaptic.effects.laws import tested, variables
+from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
+from bayeshaptic.quantities import percent, pure, quantity
+from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.sufficiency import SHORTEST_S
+from bayeshaptic.report.numbers.misfit import (
+    is_far_off,
+    misfit_factor,
+    misfit_is_clear,
+    residual_is_noticed,
+)
+from bayeshaptic.report.numbers.result import may_be_held
+from bayeshaptic.report.numbers.unstated import unstated
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.diagnosis.closed import Closed
+
+HEADLINE_RISKS = (0.01, 0.05)
+_LAGS = {"extra_delay", "position_filter", "actuator_lag"}
+
+
+def why_none(result: Result) -> tuple[str, ...]:
+    """Why no stiffness can be recommended; empty where one can."""
+    analysis, closed = result.analysis, result.closed
+    found = _of_the_analysis(analysis, closed.diagnosis if closed else None)
+    if closed and _rubs_otherwise(closed):
+        found.append(
+            "a force that goes with the velocity is left, which no law of friction explains, and "
+            "what the model takes for damping may be its part"
+        )
+    if closed and _changes(closed):
+        found.append(
+            "the device is not the same at the end of the recording as at its beginning, and what "
+            "changes was not found; it is followed under a force that does not repeat, from "
+            f"{pure(PARTS * SHORTEST_S)} s on"
+        )
+    return tuple(found)
+
+
+def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
+    found = []
+    verdict = (diagnosis or {}).get("verdict")
+    if verdict == "unexplained" and is_far_off(analysis) and not has_feedback(analysis.notices):
+        found.append(
+            f"what the model leaves over is {misfit_factor(analysis)} times the noise, and no "
+            "effect that was tried explains it"
+        )
+    if verdict != "unexplained" and analysis.sampled and misfit_is_clear(analysis):
+        found.append(
+            "the model does not explain the data (what it leaves over is "
+            f"{misfit_factor(analysis)} times the noise, reduced chi-square "
+            f"{pure(analysis.fit.reduced_chi_square)})"
+        )
+    if verdict is None and analysis.sampled and residual_is_noticed(analysis):
+        found.append(
+            "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
+        )
+    if analysis.in_loop is not None:
+        found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
+    if has_feedback(analysis.notices) and analysis.in_loop is None:
+        how = "was" if is_certain(analysis.notices) else "may have been"
+        found.append(
+            f"the force {how} computed from the motion (feedback), which biases the response that "
+            "everything here is read from"
+        )
+    if analysis.etfe.through_reference:
+        found += _in_closed_loop(analysis, verdict)
+    recording = analysis.recording
+    if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
+        found.append(
+            "what was sensed lags beyond the delay that is known, and whether that is in the loop "
+            "or in the sensor of force or motion, which the loop does without, nobody can tell"
+        )
+    if analysis.sampled and (far := unstated(analysis)) is not None:
+        found.append(far)
+    if not analysis.posterior.converged:
+        found.append("the sampler has not converged, so the interval may be too narrow")
+    if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
+        found.append("the closed loop's poles do not confirm some of the limits")
+    never = float((analysis.limit.samples <= 0).mean())
+    if never > min(HEADLINE_RISKS):
+        found.append(
+            f"with probability {percent(never)} the loop is unstable however soft the wall is"
+        )
+    return found
+
+
+def _added(diagnosis: Any) -> tuple[str, ...]:
+    """Names of the effects that were found."""
+    return tuple(effect["name"] for effect in (diagnosis or {}).get("effects", ()))
+
+
+def _left(closed: Closed) -> set[str]:
+    """Names of the tests that stay where something is unexplained."""
+    if closed.diagnosis["verdict"] != "unexplained":
+        return set()
+    return {test.name for test in closed.traced.after if test.flagged}
+
+
+def _changes(closed: Closed) -> bool:
+    """Whether the device changes by more than noise, and no drift explains it."""
+    left = _left(closed)
+    return any(test.name in left for test in closed.traced.after if test.family == "time-varying")
+
+
+def _rubs_otherwise(closed: Closed) -> bool:
+    """Whether a force over the velocity stays unexplained: such a damping ends in small motions."""
+    return bool(variables(_left(closed) & set(tested())) & {VELOCITY, LOAD_VELOCITY})
+
+
+def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
+    """What is asked of a limit that was read through a controller's reference beyond the usual."""
+    found = []
+    if verdict == "unexplained":
+        found.append(
+            "something is left that is not noise, and what a force that is not linear does in "
+            "closed loop is not simulated"
+        )
+    if analysis.model.held:
+        found.append(
+            "somebody holds the device, and in closed loop another hand on another device explains "
+            "the motion as well"
+        )
+    elif may_be_held(analysis):
+        found.append("nobody said whether somebody holds the device, which closed loops hide")
+    if analysis.choice is not None and analysis.model.name == "rigid":
+        found.append(
+            f"nothing moves the force above {quantity(analysis.etfe.band_hz[1], 'Hz')} but noise, "
+            "and a vibration mode there may set a lower limit than that of one mass"
+        )
+    if any(notice.topic == VALLEY for notice in analysis.notices):
+        found.append("a vibration mode elsewhere explains what the reference moves as well")
+    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
+    if not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB):
+        found.append("the recording leaves the limit open within more than a factor of two")
+    return found
