@@ -71,7 +71,7 @@ def rounds_of(
     class Loop:
         """One that takes as many rounds as it accepts effects, and one at least."""
 
-        def __init__(self, etfe: Any, fitted: Any, budget_s: float, *_: Any) -> None:
+        def __init__(self, etfe: Any, fitted: Any, budget_s: float, *_: Any, **__: Any) -> None:
             self.end, self.rounds = loops[fitted.model.name], 0
             self.meter = Meter(budget_s)
             self.fitted, self.name = fitted, fitted.model.name

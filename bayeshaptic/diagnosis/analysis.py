@@ -176,6 +176,7 @@ def finish(
     fit: Fit,
     options: Options,
     small_risks: bool = True,
+    witness: EtfeCriticalStiffness | None = None,
 ) -> Analysis:
     """Sample a fit's posterior and find its critical stiffness.
 
@@ -189,6 +190,8 @@ def finish(
     options : Options
     small_risks : bool
         Whether the stiffness at a small risk is to be known, too.
+    witness : EtfeCriticalStiffness, optional
+        Of this very measurement, where it is known.
     """
     clock = Clock(dict(begun.seconds))
     scale = noise_scale(fit)
@@ -210,7 +213,7 @@ def finish(
     with clock.stage("critical stiffness"):
         options.report(0.8, "critical stiffness")
         limit = watch.limit_of(posterior)
-        etfe_limit = etfe_critical_stiffness(etfe, seed=options.seed)
+        etfe_limit = witness or etfe_critical_stiffness(etfe, seed=options.seed)
     options.report(0.9, "writing the report")
     return Analysis(
         recording=etfe.recording,

@@ -121,7 +121,8 @@ class _Loops:
         fit = begun.fit
         if name != fit.model.name:
             fit = begun.choice.candidates[name].fit  # type: ignore[union-attr]
-        self.running[name] = Loop(begun.etfe, fit, budget_s, self._options.report)
+        own = next(iter(self.running.values()), None)
+        self.running[name] = Loop(begun.etfe, fit, budget_s, self._options.report, like=own)
         return self.running[name]
 
     def take_turns(self, rivals: Sequence[str]) -> None:

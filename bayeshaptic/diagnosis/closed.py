@@ -167,6 +167,7 @@ def close_loop(
             state.etfe,
             state.fit,
             chosen.within(0.6, 0.9),
+            witness=base.etfe_limit if state.etfe is begun.etfe else None,
         )
     limit, traced = with_rivals(analysis.limit, traced, chosen.seed)
     limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed)

@@ -45,9 +45,14 @@ class Trials(Protocol):
         """Without the earlier effect that a later one made needless, and its name; or as it is."""
 
 
-def trials_for(etfe: Etfe, fit: Fit) -> Trials:
-    """The trials of a base model fitted to a measurement of its kind."""
-    return LineTrials(etfe, fit) if is_periodic(etfe) else WindowTrials(State(etfe, fit))
+def trials_for(etfe: Etfe, fit: Fit, like: Trials | None = None) -> Trials:
+    """The trials of a base model fitted to a measurement of its kind.
+
+    `like` are those of another model on the same measurement.
+    """
+    if is_periodic(etfe):
+        return LineTrials(etfe, fit)
+    return WindowTrials(State(etfe, fit), like if isinstance(like, WindowTrials) else None)
 
 
 def trace(
@@ -94,6 +99,8 @@ class Loop:
     ----------
     etfe, fit, budget_s, progress, trials
         Those of `trace`.
+    like : Loop, optional
+        That on another base model, of the same measurement.
 
     Attributes
     ----------
@@ -112,10 +119,11 @@ class Loop:
         budget_s: float,
         progress: Progress | None = None,
         trials: Trials | None = None,
+        like: Loop | None = None,
     ) -> None:
         self.meter = Meter(budget_s * RATE)
         self.state, self.done = State(etfe, fit), False
-        self._given, self._progress = trials, progress
+        self._given, self._like, self._progress = trials, like, progress
         self._path: list[State] = []
         self._before: tuple[Test, ...] = ()
         self._tests: tuple[Test, ...] = ()  # of what is left
@@ -164,7 +172,8 @@ class Loop:
 
     @cached_property
     def _kind(self) -> Trials:
-        return self._given or trials_for(self.state.etfe, self.state.fit)
+        like = self._like._kind if self._like else None
+        return self._given or trials_for(self.state.etfe, self.state.fit, like)
 
     def _begin(self) -> None:
         self.state = self._kind.first

@@ -76,6 +76,7 @@ class ForceBench:
         self.force = recording.force - recording.force.mean()
         self._transform = line_transform(state.etfe, recording)
         self._extra: Floats = np.zeros(recording.samples)
+        self._measured = _between(recording.position)
         self._base = self._likelihoods(state.fit.theta, state.fit.windows)
 
     def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
@@ -92,7 +93,7 @@ class ForceBench:
             measured = self.recording.position
             besides = measured - x[::SUBSTEPS] - self._extra
             along = _between(self._hand(besides) if self.held else self._drift(besides, theta))
-            found[MOTOR] = Motion(_between(measured), v + along, self.force)
+            found[MOTOR] = Motion(self._measured, v + along, self.force)
         for x2, v2 in others:
             found[CONNECTION] = Motion(x - x2, v - v2, self.force)
             if LOAD in places:  # what is slow moves both masses

@@ -29,12 +29,16 @@ class WindowTrials:
     ----------
     state : State
         As the loop begins.
+    like : WindowTrials, optional
+        Those of another model on the same recording, which has been looked at.
     """
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: State, like: WindowTrials | None = None) -> None:
         recording = state.etfe.unbroken
         self._look: SampleLook | None = None
-        if recording is not None:
+        if like is not None:
+            self._look = like._look
+        elif recording is not None:
             self._look = look_at_samples(recording, state.etfe)
         self.first = state
 

@@ -58,8 +58,6 @@ def rational_form(
 
     `link` is one more whose law is a ratio of polynomials.
     """
-    from bayeshaptic.models.response.kernels.expansion import expand
-
     nodes = nodes_at(frequency_hz, period_s)
     plain = transfer(mechanism) if link is None else transfer_with_link(mechanism, link)
     top, bottom = plain
@@ -67,17 +65,7 @@ def rational_form(
     terms = PoleTerms(np.zeros(len(turns), int), np.zeros((len(turns), 0, 3, 2)))
     if filters:
         top, bottom, terms = _behind(top, bottom, filters, turns, period_s)
-    above, below = (np.empty((len(turns), 2, _groups(p.shape[1]))) for p in (top, bottom))
-    series, fastest = np.empty((len(turns), ORDER + 1)), np.empty(len(turns))
-    expand(
-        np.ascontiguousarray(top),
-        np.ascontiguousarray(bottom),
-        period_s,
-        above,
-        below,
-        series,
-        fastest,
-    )
+    above, below, series, fastest = _expanded(top, bottom, period_s)
     bad = np.flatnonzero(~((fastest + nodes.reach) / (2 * np.pi) < REACH))
     if bad.size:
         own = tuple(factor.rows(bad) for factor in filters)
@@ -87,6 +75,25 @@ def rational_form(
         terms = terms.alone(bad, _closed_form(*whole, poles, turns[bad], period_s))
     at, tables = (nodes.theta, nodes.hold, nodes.high), alias_tables()
     return RationalArrays(above, below, series, turns, terms.count, terms.table, *at, *tables)
+
+
+def _expanded(
+    top: Floats, bottom: Floats, period_s: float
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Both polynomials as the kernel reads them, their series for large s, and |p_max| T."""
+    from bayeshaptic.models.response.kernels.expansion import expand
+
+    batch = len(top)
+    above, below = (np.empty((batch, 2, _groups(p.shape[1]))) for p in (top, bottom))
+    series, fastest = np.empty((batch, ORDER + 1)), np.empty(batch)
+    polynomials = np.ascontiguousarray(top), np.ascontiguousarray(bottom)
+    expand(*polynomials, period_s, above, below, series, fastest)
+    return above, below, series, fastest
+
+
+def fastest_of(numerator: Polynomial, denominator: Polynomial, period_s: float) -> Floats:
+    """|p_max| T of ratios of polynomials, shape (B,), as `sampled.fastest_pole` reads it."""
+    return _expanded(numerator.T, denominator.T, period_s)[3]
 
 
 def _groups(coefficients: int) -> int:

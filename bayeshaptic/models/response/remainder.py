@@ -29,7 +29,8 @@ from numpy.polynomial import chebyshev
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
 from bayeshaptic.models.response.filter import Filter
 from bayeshaptic.models.response.mechanism import Mechanism
-from bayeshaptic.models.response.sampled import fastest_pole, laurent, nodes_at
+from bayeshaptic.models.response.rational import fastest_of
+from bayeshaptic.models.response.sampled import nodes_at
 from bayeshaptic.models.response.transfer import compliances
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Bools, Complexes, Floats, Ints
@@ -77,13 +78,13 @@ class Remainder:
         return total
 
     def on_axis(self, omega: Floats) -> Complexes:
-        """Values at s = j omega, shape (L,) for the whole batch; shape (L, B).
+        """Values over s at s = j omega, shape (L,) for the whole batch; shape (L, B).
 
         With a single link compiled.
         """
         s: Complexes = np.multiply(1j, omega[:, None])
         if len(self.links) > 1:
-            return self.at(s)
+            return np.asarray(self.at(s) / s)
         from bayeshaptic.models.response.kernels.remainder import add_link
 
         stiffness = self.links[0].stiffness(s)
@@ -196,7 +197,7 @@ def _shared_alias_sums(
     """`alias_sums` at angles that the batch shares, shape (L,): all aliases in one call."""
     k = _numbers(nearest, furthest)
     omega = ((theta + 2 * np.pi * k[:, None]) / period_s).ravel()
-    values = remainder.on_axis(omega) / (1j * omega[:, None])
+    values = remainder.on_axis(omega)
     turned = np.exp(-2j * np.pi * k[:, None] * delay_s / period_s)
     # By name: where a series reaches everything there is no alias, and nothing to count from.
     return np.einsum("kb,klb->lb", turned, values.reshape(len(k), len(theta), values.shape[-1]))
@@ -224,10 +225,9 @@ def sampled_remainder(
     nodes = nodes_at(frequency_hz, period_s)
     omega = np.asarray(nodes.s.imag, float)
     theta = omega * period_s
-    s = nodes.s[:, None]
-    total: Complexes = remainder.on_axis(omega) / s
+    total = remainder.on_axis(omega)
     top = float(np.max(theta))
-    fastest = fastest_pole(laurent(remainder.compliances[1, 1], remainder.denominator, period_s))
+    fastest = fastest_of(remainder.compliances[1, 1], remainder.denominator, period_s)
     few = len(theta) <= _TERMS
     nearest = np.maximum(1 + np.ceil((fastest + top - _REACH) / (2 * np.pi)), 1)
     series_from = np.zeros(len(fastest), int)  # 0: no series converges, or nothing is a number

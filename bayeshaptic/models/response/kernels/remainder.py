@@ -37,7 +37,7 @@ def add_link(
     stiffness: Floats,
     out: Floats,
 ) -> None:
-    """-lambda m^2 / (d (d + lambda h)) of one link, m, h and d polynomials at j omega.
+    """-lambda m^2 / (d (d + lambda h)) / (j omega) of one link, m, h and d polynomials there.
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ def add_link(
             square, square_j = m * m - mj * mj, 2.0 * m * mj
             above = k * square - kj * square_j
             above_j = k * square_j + kj * square
-            size = -1.0 / (below * below + below_j * below_j)
-            out[line, b, 0] = size * (above * below + above_j * below_j)
-            out[line, b, 1] = size * (above_j * below - above * below_j)
+            size = 1.0 / (omega[line] * (below * below + below_j * below_j))
+            out[line, b, 0] = size * (above * below_j - above_j * below)
+            out[line, b, 1] = size * (above * below + above_j * below_j)
 
 
 @kernel
