@@ -30,6 +30,7 @@ from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.effects.effect import Effect as BenchEffect
 from bayeshaptic.rig.effects.friction import StribeckFriction
+from bayeshaptic.rig.effects.nonlinear import Drag
 from bayeshaptic.stability import critical_stiffness
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -226,6 +227,20 @@ def test_friction_on_the_other_mass_is_put_there() -> None:
     best = best_of(LoadFriction(0.5), "excess noise")
     assert best.accepted.title.endswith("at the load")
     assert best.accepted.estimates["friction_force"].mean == pytest.approx(0.5, rel=0.1)
+
+
+def test_drag_at_the_load_is_put_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drag at the motor, and then a spring, took its place: a limit 2.7 times too high."""
+    only(monkeypatch, "drag", "cubic_damping")
+    best = best_of(Drag(200.0, "m2"), "v|v|")
+    assert best.name == "drag" and best.accepted.title.endswith("at the load")
+    assert best.accepted.estimates["drag_coefficient"].mean == pytest.approx(200.0, rel=0.1)
+
+
+def test_a_law_is_tried_where_the_friction_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    only(monkeypatch, "coulomb_friction", "rising_friction")
+    best = best_of(StribeckFriction(0.8, 0.3, 0.005, "m2"), "sign(v2)")
+    assert best.name == "rising_friction" and best.accepted.title.endswith("at the load")
 
 
 def test_damping_by_the_cube_is_told_from_drag(monkeypatch: pytest.MonkeyPatch) -> None:

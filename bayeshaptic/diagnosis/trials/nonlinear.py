@@ -118,9 +118,11 @@ def _search(
     tick: Callable[[str], None] | None = None,
     known: Point | None = None,
 ) -> Point:
-    """The best variant on a coarse scan of strengths, or beside the strength of a known force."""
+    """The best variant on a coarse scan of strengths, or beside those of a force known by a law."""
     if tick:
         tick(variants[0].title)
+    if known:
+        variants = [effect for effect in variants if effect.place == known.effect.place]
     theta = bench.state.fit.theta
     points: list[Point] = []
     for effect in variants:

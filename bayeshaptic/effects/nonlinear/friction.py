@@ -36,6 +36,11 @@ def _against(v: Floats) -> Floats:
     return -np.sign(v)
 
 
+def _bodies(motion: Mapping[Place, Motion]) -> dict[Place, float]:
+    """Where something may rub against the ground, and the rms velocity there."""
+    return {p: float(motion[p].velocity.std()) for p in (MOTOR, LOAD) if p in motion}
+
+
 class _DryFriction(NonlinearEffect):
     """A force against the motion: one mass has one, by whichever law."""
 
@@ -62,7 +67,7 @@ class CoulombFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        return tuple(cls(place) for place in (MOTOR, LOAD) if place in motion)
+        return tuple(map(cls, _bodies(motion)))
 
     @classmethod
     def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
@@ -91,7 +96,7 @@ class StribeckFriction(_DryFriction):
 
     name = "stribeck_friction"
     title = "dry friction that falls with velocity (Stribeck)"
-    over = (VELOCITY,)
+    over = (VELOCITY, LOAD_VELOCITY)
     dimensions = {"static_excess": "number", "stribeck_velocity": "velocity"}
     tuned = ("static_excess", "stribeck_velocity")
 
@@ -99,9 +104,9 @@ class StribeckFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        usual = float(motion[MOTOR].velocity.std())
         return tuple(
-            cls(MOTOR, {"static_excess": rise, "stribeck_velocity": share * usual})
+            cls(place, {"static_excess": rise, "stribeck_velocity": share * usual})
+            for place, usual in _bodies(motion).items()
             for rise in (0.35, 0.8)
             for share in (0.05, 0.25)
         )
@@ -141,7 +146,7 @@ class RisingFriction(_DryFriction):
 
     name = "rising_friction"
     title = "dry friction that rises with velocity"
-    over = (VELOCITY,)
+    over = (VELOCITY, LOAD_VELOCITY)
     dimensions = {"lack_at_rest": "number", "rising_velocity": "velocity"}
     tuned = ("lack_at_rest", "rising_velocity")
     most = {"lack_at_rest": 1.0}
@@ -150,9 +155,9 @@ class RisingFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        usual = float(motion[MOTOR].velocity.std())
         return tuple(
-            cls(MOTOR, {"lack_at_rest": 0.7, "rising_velocity": share * usual})
+            cls(place, {"lack_at_rest": 0.7, "rising_velocity": share * usual})
+            for place, usual in _bodies(motion).items()
             for share in (0.2, 0.6)
         )
 
@@ -171,7 +176,7 @@ class DahlFriction(_DryFriction):
     name = "dahl_friction"
     title = "dry friction that begins as a spring (Dahl)"
     # It may look like a spring, or like nothing but noise.
-    over = (VELOCITY, POSITION, STRETCH, EXCESS_NOISE)
+    over = (VELOCITY, LOAD_VELOCITY, POSITION, STRETCH, EXCESS_NOISE)
     dimensions = {"presliding_distance": "position"}
     tuned = ("presliding_distance",)
 
@@ -179,9 +184,11 @@ class DahlFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        usual = float(motion[MOTOR].velocity.std()) / (2 * np.pi * 10.0)
+        rate = 2 * np.pi * 10.0
         return tuple(
-            cls(MOTOR, {"presliding_distance": share * usual}) for share in (0.1, 0.3, 1.0, 3.0)
+            cls(place, {"presliding_distance": share * usual / rate})
+            for place, usual in _bodies(motion).items()
+            for share in (0.1, 0.3, 1.0, 3.0)
         )
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
@@ -199,11 +206,17 @@ def _dahl(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyp
 class _PowerOfVelocity(NonlinearEffect):
     """A force against the motion that grows with a power of the velocity."""
 
-    over = (VELOCITY,)
+    over = (VELOCITY, LOAD_VELOCITY)
     power: ClassVar[int]
 
     also: ClassVar[tuple[int, ...]] = ()
     """Powers that have no law of their own."""
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        return tuple(map(cls, _bodies(motion)))
 
     @classmethod
     def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
