@@ -12,7 +12,7 @@ from fake_analysis import _tests, fake_closed
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.traced import Traced
-from bayeshaptic.diagnosis.trials.drift import _edge_error, _fall, drift_trials
+from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, drift_trials
 from bayeshaptic.diagnosis.widening.discrepancy import share_left, with_discrepancy
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
@@ -61,8 +61,27 @@ def test_the_fall_is_that_of_a_ramp_from_the_middle_of_a_part_to_its_end() -> No
     for slope in (0.4, -0.4):
         limits = 100 * np.exp(slope * centres)
         ends = 100 * np.exp(slope * np.array([0.0, 1.0]))
-        assert _fall(limits) == pytest.approx(np.log(limits.min() / ends.min()))
-    assert _fall(np.array([3.0, 1.0, 2.0])) == 0, "nothing goes on from the middle"
+        assert _fall(limits, ends) == pytest.approx(np.log(limits.min() / ends.min()))
+        assert _fall(limits, limits) == pytest.approx(np.log(limits.min() / ends.min()))
+    assert _fall(np.array([3.0, 1.0, 2.0]), np.array([4.0, 2.0])) == 0, "nothing goes on"
+
+
+def test_a_grip_that_gets_firmer_is_limited_by_its_end_where_another_crossing_binds() -> None:
+    """Grips rise by 2.6 over the recording: part by part the limit rises, at the end it is less."""
+    model = build_model("grasped", "phantom")
+    at = np.array([0.0, 1.0, 3.0, 5.0, 6.0]) / 6
+    grip = np.isin(model.names, ("kh", "bh", "ks", "bs"))
+    course = model.values * np.where(grip, 2.64 ** at[:, None], 1.0)
+    course[:, model.names.index("b2")] = 0.0
+    limits = critical_stiffness(model, course).samples
+    assert limits[1] < limits[2] < limits[3] and limits[4] < limits[0]
+    ends = critical_stiffness(model, _ends(course[1:4])).samples
+    assert ends == pytest.approx(limits[[0, 4]], rel=1e-6)
+    assert _fall(limits[1:4], ends) == pytest.approx(np.log(limits[1] / limits[4]))
+    lost = course[1:4] * np.where(np.array(model.names) == "bs", [[1e-4], [1.0], [1e4]], 1.0)
+    assert _ends(lost)[:, model.names.index("bs")] == pytest.approx(
+        lost[[0, 2], model.names.index("bs")]
+    )
 
 
 def test_a_drift_needs_three_parts_as_long_as_recordings_are() -> None:

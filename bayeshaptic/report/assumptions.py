@@ -138,7 +138,7 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
     if fall > 0:
         found.append(
             "The limit is that of the worst part of the recording, and up to "
-            f"{pure(100 * fall, 2)} % lower at its end if the drift is steady."
+            f"{pure(100 * fall, 2)} % lower at one of its ends if the drift is steady."
         )
     if closed.verdict == "unexplained":
         found.append(

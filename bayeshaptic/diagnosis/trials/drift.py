@@ -32,6 +32,7 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Tick
 
 PARTS = 3
+_KNOWN = 1.0  # log change from part to part: a parameter with more is one that parts do not see
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,9 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         theta = fit_part(narrow, windows, theta)
         gains += log_likelihoods(narrow, windows, theta) - before
         found.append(theta)
-    limits = critical_stiffness(narrow, np.stack(found)).samples
+    course = np.stack(found)
+    limits = critical_stiffness(narrow, course).samples
+    ends = critical_stiffness(narrow, _ends(course)).samples
     worst = int(np.argmin(limits))
     size = len(varying) * (PARTS - 1)
     estimates = _estimates(narrow, found) | {"worst_part": Estimate(worst + 1.0, 0.0, "")}
@@ -105,7 +108,7 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         f"log likelihood of windows it was not fitted to by {gains[1]:.0f}; the limit is that of "
         f"part {worst + 1}",
         estimates,
-        limit_log_fall=0.0 if kind is _GAIN else _fall(limits),
+        limit_log_fall=0.0 if kind is _GAIN else _fall(limits, ends),
     )
     changed, good = state, thresholds.convincing(gains[0], gains[1], size)
     if good and kind is _GAIN:
@@ -117,16 +120,35 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
     return Trial(accepted, changed, float(gains[0]), float(gains[1]), size)
 
 
-def _fall(limits: Floats) -> float:
-    """How much log K_CR falls from the middle of the worst part to the end of the recording.
+def _fall(limits: Floats, ends: Floats) -> float:
+    """How much log K_CR falls from the middle of the worst part to the worse end of the recording.
 
-    That is half of a steady ramp's fall from the part beside it, if the worst is the first or last.
+    At least half of a steady ramp's fall from the part beside it, if the worst is the first or the
+    last.  Another crossing may bind at an end, one that every part is far from: a limit that rises
+    with the grip, part by part, may be lowest where the grip is firmest.
+
+    Parameters
+    ----------
+    limits, ends : ndarray
+        K_CR of every part, and of the parameters at both ends.
     """
     worst = int(np.argmin(limits))
-    if worst not in (0, len(limits) - 1) or limits[worst] <= 0:
+    if limits[worst] <= 0:
         return 0.0
-    beside = limits[1] if worst == 0 else limits[-2]
-    return 0.5 * float(np.log(beside / limits[worst]))
+    falls = [float(np.log(limits[worst] / end)) for end in ends if end > 0]
+    if worst in (0, len(limits) - 1):
+        beside = limits[1] if worst == 0 else limits[-2]
+        falls.append(0.5 * float(np.log(beside / limits[worst])))
+    return max([0.0, *falls])
+
+
+def _ends(found: Floats) -> Floats:
+    """Parameters at both ends of the recording, (2, P): half a part on, as they drift all along."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = np.log(found[-1] / found[0]) / (len(found) - 1)  # a part
+    known = np.abs(rate) < _KNOWN  # not a number where both are zero
+    further = np.where(known, np.exp(0.5 * np.where(known, rate, 0.0)), 1.0)
+    return np.stack([found[0] / further, found[-1] * further])
 
 
 def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> tuple[State, float]:
