@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -135,6 +136,15 @@ def test_ties(first: Trial, second: Trial, tie: bool) -> None:
 def test_what_may_remain(families: tuple[str, ...], test: ResidualTest, flagged: bool) -> None:
     left = remaining([test], accepted(*families), [found("nonlinear", 100.0)])
     assert any(test.flagged for test in left) is flagged
+
+
+def test_positions_that_are_rounded_allow_for_nothing_more() -> None:
+    """Dry friction, 5 sd, passed beside a coarse encoder, with a limit 4 % too high."""
+    rounded = Accepted("quantisation", "quantisation", "measurement", "")
+    tests = [found("nonlinear", 5.0), found("measurement", 99.0)]
+    assert [test.flagged for test in remaining(tests, [rounded], [])] == [True]
+    lost = replace(rounded, name="dropped_samples")
+    assert not any(test.flagged for test in remaining(tests, [rounded, lost], []))
 
 
 @pytest.mark.parametrize(
