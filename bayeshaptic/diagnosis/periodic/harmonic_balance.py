@@ -285,6 +285,6 @@ class _Joint:
         if not self.forces:
             return np.zeros(0)
         slope = self.linearised(theta, np.zeros(len(self.forces)))[1]
-        covariance = np.linalg.pinv(slope.T @ slope)
-        sd = np.sqrt(np.diag(covariance))[self.model.size :]
+        # Roots of the diagonal of (slope^T slope)^+, of which rounding makes none negative.
+        sd = np.linalg.norm(np.linalg.pinv(slope), axis=1)[self.model.size :]
         return np.asarray(sd * self._unit(self.columns(theta)))
