@@ -53,6 +53,14 @@ FORCES: tuple[tuple[str, dict[str, float], float, dict[str, float], Any], ...] =
     ("backlash", {"gap": 4e-5, "free_damping": 0.0}, 4e-5, {"damping_in_gap": 1.0}, CONNECTION),
     ("actuator_saturation", {"limit": 5.0}, 5.0, {}, MOTOR),
 )
+ALONG = (
+    "friction_along_the_way",
+    {},
+    0.6,
+    {"friction_ratio": 3.0, "way_middle": 2e-4, "way_span": 2e-3},
+    MOTOR,
+)
+COMPILED = (*FORCES[:-1], ALONG)
 OURS = {"hardening_connection": "hardening_spring"}
 BENCHS = {"rising_friction": "stribeck_friction"}  # with less at rest than in motion
 
@@ -69,7 +77,7 @@ def recorded(bench: Bench) -> Recording:
     return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
 
 
-@pytest.mark.parametrize("case", FORCES[:-1], ids=[force[0] for force in FORCES[:-1]])
+@pytest.mark.parametrize("case", COMPILED, ids=[force[0] for force in COMPILED])
 def test_compiled_steps_are_the_plain_ones(case: Any) -> None:
     name, _, strength, shape, place = case
     model = build_model("grasped", "lhifam")

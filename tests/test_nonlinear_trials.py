@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
@@ -35,6 +36,8 @@ from bayeshaptic.stability import critical_stiffness
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from foreign import LoadFriction, TanhSaturation, VelocityCubed
+from strangers.device import Masses
+from strangers.motion import STEPS, Forces, Motion
 
 LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 10.0, 3
@@ -227,6 +230,45 @@ def test_friction_on_the_other_mass_is_put_there() -> None:
     best = best_of(LoadFriction(0.5), "excess noise")
     assert best.accepted.title.endswith("at the load")
     assert best.accepted.estimates["friction_force"].mean == pytest.approx(0.5, rel=0.1)
+
+
+def guided(tighter: float) -> tuple[State, float]:
+    """Two masses of another simulation, whose motor rubs more along the way, and their limit."""
+    pair = Masses([0.19, 5.2])
+    pair.tie(0, None, 0.1, 0.0)
+    pair.tie(0, 1, 15.0, 55.3e3)
+    pair.tie(1, None, 6.8, 0.0)
+    device, period, delay = pair.states(), 1e-3, 2e-4
+    transition, entry, entries = device.held(period / STEPS)
+    samples = int(SECONDS / period)
+    none = np.zeros(samples)
+    motion = Motion(
+        transition[None], samples, entry, entries, device.c, round(delay / period * STEPS)
+    )
+    noise = np.random.default_rng(1).normal(size=samples)
+    force = 4.0 * sosfilt(butter(2, [0.3, 300.0], "band", fs=1 / period, output="sos"), noise)
+    position = motion.under(force, none, Forces(friction=0.4, tighter=tighter))
+    count = 3e-6
+    recording = recording_from_arrays(force, count * np.round(position / count), period_s=period)
+    etfe = estimate_etfe(recording)
+    state = State(etfe, least_squares(build_model("free", "lhifam"), etfe))
+    return state, device.critical_stiffness(period, delay)
+
+
+def test_friction_that_changes_along_the_way_is_sized(monkeypatch: pytest.MonkeyPatch) -> None:
+    only(monkeypatch, "coulomb_friction", "friction_along_the_way")
+    tighter = 50.0
+    state, truth = guided(tighter)
+    best = max(nonlinear_trials(state, {"sign(v)"}, Meter()), key=lambda trial: trial.score)
+    assert best.name == "friction_along_the_way" and best.convincing
+    position = state.etfe.unbroken.position
+    found = {name: e.mean for name, e in best.accepted.estimates.items()}
+    assert found["friction_force"] == pytest.approx(
+        0.4 * np.exp(tighter * position.mean()), rel=0.1
+    )
+    slope = np.log(found["friction_ratio"]) / (4 * position.std())
+    assert slope == pytest.approx(tighter, rel=0.15)
+    assert limit_db(best.state) == pytest.approx(20 * np.log10(truth), abs=2.0)
 
 
 def test_drag_at_the_load_is_put_there(monkeypatch: pytest.MonkeyPatch) -> None:

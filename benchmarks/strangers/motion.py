@@ -17,9 +17,10 @@ STEPS = 8  # a sample
 class Forces:
     """What pushes besides the command; zero is none.
 
-    Dry friction at the motor, more by `sticking` at rest; in the transmission a cubic spring and a
-    gap in the linear one; quadratic drag on the body; cogging (as a force) and ripple (as a share
-    of the command) over the motor's position; a command that is compressed as tanh.
+    Dry friction at the motor, more by `sticking` at rest, and e times more every 1/`tighter` of the
+    way; in the transmission a cubic spring and a gap in the linear one; quadratic drag on the body;
+    cogging (as a force) and ripple (as a share of the command) over the motor's position; a command
+    that is compressed as tanh.
     """
 
     friction: float = 0.0
@@ -34,6 +35,7 @@ class Forces:
     ripple: float = 0.0
     ripples: float = 0.0
     compressed: float = 0.0
+    tighter: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Motion:
 @njit(cache=True)
 def _run(transitions, every, entry, entries, position, late, command, hand, numbers):  # type: ignore[no-untyped-def]
     friction, sticking, slow, cubic, gap, spring, drag = numbers[:7]
-    cogging, cogs, ripple, ripples, compressed = numbers[7:]
+    cogging, cogs, ripple, ripples, compressed, tighter = numbers[7:]
     samples, row = len(command), entries.shape[1]
     state, found, inner = np.zeros(len(entry)), np.zeros(samples), np.zeros(row)
     for k in range(samples):
@@ -95,6 +97,7 @@ def _run(transitions, every, entry, entries, position, late, command, hand, numb
             ahead = transition @ state + entry * force + entries @ inner
             if friction > 0:  # what would stop the motor, as far as friction reaches
                 most = friction * (1 + (sticking - 1) * np.exp(-((ahead[row] / slow) ** 2)))
+                most *= np.exp(tighter * state[0])
                 stop = max(-most, min(most, -ahead[row] / entries[row, 0]))
                 ahead += entries[:, 0] * stop
             state = ahead

@@ -69,10 +69,12 @@ def nonlinear_trials(
             firsts[kind.strength[0]] = called
 
     def searched(laws: Iterable[_Called], known: dict[str, Point]) -> list[Point]:
+        beside = [(law, known.get(law[0].strength[0])) for law in laws]
+        there = [(_beside(law, point), point) for law, point in beside]
         return [
-            _search(bench, called, motion, tick, known.get(called[0].strength[0]))
-            for called in laws
-            if meter.affords(called[0].title)
+            _search(bench, law, motion, tick, point)
+            for law, point in there
+            if law and meter.affords(law[0].title)
         ]
 
     found = _fitted(bench, searched(firsts.values(), {}), meter)
@@ -92,6 +94,11 @@ def _there(kind: type[NonlinearEffect], state: State) -> bool:
     names = {accepted.name for accepted in state.accepted}
     actuators = {k.name for k in effects("nonlinear") if issubclass(k, CommandEffect)}
     return kind.name in (names | actuators if names & actuators else names)
+
+
+def _beside(variants: _Called, known: Point | None) -> _Called:
+    """Where a force is known by another law, the variants at its place."""
+    return [e for e in variants if known is None or e.place == known.effect.place]
 
 
 def _fitted(
@@ -118,11 +125,9 @@ def _search(
     tick: Callable[[str], None] | None = None,
     known: Point | None = None,
 ) -> Point:
-    """The best variant on a coarse scan of strengths, or beside those of a force known by a law."""
+    """The best variant on a coarse scan of strengths, or beside that of a known force."""
     if tick:
         tick(variants[0].title)
-    if known:
-        variants = [effect for effect in variants if effect.place == known.effect.place]
     theta = bench.state.fit.theta
     points: list[Point] = []
     for effect in variants:

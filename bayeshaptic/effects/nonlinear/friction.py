@@ -167,6 +167,39 @@ class RisingFriction(_DryFriction):
 
 
 @register
+class FrictionAlongTheWay(_DryFriction):
+    """Dry friction that grows along the way, or falls, as of a guide that is tighter at one end.
+
+    Bound Fc ratio^((x - middle)/span): to first order a straight line, and never below zero.
+    """
+
+    name = "friction_along_the_way"
+    title = "dry friction that changes along the way"
+    over = (VELOCITY,)
+    dimensions = {"friction_ratio": "number", "way_middle": "position", "way_span": "position"}
+    tuned = ("friction_ratio",)
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        position = motion[MOTOR].position
+        span = 4 * float(position.std())
+        way = {"way_middle": float(position.mean()), "way_span": span}
+        return tuple(cls(MOTOR, {"friction_ratio": ratio, **way}) for ratio in (0.5, 2.0))
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        shape = self.shape
+        fast = math.log(shape["friction_ratio"]) / shape["way_span"]
+        return Law(_along_the_way, (strength, fast, shape["way_middle"]))
+
+
+def _along_the_way(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    bound = constants[0] * math.exp(constants[1] * (x - constants[2]))
+    return min(max(-last / gain, -bound), bound)
+
+
+@register
 class DahlFriction(_DryFriction):
     """Dry friction that begins as a spring: F' = -s (v + |v| F / Fc) with s = Fc / distance.
 
