@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayeshaptic.effects.linear.reflex import reflex_stiffness
 from bayeshaptic.models import LinearSystem, build_model
 from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.mechanism import Mechanism
@@ -187,6 +188,14 @@ def test_one_link_is_compiled_as_it_is_written():
     omega = np.concatenate([np.geomspace(0.1, 3e3, 50), -np.geomspace(3e3, 6e4, 50)])
     s = 1j * omega[:, None]
     np.testing.assert_allclose(one.on_axis(omega), one.at(s) / s, rtol=1e-12)
+
+
+@pytest.mark.parametrize("columns", [1, 7])
+def test_a_reflex_is_compiled_as_it_is_written(columns):
+    values = np.geomspace(0.5, 2.0, 7) * np.array([[300.0], [4.0], [0.03], [0.01]])
+    omega = np.random.default_rng(2).uniform(-6e4, 6e4, (40, columns))
+    mine, plain = reflex_stiffness(1j * omega, *values), late(1j * omega, *values)
+    np.testing.assert_allclose(mine, plain, rtol=1e-11)
 
 
 def test_vectors_that_are_no_numbers_leave_the_others_alone():

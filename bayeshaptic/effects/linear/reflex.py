@@ -12,7 +12,7 @@ from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import HAND, apart, grid, place_of, typical
 from bayeshaptic.effects.unseen import Unseen, combined
 from bayeshaptic.models import HalfNormal, LinearSystem, LogNormal, Model, Parameter
-from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink, delayed
+from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink
 from bayeshaptic.recordings.response.etfe import Etfe
 
 DELAYS_S, LAGS_S = (0.015, 0.025, 0.04, 0.07), (0.004, 0.02)  # where to start looking
@@ -21,8 +21,19 @@ DELAYS_S, LAGS_S = (0.015, 0.025, 0.04, 0.07), (0.004, 0.02)  # where to start l
 def reflex_stiffness(
     s: Complexes, stiffness: Floats, damping: Floats, delay_s: Floats, lag_s: Floats
 ) -> Complexes:
-    """(k + b s) e^(-s delay) / (1 + s lag)."""
-    return (stiffness + damping * s) * delayed(s, delay_s) / (1 + s * lag_s)
+    """(k + b s) e^(-s delay) / (1 + s lag), for `s` of shape (L, 1) or (L, B), values (B,).
+
+    On the imaginary axis, where nearly all points are, compiled.
+    """
+    if s.ndim != 2 or np.any(s.real):
+        return (stiffness + damping * s) * np.exp(-s * delay_s) / (1 + s * lag_s)
+    from bayeshaptic.effects.linear.reflex_kernel import on_axis
+
+    k, b, delay, lag = map(np.ascontiguousarray, (stiffness, damping, delay_s, lag_s))
+    omega = np.ascontiguousarray(np.broadcast_to(s.imag, (len(s), len(k))))
+    found = np.empty(omega.shape, complex)
+    on_axis(omega, k, b, delay, lag, found.view(float).reshape(*omega.shape, 2))
+    return found
 
 
 @register

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,14 +47,3 @@ class DynamicLink:
         if ratio is not None:
             ratio = ratio[0][:, index], ratio[1][:, index]
         return replace(self, values=tuple(value[index] for value in self.values), ratio=ratio)
-
-
-def delayed(s: NDArray[Any], delay_s: NDArray[Any]) -> Complexes:
-    """e^(-s delay); on the imaginary axis, where nearly all points are, by cosine and sine."""
-    if np.any(s.real):
-        return np.exp(-s * delay_s)
-    angle = s.imag * delay_s
-    turned = np.empty(angle.shape, complex)
-    np.cos(angle, out=turned.real)
-    np.sin(-angle, out=turned.imag)
-    return turned
