@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.feedback.other_valley import VALLEY
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.diagnosis.trials.drift import PARTS
 from bayeshaptic.effects.laws import tested, variables
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.recordings.sufficiency import SHORTEST_S
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
     misfit_factor,
@@ -40,11 +38,10 @@ def why_none(result: Result) -> tuple[str, ...]:
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part"
         )
-    if closed and _changes(closed):
+    if closed and changes(closed):
         found.append(
             "the device is not the same at the end of the recording as at its beginning, and what "
-            "changes was not found; it is followed under a force that does not repeat, from "
-            f"{pure(PARTS * SHORTEST_S)} s on"
+            "changes was not found"
         )
     return tuple(found)
 
@@ -109,7 +106,7 @@ def _left(closed: Closed) -> set[str]:
     return {test.name for test in closed.traced.after if test.flagged}
 
 
-def _changes(closed: Closed) -> bool:
+def changes(closed: Closed) -> bool:
     """Whether the device changes by more than noise, and no drift explains it."""
     left = _left(closed)
     return any(test.name in left for test in closed.traced.after if test.family == "time-varying")

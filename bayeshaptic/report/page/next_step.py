@@ -6,8 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.diagnosis.trials.drift import PARTS
+from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.sufficiency import SHORTEST_S
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
+from bayeshaptic.report.objections import changes
 
 if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline
@@ -69,6 +73,16 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
         )
     if result.closed is None:
         return (Step("Let the loop look for what the model lacks (leave out --no-loop):", command),)
+    if changes(result.closed):
+        grip = ", hold it alike all the time" if analysis.model.held else ""
+        return (
+            Step(
+                f"Let the device warm up{grip}, and record at least "
+                f"{pure(PARTS * SHORTEST_S)} s of a force that does not repeat: in that a change "
+                "can be followed. Then:",
+                f"bayeshaptic report NEW.csv{_device(result)}",
+            ),
+        )
     if is_unexplained(result):
         alone = ", and with nobody holding the device" if may_be_held(analysis) else ""
         return (
