@@ -22,7 +22,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
-from bayeshaptic.recordings.signals.rounding import repeated_rounding
+from bayeshaptic.recordings.signals.rounding import hidden_rounding, repeated_rounding
 
 MEASURED = Path(
     os.environ.get(
@@ -315,6 +315,24 @@ def test_repeated_rounding(noise):
     left = np.mean((rounded.mean(axis=0) - place) ** 2) - scatter / periods
     # Standard error of the mean of 4000 squares near 1/12.
     assert repeated_rounding(float(scatter)) == pytest.approx(left, abs=4 * 0.0745 / np.sqrt(4000))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.15])
+@pytest.mark.parametrize("step", [0.2, 0.5, 2.0])
+def test_rounding_of_a_slow_motion_is_no_white_noise(step, noise):
+    """Against rounding simulated, at lines below a tenth of the Nyquist frequency."""
+    rng, periods, samples = np.random.default_rng(21), 4, 8000
+    lines, ours, simulated = np.arange(20, 400), [], []
+    for _ in range(6):
+        motion = multisine(rng, samples, np.arange(1, 400))
+        motion *= step / np.diff(motion).std()
+        seen = np.round(motion + noise * rng.standard_normal((periods, samples)))
+        smooth = np.round(motion + noise * rng.standard_normal((100, samples))).mean(axis=0)
+        error = np.fft.rfft(smooth - motion)[lines]
+        simulated.append(periods * np.mean(np.abs(error) ** 2) / samples)
+        ours.append(np.mean(hidden_rounding(seen, lines, 1.0)))
+    # 2280 squares, of neighbours that share some of their error; and a hundredth of the noise.
+    assert np.mean(ours) == pytest.approx(np.mean(simulated), rel=0.15)
 
 
 def test_exactly_repeated_counts_have_a_variance():

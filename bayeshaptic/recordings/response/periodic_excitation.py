@@ -172,7 +172,7 @@ def _spectra(
     shrink = 1 / np.sqrt(1 + leverage)
     freedom = width - LEAKAGE_TERMS + 1
     answer = (spectrum[line] - below) * shrink
-    rounding = hidden_rounding(position, recording.encoder_resolution)
+    rounding = hidden_rounding(position, harmonics, recording.encoder_resolution)
     floor = rounding + (REPEATS_TO * np.abs(answer)) ** 2
     return PeriodicSpectra(
         frequency_hz=harmonics / (samples * recording.period_s),

@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+
+from bayeshaptic.types import Floats, Ints
+
+_ORDERS = np.arange(1, 100)  # of the rounding error's Fourier series
 
 
-def hidden_rounding(position: NDArray[Any], count: float | None = None) -> float:
-    """Variance that rounding adds to a line of the DFT and that the periods' scatter cannot show.
+def hidden_rounding(position: Floats, harmonics: Ints, count: float | None = None) -> Floats:
+    r"""Variance that rounding adds to lines of the DFT and that the periods' scatter cannot show.
+
+    Of a motion whose increments are normal, of mean square D over a lag, the rounding error has
+    from one period to another the covariance
+
+    .. math:: R(D) = \sum_k e^{-2 \pi^2 k^2 (D + 2 \sigma^2)} / (2 \pi^2 k^2)
+
+    in counts, sigma the noise before rounding (B. Widrow and I. Kollar, "Quantization Noise",
+    Cambridge, 2008): no white noise where the motion takes several samples for a count.  What is
+    recorded has increments of mean square D + 2 R(0) - 2 R(D).
 
     Parameters
     ----------
     position : ndarray, shape (M, p)
         M periods.
+    harmonics : ndarray of int, shape (L,)
     count : float, optional
         One encoder count; the smallest increment of the position by default.
 
     Returns
     -------
-    float
+    ndarray, shape (L,)
         For a DFT over the square root of the number of samples: what repeats gathers in the
         harmonics, hence M times its variance a sample.
     """
@@ -28,9 +39,27 @@ def hidden_rounding(position: NDArray[Any], count: float | None = None) -> float
     if count is None:
         count = float(np.min(increments[increments > 0], initial=np.inf))
     floating_point = (np.finfo(float).eps * np.abs(position).max()) ** 2
-    scatter = np.mean(np.var(position, axis=0, ddof=1))
-    repeated = count**2 * repeated_rounding(scatter / count**2)
-    return float(len(position) * repeated + floating_point)
+    scatter = float(np.mean(np.var(position, axis=0, ddof=1))) / count**2
+    sigma, _ = _repeated()
+    noise = float(np.interp(scatter, _scatter(), sigma))
+    mean = position.mean(axis=0) / count
+    power = np.abs(np.fft.rfft(mean - mean.mean())) ** 2
+    alike = np.fft.irfft(power, len(mean)) / len(mean)
+    recorded = 2 * np.maximum(alike[0] - scatter / len(position) - alike, 0)
+    recorded[0] = 0
+    apart = np.concatenate([[0.0], np.geomspace(1e-6, 1e2, 400)])
+    rounded = _covariance(apart, noise)
+    apart_here = np.interp(recorded, apart + 2 * (rounded[0] - rounded), apart)
+    spectrum = np.fft.rfft(np.interp(apart_here, apart, rounded)).real
+    return np.asarray(
+        len(position) * count**2 * np.maximum(spectrum[harmonics], 0) + floating_point
+    )
+
+
+def _covariance(apart: Floats, noise: float) -> Floats:
+    """Of rounding errors whose motions are apart by a mean square, with noise before rounding."""
+    squared = 2 * (np.pi * _ORDERS[:, None]) ** 2
+    return np.asarray(np.sum(np.exp(-squared * (apart + 2 * noise**2)) / squared, axis=0))
 
 
 def repeated_rounding(scatter: float) -> float:
@@ -55,7 +84,19 @@ def repeated_rounding(scatter: float) -> float:
     float
         r, square counts.
     """
+    sigma, repeated = _repeated()
+    return float(np.interp(scatter, _scatter(), repeated))
+
+
+def _repeated() -> tuple[Floats, Floats]:
+    """Noise before rounding, and r of it."""
     sigma, k = np.linspace(0, 1, 201), np.arange(1, 100)[:, None]
     repeated = np.sum(np.exp(-((2 * np.pi * k * sigma) ** 2)) / (2 * np.pi**2 * k**2), axis=0)
     repeated[0] = 1 / 12
-    return float(np.interp(scatter, sigma**2 + 1 / 12 - repeated, repeated))
+    return sigma, repeated
+
+
+def _scatter() -> Floats:
+    """Between periods, of the same noise."""
+    sigma, repeated = _repeated()
+    return np.asarray(sigma**2 + 1 / 12 - repeated)
