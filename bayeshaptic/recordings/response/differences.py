@@ -10,22 +10,24 @@ can tell it from the device's.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.random_excitation import estimate_random
-from bayeshaptic.types import Floats
 
 # Angles w T between which the noise is compared.
-_SLOW, _MIDDLE, _FAST = (0.05, 0.1), (0.2, 0.6), (1.3, 2.0)
-# Noise at the fast over that at the middle angles: 0.5 to 1.7 in 16 recordings of tachometers, 8 to
-# 21 in as many of an encoder's differences (both devices, free and held, beside a command and a
-# measured force), 1.3 to 5.7 where these went through a low-pass of 30 to 200 Hz.
-_SENSOR, _DIFFERENCES = 2.0, 7.0
-# At the slow over that at the middle angles, where a filter has levelled what is above: 0.6 or more
-# of tachometers, 0.12 or less of filtered differences of a free device; a hand hides it.
+_SLOW, _LOWER, _MIDDLE, _FAST = (0.05, 0.1), (0.2, 0.6), (0.3, 0.6), (1.3, 2.0)
+# Noise at the fast over that at the middle angles.  Beside a command, 24 recordings each (both
+# devices, free and held): tachometers 0.6 to 1.07, an encoder's differences 10.0 to 13.5, these
+# through a low-pass of 30 to 200 Hz 1.2 to 6.0.  Beside a measured force tachometers reach 1.5 and
+# differences begin at 7.1.
+_SENSOR, _SENSOR_OF_BOTH, _DIFFERENCES = 1.13, 2.0, 6.5
+_SDS = 3.5  # of a short recording's noise
+# At the slow over that at the lower angles, where a filter has levelled what is above: 0.6 or more
+# of tachometers, 0.16 or less of filtered differences of a free device; a hand hides it.
 _LEVELLED = 0.4
 
 
@@ -40,7 +42,8 @@ def with_differences(recording: Recording) -> Recording:
     sensed = recording.sensed
     if sensed is None or sensed.derivatives != 1:
         return recording
-    slow, middle, fast = _noise(max(recording.pieces, key=lambda piece: piece.samples))
+    noise = _noise(max(recording.pieces, key=lambda piece: piece.samples))
+    slow, lower, middle, fast = noise.power
     if fast > _DIFFERENCES * middle:
         position = np.cumsum(sensed.output) * recording.period_s
         held = replace(sensed, derivatives=0) if sensed.measured_force else None
@@ -50,7 +53,8 @@ def with_differences(recording: Recording) -> Recording:
         )
         notices = (*recording.notices, Notice("note", "columns", text))
         return replace(recording, position=position, sensed=held, notices=notices)
-    if fast < _SENSOR * middle and slow > _LEVELLED * middle:
+    white = _SENSOR_OF_BOTH if sensed.measured_force else max(_SENSOR, 1 + _SDS * noise.sd)
+    if fast < white * middle and slow > _LEVELLED * lower:
         return recording
     raise InputError(
         f"{recording.source or recording.name}: the noise of the velocity is neither that of a "
@@ -59,16 +63,24 @@ def with_differences(recording: Recording) -> Recording:
     )
 
 
-def _noise(recording: Recording) -> tuple[float, float, float]:
-    """Power of the velocity's noise at slow, middle and fast angles."""
+class _Noise(NamedTuple):
+    """Power of the velocity's noise at slow, lower, middle and fast angles.
+
+    `sd` is that of the fast one over the middle one, relative.
+    """
+
+    power: tuple[float, ...]
+    sd: float
+
+
+def _noise(recording: Recording) -> _Noise:
     assert recording.sensed is not None
     whole = (1 / recording.duration_s, 0.49 / recording.period_s)
     windows = estimate_random(recording, whole, None)[0].windows()
     theta = 2 * np.pi * recording.period_s * windows.frequency_hz[:, 1]
-    power = windows.scatter / (windows.lines - 3) * recording.sensed.noise(theta)
-    slow, middle, fast = (_between(theta, power, *part) for part in (_SLOW, _MIDDLE, _FAST))
-    return slow, middle, fast
-
-
-def _between(theta: Floats, power: Floats, low: float, high: float) -> float:
-    return float(np.median(power[(theta > low) & (theta < high)]))
+    freedom = windows.lines - 3
+    power = windows.scatter / freedom * recording.sensed.noise(theta)
+    parts = [(theta > low) & (theta < high) for low, high in (_SLOW, _LOWER, _MIDDLE, _FAST)]
+    of_median = np.pi / 2  # variance of a median over that of the mean
+    sd = np.sqrt(of_median * sum(1 / freedom[part].sum() for part in parts[2:]))
+    return _Noise(tuple(float(np.median(power[part])) for part in parts), float(sd))
