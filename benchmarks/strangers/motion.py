@@ -85,16 +85,20 @@ def _run(transitions, every, entry, entries, position, late, command, hand, numb
                 force = np.tanh(force * compressed) / compressed
             force *= 1 + ripple * np.sin(ripples * state[0])
             inner[:] = 0.0
+            # Inner forces are those in the middle of the step: at its beginning they would be late,
+            # and a gap of a stiff spring late by 60 us damps as much again as the transmission.
+            free = transition @ state + entry * force
+            middle = 0.5 * (state + free)
             if row > 1:
-                stretch = state[0] - state[1]
+                stretch = middle[0] - middle[1]
                 pull = spring * (cubic * stretch**3 - max(-gap, min(gap, stretch)))
                 inner[0] -= pull
                 inner[1] += pull
             body = min(row - 1, 1)
-            inner[body] -= drag * abs(state[row + body]) * state[row + body]
-            inner[0] += cogging * np.sin(cogs * state[0])
+            inner[body] -= drag * abs(middle[row + body]) * middle[row + body]
+            inner[0] += cogging * np.sin(cogs * middle[0])
             inner[-1] += hand[k]
-            ahead = transition @ state + entry * force + entries @ inner
+            ahead = free + entries @ inner
             if friction > 0:  # what would stop the motor, as far as friction reaches
                 most = friction * (1 + (sticking - 1) * np.exp(-((ahead[row] / slow) ** 2)))
                 most *= np.exp(tighter * state[0])
