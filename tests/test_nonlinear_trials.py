@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
 from bayeshaptic.diagnosis.trials.force_fit import spread
-from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
+from bayeshaptic.diagnosis.trials.nonlinear import _scan, nonlinear_trials
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
@@ -334,3 +335,18 @@ def test_scores_of_few_lines_count_for_less() -> None:
     assert np.sum(np.abs(scores) > 4.0) > expected + 4 * np.sqrt(expected)
     assert as_normal(5.0, 1e9) == pytest.approx(5.0, rel=1e-6)
     assert as_normal(80.0, 1e9) == 80.0  # too unlikely for a number
+
+
+def test_a_scan_goes_on_to_fainter_forces_where_its_faintest_is_too_strong() -> None:
+    """A force of 0.01, and scans from one on: gains are a parabola, 40 at the force itself."""
+
+    def point(_: object, strength: float, start: object) -> SimpleNamespace:
+        share = strength / 0.01
+        return SimpleNamespace(strength=strength, gain_fit=80 * share - 40 * share**2, theta=start)
+
+    bench = SimpleNamespace(point=point)
+    found = _scan(bench, None, np.array([1.0, 3.0]), None, beyond=8)  # type: ignore[arg-type]
+    best = max(found, key=lambda one: one.gain_fit)
+    assert 0.01 / np.sqrt(3) < best.strength < 0.01 * np.sqrt(3)
+    beside = _scan(bench, None, np.array([0.8, 1.0]), None)  # type: ignore[arg-type]
+    assert [one.strength for one in beside] == [0.8, 1.0], "a known force is looked for there"

@@ -170,7 +170,25 @@ def _scan(
         gained = points[-1].gain_fit - points[-2].gain_fit if len(points) > 1 else np.inf
         if gained < -too_strong or (number >= len(strengths) - 1 and not gained > 0):
             break
-    return points
+    rising = abs(strengths[-1]) > abs(strengths[0])  # the less an actuator's limit, the stronger
+    return points + (_fainter(bench, effect, points[0], theta, beyond) if rising else [])
+
+
+def _fainter(
+    bench: ForceBench, effect: NonlinearEffect, first: Point, theta: Floats, most: int
+) -> list[Point]:
+    """Where the faintest of a scan is too strong already: ever fainter, until less is no better.
+
+    Tests see forces that are a hundredth of what a scan begins with.
+    """
+    points = [first]
+    no_trace = 1.0  # of the log likelihood
+    while first.gain_fit < 0 and len(points) <= most:
+        points.append(bench.point(effect, points[-1].strength / 3.0, theta))
+        gained = points[-1].gain_fit - points[-2].gain_fit
+        if not gained > 0 or abs(points[-1].gain_fit) < no_trace:
+            break
+    return points[1:]
 
 
 def _trial(bench: ForceBench, point: Point) -> Trial:
