@@ -62,6 +62,14 @@ def test_a_tone_is_no_change() -> None:
     assert not any(t.flagged for t in change_tests(fit, bh.estimate_etfe(louder)))
 
 
+def test_rounding_that_repeats_is_no_noise_of_its_own() -> None:
+    """Where counts alone make noise the first periods have it all; one was flagged with 4.6 sd."""
+    bench = Bench.from_device("lhifam", held=False)
+    made = simulate(bench, Multisine(0.3 * bench.force_rms, 1.0, 150.0, 0.5, 12), seed=3)
+    recording = bh.recording_from_arrays(made.force, made.position, period_s=bench.period_s)
+    assert not any(t.flagged for t in change_tests(*fitted(recording, held=False)))
+
+
 def test_random_excitation_has_a_test_of_its_own() -> None:
     bench = Bench.from_device("lhifam", held=False)
     made = simulate(bench, bh.rig.WhiteNoise(bench.force_rms, 300.0, 0.3, 8.0), seed=1)

@@ -24,6 +24,7 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.local_polynomial import leakage_terms, window_edges
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra, project_out
 from bayeshaptic.recordings.signals.excitation import find_repetition
+from bayeshaptic.recordings.signals.rounding import hidden_rounding
 from bayeshaptic.types import Bools, Complexes, Floats, Ints
 
 CHANGES = {f"{name} between the periods": shape for name, shape in SHAPES.items()}
@@ -75,6 +76,9 @@ class _Between:
     frequency_hz : ndarray, shape (L,)
     position : complex ndarray, shape (L,)
         Leakage removed.
+    rounding : ndarray, shape (L,)
+        Density of the rounding that settled periods repeat: where they do in every count, only
+        the first ones make noise, and theirs is not alike from line to line.
     force : ndarray, shape (N,)
         Of all periods.
     windows : tuple of (slice, ndarray)
@@ -84,6 +88,7 @@ class _Between:
     number: Ints
     frequency_hz: Floats
     position: Complexes
+    rounding: Floats
     force: Floats
     windows: tuple[tuple[slice, Complexes], ...]
 
@@ -127,7 +132,10 @@ def _between(etfe: Etfe) -> _Between | None:
     )
     position = _transform(whole.position)[number]
     force = whole.force - whole.force.mean()
-    found = _Between(number, frequency, position, force, windows)
+    settled = whole.position[samples - etfe.spectra.periods * repetition.period :]
+    settled = settled.reshape(-1, repetition.period)
+    rounding = hidden_rounding(settled, number // periods, recording.encoder_resolution)
+    found = _Between(number, frequency, position, rounding / len(settled), force, windows)
     return replace(found, position=found.without_leakage(position[:, None])[:, 0])
 
 
@@ -181,7 +189,7 @@ def _score(found: _Between, begun: Complexes, columns: Complexes) -> tuple[float
     for _ in range(_ROUNDS):
         free = np.clip(1 - taken, 0.01, 1)
         power = np.abs(left) ** 2 / free
-        noise = _smooth(found.frequency_hz, power, free, kept)
+        noise = np.maximum(_smooth(found.frequency_hz, power, free, kept), found.rounding)
         kept = power < _WILD * noise
         weight = kept * np.sqrt(2 / noise)
         basis = _basis(_real(weight[:, None] * both))
