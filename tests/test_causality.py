@@ -197,6 +197,27 @@ def test_a_force_that_repeats_exactly_is_no_feedback() -> None:
     assert not judge(noisy, position[0]).repeats
 
 
+def test_noise_of_a_force_sensor_under_a_multisine_is_no_feedback() -> None:
+    """Past it the position knows what was commanded; what a controller does not repeat answers."""
+    rng = np.random.default_rng(9)
+    lines = np.zeros(701, complex)
+    lines[1:200] = np.exp(2j * np.pi * rng.random(199))
+    once = np.fft.irfft(lines, 1400)
+    command = np.resize(once / once.std(), 9000)
+    force, position = record("lhifam free", 3.0 * command[None], rng)
+    sensed = force[0] + 0.05 * force[0].std() * rng.normal(size=force.shape[1])
+    assert not judge(sensed, position[0]).doubt
+    place, velocity, before = 0.0, 0.0, 0.0
+    closed = np.zeros((2, 9000))
+    for k, reference in enumerate(0.05 * command):
+        seen = 1e-5 * np.round(place / 1e-5)
+        push = 400.0 * (reference - seen) - 5.0 * (seen - before) / 1e-3
+        closed[:, k], before = (push, seen), seen
+        velocity += (push + 0.1 * rng.normal() - 0.5 * velocity) / 0.5 * 1e-3
+        place += velocity * 1e-3
+    assert judge(closed[0], closed[1]).has_feedback
+
+
 def test_signals_of_other_people_are_neither_feedback_nor_swapped() -> None:
     force, position = open_loops("lhifam grasped")
     found = judge(force[6], position[7])

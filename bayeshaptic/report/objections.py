@@ -110,7 +110,9 @@ def _left(closed: Closed) -> set[str]:
 def changes(closed: Closed) -> bool:
     """Whether the device changes by more than noise, and no drift explains it."""
     left = _left(closed)
-    return any(test.name in left for test in closed.traced.after if test.family == "time-varying")
+    return bool(left) and any(
+        test.name in left for test in closed.traced.after if test.family == "time-varying"
+    )
 
 
 def _rubs_otherwise(closed: Closed) -> bool:

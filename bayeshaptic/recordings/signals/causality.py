@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.excitation import find_repetition, is_sweep
+from bayeshaptic.recordings.signals.excitation import Repetition, find_repetition, is_sweep
 from bayeshaptic.recordings.signals.news import News, news
 from bayeshaptic.recordings.signals.prediction import Share, predict
 from bayeshaptic.types import Bools, Floats
@@ -186,7 +186,9 @@ def causality(recording: Recording) -> Causality:
 
     Under a sweep what looks like feedback must do so with shorter stretches for the cross-fit, too:
     few long ones hold other frequencies than those beside them, predictions of both signals fail
-    together there, and what they leave is correlated.
+    together there, and what they leave is correlated.  Of a force that repeats but for noise what
+    does not repeat must answer to what the position does not repeat: a controller's does, noise of
+    a sensor of force, past which the position knows what was commanded, does not.
 
     Parameters
     ----------
@@ -197,18 +199,30 @@ def causality(recording: Recording) -> Causality:
     -------
     Causality
     """
-    first = _causality(recording, stretches=10)
-    if not first.doubt or not is_sweep(recording.force):
+    signals = _known_then(recording)
+    first = _causality(*signals, stretches=10)
+    if not first.doubt:
         return first
-    finer = _causality(recording, stretches=40)
-    milder = finer.doubt < first.doubt and not finer.swapped and not finer.opposite
-    return finer if milder else first
+    again = None
+    if is_sweep(recording.force):
+        again = _causality(*signals, stretches=40)
+    elif (found := find_repetition(recording.force)) is not None and found.noisy:
+        rest = [_unrepeated(signal, found) for signal in signals]
+        again = _causality(rest[0], rest[1], stretches=10)
+    milder = again is not None and again.doubt < first.doubt
+    return again if again and milder and not (again.swapped or again.opposite) else first
 
 
-def _causality(recording: Recording, stretches: int) -> Causality:
+def _unrepeated(signal: Floats, found: Repetition) -> Floats:
+    """What differs from the mean of the periods, whole periods of it."""
+    periods = signal[found.start : found.stop].reshape(-1, found.period)
+    return np.asarray((periods - periods.mean(axis=0)).ravel())
+
+
+def _causality(force: Floats, position: Floats, stretches: int) -> Causality:
     most_samples = 60_000
-    start = max(0, (recording.samples - most_samples) // 2)
-    force, position = (s[start : start + most_samples] for s in _known_then(recording))
+    start = max(0, (len(force) - most_samples) // 2)
+    force, position = (signal[start : start + most_samples] for signal in (force, position))
     at_limits = _at_limits(force)
     saturates = float(np.mean(at_limits))
     left_out = at_limits if 0 < saturates < _MOST_AT_LIMIT else None
@@ -222,7 +236,7 @@ def _causality(recording: Recording, stretches: int) -> Causality:
         next_sample=of_force.next_instant(),
         answers=of_force.answers(),
         at_limits=saturates,
-        repeats=find_repetition(force, _SAME) is not None,
+        repeats=find_repetition(force, _SAME, noise=0.0) is not None,
         relay=_is_relay(force, position),
         smooth_position=_roughness(position) < _roughness(force),
     )
