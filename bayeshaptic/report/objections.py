@@ -109,10 +109,9 @@ def _left(closed: Closed) -> set[str]:
 
 def changes(closed: Closed) -> bool:
     """Whether the device changes by more than noise, and no drift explains it."""
-    left = _left(closed)
-    return bool(left) and any(
-        test.name in left for test in closed.traced.after if test.family == "time-varying"
-    )
+    if closed.diagnosis["verdict"] != "unexplained":
+        return False
+    return any(test.flagged and test.family == "time-varying" for test in closed.traced.after)
 
 
 def _rubs_otherwise(closed: Closed) -> bool:

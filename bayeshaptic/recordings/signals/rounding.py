@@ -90,8 +90,8 @@ def repeated_rounding(scatter: float) -> float:
 
 def _repeated() -> tuple[Floats, Floats]:
     """Noise before rounding, and r of it."""
-    sigma, k = np.linspace(0, 1, 201), np.arange(1, 100)[:, None]
-    repeated = np.sum(np.exp(-((2 * np.pi * k * sigma) ** 2)) / (2 * np.pi**2 * k**2), axis=0)
+    sigma = np.linspace(0, 1, 201)
+    repeated = _covariance(2 * sigma**2, 0.0)
     repeated[0] = 1 / 12
     return sigma, repeated
 

@@ -39,30 +39,9 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
         return ()
     analysis, command = result.analysis, _command(result)
     if has_feedback(analysis.notices):
-        again = Step(
-            "Record again with a force that does not depend on the motion: white noise, or a "
-            "multisine. Then report on that recording:",
-            f"bayeshaptic report NEW.csv{_device(result)}",
-        )
-        if analysis.in_loop is None or analysis.in_loop.doubts:
-            return (again, _through(result)) if is_certain(analysis.notices) else (again,)
-        rigid = (
-            "Or, where the device is known to be one rigid mass, say so. This recording will do:"
-        )
-        return again, Step(rigid, f"{command} --model rigid")
+        return _after_feedback(result, command)
     if analysis.etfe.through_reference:
-        new = f"bayeshaptic report NEW.csv{_device(result)}"
-        if analysis.model.held:
-            return (Step("Record in open loop: a force that comes from a table. Then:", new),)
-        free = Step("Where nobody holds the device, say so:", f"{command} --held no")
-        return (
-            *((free,) if may_be_held(analysis) else ()),
-            Step(
-                "Record again with a reference of white noise that keeps the device moving, or in "
-                "open loop, where friction can be told from the rest. Then:",
-                new,
-            ),
-        )
+        return _after_reference(result, command)
     if not analysis.posterior.converged:
         return (
             Step(
@@ -97,6 +76,37 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
             "Try another base model (--model free, --model grasped) or another band (--band "
             "LOW,HIGH), and see whether the misfit goes:",
             f"{command} --model free",
+        ),
+    )
+
+
+def _after_feedback(result: Result, command: str) -> tuple[Step, ...]:
+    """Where the force was computed from the motion."""
+    analysis = result.analysis
+    again = Step(
+        "Record again with a force that does not depend on the motion: white noise, or a "
+        "multisine. Then report on that recording:",
+        f"bayeshaptic report NEW.csv{_device(result)}",
+    )
+    if analysis.in_loop is None or analysis.in_loop.doubts:
+        return (again, _through(result)) if is_certain(analysis.notices) else (again,)
+    rigid = "Or, where the device is known to be one rigid mass, say so. This recording will do:"
+    return again, Step(rigid, f"{command} --model rigid")
+
+
+def _after_reference(result: Result, command: str) -> tuple[Step, ...]:
+    """Where a controller's reference was followed."""
+    analysis = result.analysis
+    new = f"bayeshaptic report NEW.csv{_device(result)}"
+    if analysis.model.held:
+        return (Step("Record in open loop: a force that comes from a table. Then:", new),)
+    free = Step("Where nobody holds the device, say so:", f"{command} --held no")
+    return (
+        *((free,) if may_be_held(analysis) else ()),
+        Step(
+            "Record again with a reference of white noise that keeps the device moving, or in "
+            "open loop, where friction can be told from the rest. Then:",
+            new,
         ),
     )
 
