@@ -484,6 +484,17 @@ def test_the_figures_of_interval_coverage_are_those_of_the_benchmarks() -> None:
     assert hidden and (int(hidden[2]), int(hidden[1])) == FARED_HIDDEN
 
 
+@pytest.mark.parametrize(("sd", "refused"), [(0.3, False), (3.0, True)])
+def test_a_limit_that_only_the_prior_ends_below_is_no_recommendation(
+    sd: float, refused: bool
+) -> None:
+    # The limit of one mass goes with its damper: 2.3 sd below the median is half of it, or 1/1000.
+    analysis = fake_analysis("rigid", damping=sd)
+    found = headline(analysis)
+    assert (found.stiffness is None) == ("how small" in found.sentence) == refused
+    assert any("dampers" in step.text for step in next_steps(found, analysis)) == refused
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_a_page_without_a_recommendation_says_what_to_do(case: str) -> None:
     analysis = fake_analysis(**CASES[case])

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
 
 HEADLINE_RISKS = (0.01, 0.05)
+_OPEN = 10.0  # times the stiffness at the least of these risks: a median beyond that leaves it open
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 
 
@@ -87,12 +88,23 @@ def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
         found.append("the sampler has not converged, so the interval may be too narrow")
     if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
         found.append("the closed loop's poles do not confirm some of the limits")
+    if analysis.sampled and is_open(analysis):
+        found.append(
+            "the recording does not say how small the limit may be, and what it leaves open (the "
+            "damping of what moves slowly, mostly) only the prior fills"
+        )
     never = float((analysis.limit.samples <= 0).mean())
     if never > min(HEADLINE_RISKS):
         found.append(
             f"with probability {percent(never)} the loop is unstable however soft the wall is"
         )
     return found
+
+
+def is_open(analysis: Analysis) -> bool:
+    """Whether a stiffness at the headline's risk would be a tenth of the limit's median."""
+    low, middle = (analysis.limit.quantile(p) for p in (min(HEADLINE_RISKS), 0.5))
+    return bool(low * _OPEN < middle < math.inf)
 
 
 def _added(diagnosis: Any) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.sufficiency import SHORTEST_S
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
-from bayeshaptic.report.objections import changes
+from bayeshaptic.report.objections import changes, is_open
 
 if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline
@@ -48,6 +48,15 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
                 "Let the sampler begin elsewhere, and tell it what is known of the device "
                 "(--device, --delay-s):",
                 f"{command} --seed {analysis.posterior.seed + 1}",
+            ),
+        )
+    if is_open(analysis):
+        return (
+            Step(
+                "Let the force be larger and slower, or record longer, so that the device moves as "
+                "far as it will in use; or say what is known of its dampers in a device file, "
+                "--device. Then:",
+                f"bayeshaptic report NEW.csv{_device(result)}",
             ),
         )
     if result.closed is None:
