@@ -1,7 +1,7 @@
 """What the rules of acceptance cost and find: each of them left out, and what then changes.
 
-    python acceptance.py --clean 24 --each 2 --seconds 20
-    python acceptance.py --reach --each 8 --seconds 20
+    python -m benchmarks.acceptance --clean 24 --each 2 --seconds 20
+    python -m benchmarks.acceptance --reach --each 8 --seconds 20
 
 Of every recording all candidates of all classes are fitted, whether or not a test raises them: so a
 clean recording shows what acceptance alone would let through.  Then the first round is decided with
@@ -21,8 +21,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from base_fits import Job, begun_of
-from blind_recordings import CASES, LISTED, SINGLE, cases_for
 
 from bayeshaptic.diagnosis import acceptance, thresholds
 from bayeshaptic.diagnosis.loop import trials_for
@@ -31,6 +29,8 @@ from bayeshaptic.diagnosis.state import FIT, Trial, compared_errors, share, wort
 from bayeshaptic.diagnosis.trials.linear import sieve
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import BUDGET_S, RATE, metered
+from benchmarks.base_fits import Job, begun_of
+from benchmarks.recordings.blind import CASES, LISTED, SINGLE, cases_for
 
 LEFT_OUT = {
     "ENOUGH": -np.inf,

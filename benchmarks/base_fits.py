@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from blind_recordings import CASES, recorded
-
 from bayeshaptic.diagnosis.begun import Begun, begin
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.rig import Bench
+from benchmarks.recordings.blind import CASES, recorded
 
 
 @dataclass(frozen=True)

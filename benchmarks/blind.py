@@ -1,6 +1,6 @@
 """Closing the loop on recordings it has never seen: names, classes, and the truth of K_CR.
 
-    python benchmarks/blind.py [--each N] [--others N] [--clean N] [--pairs N] [--seed S]
+    python -m benchmarks.blind [--each N] [--others N] [--clean N] [--pairs N] [--seed S]
         [--known file|delay|nothing] [--drawn]
 
 Recordings come from the virtual bench, which shares no code with the models.  The base model is
@@ -25,7 +25,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from blind_recordings import (
+
+from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.errors import InputError
+from bayeshaptic.rig import Bench
+from benchmarks.recordings.blind import (
     CASES,
     LISTED,
     PAIR,
@@ -40,11 +45,6 @@ from blind_recordings import (
     seconds_of,
     single_jobs,
 )
-
-from bayeshaptic.diagnosis.closed import Closed, close_loop
-from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.errors import InputError
-from bayeshaptic.rig import Bench
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """How often feedback is missed, and how often a good open-loop recording is taken for it.
 
-    python door.py [--each 360] [--part 0 --of 1] [--keep LINES] [--replay]
-    python door.py --show LINES...
+    python -m benchmarks.door [--each 360] [--part 0 --of 1] [--keep LINES] [--replay]
+    python -m benchmarks.door --show LINES...
 
-Open loops and closed ones of random devices (`door_recordings.py`), judged as `check_recording`
+Open loops and closed ones of random devices (`recordings/door.py`), judged as `check_recording`
 judges them. In pieces: each part appends a line a recording to a file, and goes on where it
 stopped; `--show` makes the tables of all. Of a closed loop, `weight` is what its answers to chance
 amount to (`Case.weight`): where they are less than one sample's worth in all, nothing tells that
@@ -21,14 +21,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from door_recordings import Case, closed_case, open_case, written_down
-
 from bayeshaptic import analyse
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality import causality
 from bayeshaptic.recordings.sufficiency import refuse_too_little
 from bayeshaptic.rig import simulate
+from benchmarks.recordings.door import Case, closed_case, open_case, written_down
 
 WEIGHTS = (10.0, 100.0)
 VERDICTS = ("feedback", "undecided", "open loop")

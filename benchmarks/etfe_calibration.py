@@ -1,6 +1,6 @@
 """Calibration and information of the ETFE's windows, on simulated recordings.
 
-    python benchmarks/etfe_calibration.py [recordings] [--limit RECORDINGS]
+    python -m benchmarks.etfe_calibration [recordings] [--limit RECORDINGS]
 
 For each device and length: the rms of the pulls of a free scale and delay (1 is right), their
 widths over the Cramer-Rao bound with the noise known and nothing leaking (1 is the best there is),
@@ -20,7 +20,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from calibration import CASES, truth_and_bench
 from linear_bench import (
     LHIFAM_FREE,
     LHIFAM_HELD,
@@ -35,6 +34,7 @@ from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability import etfe_critical_stiffness
+from benchmarks.calibration import CASES, truth_and_bench
 
 DEVICES = {
     "LHIfAM free": (LHIFAM_FREE, 1.0, 5e-7),

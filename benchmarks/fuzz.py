@@ -1,7 +1,7 @@
 """Damaged files at every door: no traceback, no crash, none over 10 s (of processor time) or 2 GiB.
 
-    python fuzz.py                      2000 files a format
-    python fuzz.py --count 200 csv npz  fewer, of some formats
+    python -m benchmarks.fuzz                      2000 files a format
+    python -m benchmarks.fuzz --count 200 csv npz  fewer, of some formats
 
 Each case is a good file with bytes changed, moved, repeated or cut off, read in a process that this
 one watches. What is not a one-line refusal (`InputError`) or a result is printed with the seed that
@@ -41,8 +41,7 @@ from bayeshaptic.inference.saved import checkpoint
 from bayeshaptic.recordings import read_frf, read_recording, read_study
 from bayeshaptic.recordings.readers import apart, reader_for
 
-# In the place of this folder, whose coverage.py would be taken for the library of that name.
-sys.path[0] = str(Path(__file__).parents[1] / "tests")
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 test_readers = importlib.import_module("test_readers")
 
 MOST_SECONDS = 10.0

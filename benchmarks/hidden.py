@@ -1,10 +1,10 @@
 """Does the limit hold where effects hide that no test can see?
 
-    python benchmarks/hidden.py [--recordings 400] [--seed 1] [--pairs] [--file with|without]
+    python -m benchmarks.hidden [--recordings 400] [--seed 1] [--pairs] [--file with|without]
         [--processes 2] [--keep FOLDER]
 
 Recordings of both devices, free and held, 10 and 30 s long, half of them without a device file,
-with effects drawn at random (`hidden_recordings.py`).  Printed beside the figures of the average
+with effects drawn at random (`recordings/hidden.py`).  Printed beside the figures of the average
 those of the declared model on the same recordings: how often K_CR's 90 % interval holds the truth,
 and how often the truth lies below the stiffness of a risk.  Recordings whose report recommends no
 stiffness are left out and counted.
@@ -30,7 +30,16 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 import numpy as np  # noqa: E402
-from hidden_recordings import (  # noqa: E402
+
+from bayeshaptic.diagnosis.analysis import Analysis  # noqa: E402
+from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average  # noqa: E402
+from bayeshaptic.diagnosis.hidden.average import Average  # noqa: E402
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior  # noqa: E402
+from bayeshaptic.diagnosis.hidden.weighed import Weighed  # noqa: E402
+from bayeshaptic.diagnosis.options import Options  # noqa: E402
+from bayeshaptic.report.headline import headline  # noqa: E402
+from bayeshaptic.rig import Bench  # noqa: E402
+from benchmarks.recordings.hidden import (  # noqa: E402
     CASES,
     LENGTHS_S,
     NONE,
@@ -42,15 +51,6 @@ from hidden_recordings import (  # noqa: E402
     recorded,
     seen_in,
 )
-
-from bayeshaptic.diagnosis.analysis import Analysis  # noqa: E402
-from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average  # noqa: E402
-from bayeshaptic.diagnosis.hidden.average import Average  # noqa: E402
-from bayeshaptic.diagnosis.hidden.prior import HiddenPrior  # noqa: E402
-from bayeshaptic.diagnosis.hidden.weighed import Weighed  # noqa: E402
-from bayeshaptic.diagnosis.options import Options  # noqa: E402
-from bayeshaptic.report.headline import headline  # noqa: E402
-from bayeshaptic.rig import Bench  # noqa: E402
 
 LEVELS = (0.01, 0.05, 0.5, 0.95)
 SENSITIVE = (0.5, 2.0)

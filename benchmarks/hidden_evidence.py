@@ -1,6 +1,6 @@
 """Is the evidence of what could hide right?  Beside long runs with the effect in the model.
 
-    python benchmarks/hidden_evidence.py [--seed 1] [--ess 4000] [--cases "LHIfAM free" ...]
+    python -m benchmarks.hidden_evidence [--seed 1] [--ess 4000] [--cases "LHIfAM free" ...]
 
 Recordings of 10 s, clean and with a lag of half of what the tests see.  The average takes an
 effect's evidence, its strength and what it does to K_CR from 400 draws that are moved and weighed
@@ -21,7 +21,6 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 import numpy as np  # noqa: E402
-from blind_recordings import CASES, recorded  # noqa: E402
 
 import bayeshaptic as bh  # noqa: E402
 from bayeshaptic.diagnosis.hidden.regression import Around, around, log_limits  # noqa: E402
@@ -31,6 +30,7 @@ from bayeshaptic.diagnosis.hidden.weighed import weigh  # noqa: E402
 from bayeshaptic.models import Uniform  # noqa: E402
 from bayeshaptic.numerics.weights import systematic  # noqa: E402
 from bayeshaptic.rig import Bench  # noqa: E402
+from benchmarks.recordings.blind import CASES, recorded  # noqa: E402
 
 SECONDS = 10.0
 LAG = "actuator_lag"

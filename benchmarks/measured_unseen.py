@@ -1,6 +1,6 @@
 """How far do effects of encoder, clock and logger that no test sees move the limit?
 
-    python benchmarks/measured_unseen.py [--recordings 12] [--seconds 10 30] [--effects ...]
+    python -m benchmarks.measured_unseen [--recordings 12] [--seconds 10 30] [--effects ...]
 
 Both devices, free and held.  Each effect is halved until the tests see it in at most one recording
 of three; then recordings are made with it and without, everything else alike.  Of those in which no
@@ -23,7 +23,6 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 import numpy as np  # noqa: E402
-from blind_recordings import CASES, recorded  # noqa: E402
 
 from bayeshaptic.diagnosis.battery import residual_tests  # noqa: E402
 from bayeshaptic.diagnosis.hidden.regression import log_limits  # noqa: E402
@@ -36,6 +35,7 @@ from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe  
 from bayeshaptic.rig import Bench, Effect  # noqa: E402
 from bayeshaptic.rig.effects.effect import Log  # noqa: E402
 from bayeshaptic.types import Floats  # noqa: E402
+from benchmarks.recordings.blind import CASES, recorded  # noqa: E402
 
 LOOKED_AT = 3  # recordings of each strength that the tests look at
 WIDTH = 3.29  # of a 90 % interval, in standard deviations

@@ -1,6 +1,6 @@
 """CPU time of whole reports beside an older version of the package, recording by recording.
 
-    python benchmarks/reports.py [--old PATH] [--old-limit S] [--only new] [--count 60]
+    python -m benchmarks.reports [--old PATH] [--old-limit S] [--only new] [--count 60]
                                  [--seconds S] [-o FILE]
 
 60 simulated recordings of 30 s, in an order that makes the first few like the rest: 14 clean, 30 of
@@ -24,10 +24,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from blind_recordings import CASES, LISTED, PAIRS, SINGLE, Job, bench_of, jobs_for
 
 from bayeshaptic.devices import load_device
 from bayeshaptic.rig import simulate, write_recording
+from benchmarks.recordings.blind import CASES, LISTED, PAIRS, SINGLE, Job, bench_of, jobs_for
 
 HERE = Path(__file__).resolve().parent
 SEED = 970_000

@@ -1,6 +1,6 @@
 """How the likelihood and K_CR cost more with more lines, poles and walkers; exponents of each.
 
-python benchmarks/scaling.py
+python -m benchmarks.scaling
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Where the time of a report goes, and how many effective draws a second the sampler gives.
 
-    python benchmarks/speed.py [--recording FILE --device NAME] [--ess 8000] [--stretch-steps 2000]
+    python -m benchmarks.speed [--recording FILE --device NAME] [--ess 8000] [--stretch-steps 2000]
 
 First the whole command, `bayeshaptic report ... --no-loop`, as a process of its own, and the same
 work stage by stage; then the sampler beside emcee's plain stretch move on the same density, fit and

@@ -1,6 +1,6 @@
 """What the tests of the residual cost and find: false alarms on clean recordings, and power.
 
-    python thresholds.py --clean 400 --power 10 --workers 2
+    python -m benchmarks.thresholds --clean 400 --power 10 --workers 2
 
 A clean recording is the virtual bench's, without any effect: both devices, free and held, of three
 lengths, analysed with and without a device file.  Only a fit is needed, no sampling.  The table is
@@ -15,10 +15,10 @@ from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from base_fits import Job, begun_of
-from blind_recordings import CASES, LISTED, SINGLE, cases_for
 
 from bayeshaptic.diagnosis.battery import residual_tests
+from benchmarks.base_fits import Job, begun_of
+from benchmarks.recordings.blind import CASES, LISTED, SINGLE, cases_for
 
 SECONDS = (10.0, 30.0, 90.0)
 

@@ -28,7 +28,7 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
-from benchmarks.door_recordings import controller_of, written_down
+from benchmarks.recordings.door import controller_of, written_down
 
 CONTROLLERS = ("P", "PD", "PI", "PID", "PD filtered")
 REFERENCES = ("steps", "ramps", "noise")

@@ -22,7 +22,7 @@ from bayeshaptic.threads import one_thread_from_the_start
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
-from benchmarks.foreign import EccentricEncoder  # noqa: E402
+from benchmarks.recordings.foreign import EccentricEncoder  # noqa: E402
 
 FOLDER = ROOT / "docs" / "gallery"
 SECONDS = 20.0

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
-from calibration import combined, one_recording, uniform
+from benchmarks.calibration import combined, one_recording, uniform
 
 # Grasped devices take three times as long: fewer of them here.
 JOBS = [(case, 300 + seed) for case in ("lhifam free", "phantom free") for seed in range(4)]

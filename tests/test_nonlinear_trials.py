@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -34,11 +32,9 @@ from bayeshaptic.rig.effects.effect import Effect as BenchEffect
 from bayeshaptic.rig.effects.friction import StribeckFriction
 from bayeshaptic.rig.effects.nonlinear import Drag
 from bayeshaptic.stability import critical_stiffness
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from foreign import LoadFriction, TanhSaturation, VelocityCubed
-from strangers.device import Masses
-from strangers.motion import STEPS, Forces, Motion
+from benchmarks.recordings.foreign import LoadFriction, TanhSaturation, VelocityCubed
+from benchmarks.strangers.device import Masses
+from benchmarks.strangers.motion import STEPS, Forces, Motion
 
 LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 10.0, 3

@@ -1,6 +1,6 @@
 """CPU time of the package beside its peers and beside an older version of itself, in one run.
 
-    python benchmarks/peers.py [--old PATH] [--rounds 5] [--only NAME ...]
+    python -m benchmarks.peers [--old PATH] [--rounds 5] [--only NAME ...]
 
 PATH is a checkout of the older version.  The peers come with `pip install -e ".[bench]"`; one that
 is not there is left out.  Every figure is the least CPU time of some rounds, so that other work on
@@ -24,9 +24,9 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 import numpy as np  # noqa: E402
-from peers_jobs import CASES, DRAWS, JOBS, cpu, drawn, loops, recording  # noqa: E402
 
 import bayeshaptic as bh  # noqa: E402
+from benchmarks.peers.jobs import CASES, DRAWS, JOBS, cpu, drawn, loops, recording  # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 
@@ -39,7 +39,7 @@ def there(module: str) -> bool:
 
 
 def of_old(path: Path, names: list[str], rounds: int) -> dict[str, float]:
-    """The same jobs by another checkout, in a process of its own."""
+    """The same jobs by another checkout, which knows nothing of this one, in a process."""
     environment = {**os.environ, "PYTHONPATH": f"{path}{os.pathsep}{HERE}"}
     line = [sys.executable, "-c", _OLD, json.dumps(names), str(rounds)]
     done = subprocess.run(
@@ -50,7 +50,7 @@ def of_old(path: Path, names: list[str], rounds: int) -> dict[str, float]:
 
 _OLD = """
 import json, sys
-from peers_jobs import JOBS, cpu
+from jobs import JOBS, cpu
 print(json.dumps({name: cpu(JOBS[name](), int(sys.argv[2])) for name in json.loads(sys.argv[1])}))
 """
 
@@ -142,11 +142,11 @@ def confirmed(loop: object, gain: float) -> bool:
 
 def fit_peers(rounds: int) -> dict[str, float]:
     """40 starts by `scipy.optimize.least_squares` and lmfit on the residuals of this package."""
-    from peers_jobs import starts
     from scipy import optimize
 
     from bayeshaptic.inference.fit import search_box, weighted_residuals
     from bayeshaptic.inference.likelihood import Likelihood
+    from benchmarks.peers.jobs import starts
 
     fit, start = starts()
     here, low, high = search_box(fit.model)

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from blind_recordings import CASES, cases_for, recorded
 
 from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.diagnosis.hidden.forces import force_suspects
@@ -22,6 +21,7 @@ from bayeshaptic.diagnosis.hidden.regression import around
 from bayeshaptic.diagnosis.hidden.sizes import seen_of
 from bayeshaptic.diagnosis.hidden.suspects import Suspect, linear_suspects
 from bayeshaptic.rig import Bench
+from benchmarks.recordings.blind import CASES, cases_for, recorded
 
 LENGTHS_S = (10.0, 30.0)
 LEAST, MOST = 1 / 30, 3.0

@@ -1,6 +1,6 @@
 """Effective draws a CPU second beside other samplers, on the same density, in one run.
 
-    python benchmarks/peers_sampling.py [--case NAME ...] [--only SAMPLER ...] [--old PATH]
+    python -m benchmarks.peers.sampling [--case NAME ...] [--only SAMPLER ...] [--old PATH]
 
 The others are emcee's stretch and differential-evolution moves, the adaptive sampler of PINTS, and
 NUTS by nutpie, NumPyro and BlackJAX (`pip install -e ".[bench]"`; what is not there is left out).
@@ -28,9 +28,9 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 import numpy as np  # noqa: E402
-from peers_samplers import SAMPLERS, Target, by_older, target  # noqa: E402
 
 import bayeshaptic as bh  # noqa: E402
+from benchmarks.peers.samplers import SAMPLERS, Target, by_older, target  # noqa: E402
 
 CASES = {f"{device} {how}": (device, how == "held") for device in ("lhifam", "phantom")
          for how in ("free", "held")}  # fmt: skip

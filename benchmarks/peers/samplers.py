@@ -1,4 +1,4 @@
-"""The samplers that `peers_sampling.py` runs, and the posterior that it gives to each."""
+"""The samplers that `sampling.py` runs, and the posterior that it gives to each."""
 
 from __future__ import annotations
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
-import foreign
 import numpy as np
 
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.rig import Bench, Effect, WhiteNoise, simulate
+from benchmarks.recordings import foreign
 
 CASES = {
     "LHIfAM free": ("lhifam", False),

@@ -1,4 +1,4 @@
-"""The jobs that `peers.py` measures, by this version of the package or by an older one."""
+"""The jobs that are measured, by this version of the package or by an older one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 import bayeshaptic as bh
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
-DATA = Path(__file__).resolve().parents[1] / "data" / "recordings"
+DATA = Path(__file__).resolve().parents[2] / "data" / "recordings"
 CASES = ("rigid", "free", "grasped")
 DRAWS = 10_000
 STARTS = 40
