@@ -11,6 +11,7 @@ from bayeshaptic.effects.linear.reflex import reflex_stiffness
 from bayeshaptic.models import LinearSystem, build_model
 from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.mechanism import Mechanism
+from bayeshaptic.models.response.remainder import aliases
 from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.stability import find_crossings
 from bayeshaptic.stability.crossings import search
@@ -188,6 +189,25 @@ def test_one_link_is_compiled_as_it_is_written():
     omega = np.concatenate([np.geomspace(0.1, 3e3, 50), -np.geomspace(3e3, 6e4, 50)])
     s = 1j * omega[:, None]
     np.testing.assert_allclose(one.on_axis(omega), one.at(s) / s, rtol=1e-12)
+    own = np.exp(np.random.default_rng(1).uniform(0, 9, (40, system.batch)))  # of each vector
+    np.testing.assert_allclose(one.on_axis(own), one.at(1j * own) / (1j * own), rtol=1e-12)
+    (link,), compliance = one.links, evaluate(one.compliances[1, 1], 1j * own)
+    ratio = compliance / evaluate(one.denominator, 1j * own)
+    difference = 1 + link.stiffness(1j * own) * ratio
+    np.testing.assert_allclose(one.return_difference(own), difference, rtol=1e-11)
+
+
+def test_aliases_hold_and_delay_are_compiled_as_they_are_written():
+    system = linked("lhifam", "grasped")
+    remainder, batch = system.remainder, system.batch
+    series = aliases(remainder, np.pi, system.delay_s, T)
+    theta = np.pi * np.exp(-np.random.default_rng(4).uniform(0, 20, (30, 5)))
+    rows, turns = np.arange(5) % batch, system.delay_s[np.arange(5) % batch] / T
+    values = remainder.rows(rows).on_axis(theta / T)
+    plain = -np.expm1(-1j * theta) / T * np.exp(-1j * theta * turns)
+    plain = plain * (values + series.at(theta, rows))
+    mine = series.sampled(values, theta, rows, turns, T)
+    np.testing.assert_allclose(mine, plain, rtol=1e-12)
 
 
 @pytest.mark.parametrize("columns", [1, 7])

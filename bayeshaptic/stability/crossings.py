@@ -10,7 +10,7 @@ from scipy.optimize import elementwise
 
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.stability.responses.evaluated import EvaluableSystem, EvaluatedResponse
-from bayeshaptic.stability.responses.grid import search_grid
+from bayeshaptic.stability.responses.grid import in_chunks, search_grid
 from bayeshaptic.stability.responses.linked import linked_response
 from bayeshaptic.stability.responses.response import PoleResponse, Response, pole_response
 from bayeshaptic.types import Floats, Ints
@@ -139,11 +139,7 @@ def plain_search(response: Response) -> tuple[Ints, Floats, Floats]:
     row, theta, gain : ndarray, shape (M,)
         Of which loop, at which angle, and the real value of the response there.
     """
-    batch = len(response.delay)
-    chunk = 64  # rows at a time: the arrays of one chunk stay in the cache
-    scans = [
-        _scan(response, slice(start, min(start + chunk, batch))) for start in range(0, batch, chunk)
-    ]
+    scans = [_scan(response, rows) for rows in in_chunks(len(response.delay))]
     row, low, high = (np.concatenate(part) for part in zip(*scans, strict=True))
 
     def value(theta: Floats, row: Ints) -> Floats:

@@ -78,29 +78,44 @@ class Remainder:
         return total
 
     def on_axis(self, omega: Floats) -> Complexes:
-        """Values over s at s = j omega, shape (L,) for the whole batch; shape (L, B).
+        """Values over s at s = j omega, of shape (L,) for the whole batch, or (L, B); (L, B).
 
         With a single link compiled.
         """
-        s: Complexes = np.multiply(1j, omega[:, None])
+        s, omega = self._points(omega)
         if len(self.links) > 1:
             return np.asarray(self.at(s) / s)
         from bayeshaptic.models.response.kernels.remainder import add_link
 
         stiffness = self.links[0].stiffness(s)
         total = np.empty_like(stiffness)
-        denominator, mutual, own = map(
-            np.ascontiguousarray,
-            (self.denominator, self.compliances[0, 1], self.compliances[1, 1]),
-        )
-        add_link(omega, denominator, mutual, own, _real(stiffness), _real(total))
+        add_link(omega, *self._polynomials((0, 1), (1, 1)), _real(stiffness), _real(total))
         for factor in self.filters:
             total *= evaluate(factor.numerator, s) / evaluate(factor.denominator, s)
         return total
 
-    def return_difference(self, s: Complexes) -> Complexes:
-        """Characteristic function with the links over that without, at points as in `at`."""
-        return self._add_links(s)[1]
+    def return_difference(self, omega: Floats) -> Complexes:
+        """Characteristic function with the links over that without, as `on_axis`."""
+        s, omega = self._points(omega)
+        if len(self.links) > 1:
+            return self._add_links(s)[1]
+        from bayeshaptic.models.response.kernels.remainder import return_difference
+
+        stiffness = self.links[0].stiffness(s)
+        found = np.empty_like(stiffness)
+        return_difference(omega, *self._polynomials((1, 1)), _real(stiffness), _real(found))
+        return found
+
+    def _points(self, omega: Floats) -> tuple[Complexes, Floats]:
+        """Points j omega, shape (L, 1) or (L, B), and omega for every vector, shape (L, B)."""
+        omega = np.ascontiguousarray(omega if omega.ndim == 2 else omega[:, None])
+        of_each = np.broadcast_to(omega, (len(omega), self.denominator.shape[1]))
+        return np.multiply(1j, omega), np.ascontiguousarray(of_each)
+
+    def _polynomials(self, *pairs: tuple[int, int]) -> list[Polynomial]:
+        """The denominator and some numerators, as kernels read them."""
+        wanted = [self.denominator, *(self.compliances[pair] for pair in pairs)]
+        return [np.ascontiguousarray(polynomial) for polynomial in wanted]
 
     def _add_links(self, s: Complexes) -> tuple[Complexes, Complexes]:
         inverse: Complexes = 1 / evaluate(self.denominator, s)
@@ -150,6 +165,17 @@ class Aliases:
         """Values at angles of shape (..., B') for the part `index` of the batch."""
         x = 2 * theta / self.top - 1
         return np.asarray(chebyshev.chebval(x, self.coefficients[:, index], tensor=False))
+
+    def sampled(
+        self, values: Complexes, theta: Floats, index: Index, turns: Floats, period_s: float
+    ) -> Complexes:
+        """`Remainder.on_axis` with its aliases, behind hold and delay, at angles (L, B')."""
+        from bayeshaptic.models.response.kernels.remainder import sampled
+
+        series = _real(np.ascontiguousarray(self.coefficients[:, index]))
+        angles, turns = np.ascontiguousarray(theta), np.ascontiguousarray(turns)
+        sampled(angles, series, self.top, turns, period_s, _real(values))
+        return values
 
 
 def aliases(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from bayeshaptic.stability.responses.response import Response
@@ -10,6 +12,12 @@ from bayeshaptic.types import Floats
 LOWEST = 1e-9  # radians a sample: 0.16 microhertz at T = 1 ms
 # No point on the pole itself: an undamped one is infinite there.
 _TANGENTS = np.tan(np.deg2rad(np.array([-88.0, -80, -60, -30, -8, 8, 30, 60, 80, 88])))
+
+
+def in_chunks(batch: int) -> Iterator[slice]:
+    """Rows of a batch, some at a time: the arrays of one chunk stay in the cache."""
+    chunk = 64
+    return (slice(start, min(start + chunk, batch)) for start in range(0, batch, chunk))
 
 
 def search_grid(response: Response, rows: slice) -> Floats:

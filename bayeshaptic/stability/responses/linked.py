@@ -19,7 +19,7 @@ from bayeshaptic.models.response.remainder import (
 )
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.stability.responses.evaluated import ends, held_at_rest
-from bayeshaptic.stability.responses.grid import search_grid
+from bayeshaptic.stability.responses.grid import in_chunks, search_grid
 from bayeshaptic.stability.responses.response import PoleResponse, pole_response
 from bayeshaptic.types import Bools, Complexes, Floats, Ints
 
@@ -60,18 +60,17 @@ class LinkedResponse:
 
     def _added(self, rows: Ints, theta: Floats) -> Complexes:
         """What the links add at angles of shape (k, M)."""
-        s: Complexes = np.divide(1j * theta, self.period_s)
         part = self.remainder.rows(rows)
-        late = np.exp(-1j * theta * self.delay[rows])
+        value = part.on_axis(theta / self.period_s)
         if not self.rational.exact:
-            return part.at(s) * late
-        value = part.at(s) / s + self.aliases.at(theta, rows)
+            late = np.exp(-1j * theta * self.delay[rows])
+            return np.asarray(value * (1j * theta / self.period_s) * late)
         rough = self.rough[rows]
         if rough.any():
             delay_s = self.delay[rows[rough]] * self.period_s
             sums = alias_sums(part.rows(rough), theta[:, rough], delay_s, self.period_s)
             value[:, rough] += sums - self.aliases.at(theta[:, rough], rows[rough])
-        return -np.expm1(-1j * theta) / self.period_s * late * value
+        return self.aliases.sampled(value, theta, rows, self.delay[rows], self.period_s)
 
     def at_ends(self) -> tuple[Floats, Floats]:
         return ends(self, self.rational.exact)
@@ -81,13 +80,16 @@ class LinkedResponse:
 
         Their number is how often the return difference 1 + lambda h_ee goes round the origin.
         """
-        every = np.arange(len(self.delay))
-        theta = search_grid(self, slice(0, len(every)))
-        beyond = np.broadcast_to(_BEYOND, (len(every), len(_BEYOND)))
-        s = 1j * np.concatenate([theta, beyond], axis=1).T / self.period_s
-        phase = np.unwrap(np.angle(self.remainder.return_difference(s)), axis=0)
-        quiet = np.abs(phase[-1] - phase[0]) < np.pi
-        return self.rational.stable_at_rest() & quiet & held_at_rest(self)
+        quiet = [self._goes_not_round(rows) for rows in in_chunks(len(self.delay))]
+        return self.rational.stable_at_rest() & np.concatenate(quiet) & held_at_rest(self)
+
+    def _goes_not_round(self, rows: slice) -> Bools:
+        """Where the return difference does not go round the origin, of some rows."""
+        theta = search_grid(self, rows)
+        beyond = np.broadcast_to(_BEYOND, (len(theta), len(_BEYOND)))
+        omega = np.concatenate([theta, beyond], axis=1).T / self.period_s
+        phase = np.unwrap(np.angle(self.remainder.rows(rows).return_difference(omega)), axis=0)
+        return np.asarray(np.abs(phase[-1] - phase[0]) < np.pi)
 
 
 def linked_response(system: LinearSystem, period_s: float, exact: bool = True) -> LinkedResponse:

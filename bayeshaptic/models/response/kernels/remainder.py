@@ -10,22 +10,23 @@ from bayeshaptic.types import Floats
 
 
 @kernel(inline=True)
-def _polynomial(coefficients: Floats, omega: float, real: Floats, imaginary: Floats) -> None:
-    """Values at j omega of polynomials of shape (degree + 1, B), into arrays of shape (B,)."""
+def _polynomial(
+    coefficients: Floats, omega: Floats, minus: Floats, real: Floats, imaginary: Floats
+) -> None:
+    """Values at j omega, with minus its square, of polynomials (degree + 1, B); all else (B,)."""
     degree, batch = coefficients.shape[0] - 1, coefficients.shape[1]
-    square = -omega * omega
     last_even, last_odd = degree - degree % 2, degree - (degree + 1) % 2
     for b in range(batch):
         real[b] = coefficients[last_even, b]
         imaginary[b] = coefficients[last_odd, b] if degree > 0 else 0.0
     for power in range(last_even - 2, -1, -2):
         for b in range(batch):
-            real[b] = real[b] * square + coefficients[power, b]
+            real[b] = real[b] * minus[b] + coefficients[power, b]
     for power in range(last_odd - 2, 0, -2):
         for b in range(batch):
-            imaginary[b] = imaginary[b] * square + coefficients[power, b]
+            imaginary[b] = imaginary[b] * minus[b] + coefficients[power, b]
     for b in range(batch):
-        imaginary[b] *= omega
+        imaginary[b] *= omega[b]
 
 
 @kernel
@@ -41,18 +42,20 @@ def add_link(
 
     Parameters
     ----------
-    omega : ndarray, shape (L,)
+    omega : ndarray, shape (L, B)
     denominator, mutual, own : ndarray, shape (degree + 1, B)
     stiffness : ndarray, shape (L, B, 2)
         Real and imaginary part of lambda.
     out : ndarray, shape (L, B, 2)
     """
     batch = denominator.shape[1]
-    values = np.empty((6, batch))
+    values, minus = np.empty((6, batch)), np.empty(batch)
     for line in range(len(omega)):
-        _polynomial(denominator, omega[line], values[0], values[1])
-        _polynomial(mutual, omega[line], values[2], values[3])
-        _polynomial(own, omega[line], values[4], values[5])
+        for b in range(batch):
+            minus[b] = -omega[line, b] * omega[line, b]
+        _polynomial(denominator, omega[line], minus, values[0], values[1])
+        _polynomial(mutual, omega[line], minus, values[2], values[3])
+        _polynomial(own, omega[line], minus, values[4], values[5])
         for b in range(batch):
             d, dj, m, mj = values[0, b], values[1, b], values[2, b], values[3, b]
             k, kj = stiffness[line, b, 0], stiffness[line, b, 1]
@@ -63,9 +66,65 @@ def add_link(
             square, square_j = m * m - mj * mj, 2.0 * m * mj
             above = k * square - kj * square_j
             above_j = k * square_j + kj * square
-            size = 1.0 / (omega[line] * (below * below + below_j * below_j))
+            size = 1.0 / (omega[line, b] * (below * below + below_j * below_j))
             out[line, b, 0] = size * (above * below_j - above_j * below)
             out[line, b, 1] = size * (above * below + above_j * below_j)
+
+
+@kernel
+def return_difference(
+    omega: Floats, denominator: Floats, own: Floats, stiffness: Floats, out: Floats
+) -> None:
+    """1 + lambda h / d, the arguments those of `add_link`."""
+    batch = denominator.shape[1]
+    values, minus = np.empty((4, batch)), np.empty(batch)
+    for line in range(len(omega)):
+        for b in range(batch):
+            minus[b] = -omega[line, b] * omega[line, b]
+        _polynomial(denominator, omega[line], minus, values[0], values[1])
+        _polynomial(own, omega[line], minus, values[2], values[3])
+        for b in range(batch):
+            d, dj, h, hj = values[0, b], values[1, b], values[2, b], values[3, b]
+            size = 1.0 / (d * d + dj * dj)
+            ratio, ratio_j = size * (h * d + hj * dj), size * (hj * d - h * dj)
+            k, kj = stiffness[line, b, 0], stiffness[line, b, 1]
+            out[line, b, 0] = 1.0 + k * ratio - kj * ratio_j
+            out[line, b, 1] = k * ratio_j + kj * ratio
+
+
+@kernel
+def sampled(
+    theta: Floats, series: Floats, top: float, turns: Floats, period_s: float, values: Floats
+) -> None:
+    """`values` with their aliases, behind hold and delay, each loop at its own angles.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (L, B)
+        Angles w T.
+    series : ndarray, shape (terms, B, 2)
+        Chebyshev series of the aliases up to the angle `top`.
+    turns : ndarray, shape (B,)
+        Delay in periods.
+    values : ndarray, shape (L, B, 2)
+        Over s; becomes the product.
+    """
+    terms, batch, _ = series.shape
+    for line in range(len(theta)):
+        for b in range(batch):
+            twice = 4.0 * theta[line, b] / top - 2.0
+            re = im = last = last_j = 0.0
+            for term in range(terms - 1, 0, -1):
+                re, last = series[term, b, 0] + twice * re - last, re
+                im, last_j = series[term, b, 1] + twice * im - last_j, im
+            re = values[line, b, 0] + series[0, b, 0] + 0.5 * twice * re - last
+            im = values[line, b, 1] + series[0, b, 1] + 0.5 * twice * im - last_j
+            cosine, sine = cos_sin(0.5 * theta[line, b])
+            c, s = cos_sin(theta[line, b] * turns[b])
+            size = 2.0 * sine / period_s
+            hold, hold_j = size * (sine * c + cosine * s), size * (cosine * c - sine * s)
+            values[line, b, 0] = hold * re - hold_j * im
+            values[line, b, 1] = hold * im + hold_j * re
 
 
 @kernel
