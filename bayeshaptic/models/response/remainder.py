@@ -89,7 +89,8 @@ class Remainder:
 
         stiffness = self.links[0].stiffness(s)
         total = np.empty_like(stiffness)
-        add_link(omega, *self._polynomials((0, 1), (1, 1)), _real(stiffness), _real(total))
+        denominator, mutual, own = self._polynomials((0, 1), (1, 1))
+        add_link(omega, denominator, mutual, own, _real(stiffness), _real(total))
         for factor in self.filters:
             total *= evaluate(factor.numerator, s) / evaluate(factor.denominator, s)
         return total
@@ -103,7 +104,8 @@ class Remainder:
 
         stiffness = self.links[0].stiffness(s)
         found = np.empty_like(stiffness)
-        return_difference(omega, *self._polynomials((1, 1)), _real(stiffness), _real(found))
+        denominator, own = self._polynomials((1, 1))
+        return_difference(omega, denominator, own, _real(stiffness), _real(found))
         return found
 
     def _points(self, omega: Floats) -> tuple[Complexes, Floats]:
