@@ -22,7 +22,7 @@ from bayeshaptic.models import (
     rigid,
 )
 from bayeshaptic.models.parameter import unit_of
-from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.models.response.motion import linear_motion, modal_motion
 from bayeshaptic.models.start import informed, scales, starting_points
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.recordings import Recording
@@ -261,3 +261,19 @@ def test_a_device_file_with_some_values_only() -> None:
     with pytest.raises(InputError, match="no values for bc, kc"):
         free(device=device).values  # noqa: B018
     assert rigid(device=device).names[:2] == ("m", "b")
+
+
+@pytest.mark.parametrize(("substeps", "whole"), [(1, 0), (8, 3), (8, 19), (3, 40)])
+def test_modes_in_time_are_those_of_step_after_step(substeps, whole):
+    rng = np.random.default_rng(8)
+    decay, new, old, *weights = rng.normal(size=(5, 3)) + 1j * rng.normal(size=(5, 3))
+    decay *= 0.95 / np.abs(decay)
+    force = rng.normal(size=12)
+    held = np.concatenate([np.zeros(whole), np.repeat(force, substeps)])[: 12 * substeps]
+    state, before, stepped = np.zeros(3, complex), 0.0, []
+    for now in held:
+        stepped.append([(weight * state).sum().real for weight in weights])
+        state = state * decay + new * now + old * before
+        before = now
+    found = modal_motion(force, substeps, whole, decay, new, old, np.array(weights))
+    np.testing.assert_allclose(found, np.transpose(stepped), rtol=1e-12, atol=1e-12)

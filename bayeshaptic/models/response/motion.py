@@ -41,8 +41,6 @@ def linear_motions(
     -------
     ndarray, shape (masses, 2, N * substeps)
     """
-    from bayeshaptic.models.response.motion_kernel import modal_motion
-
     slow = 1e-5  # rad/s: what a pole at zero may be moved by, 6e-8 of the motion after a minute
     own = moved_apart(system.poles()[0], slow)
     poles = own[0]
@@ -59,9 +57,53 @@ def linear_motions(
     # One step: the old force until `late`, the new one after it.
     new = (h - late) * phi(kept * (h - late))
     old = np.exp(kept * (h - late)) * late * phi(kept * late)
-    held = np.ascontiguousarray(force, float)
-    motion = modal_motion(held, substeps, whole, np.exp(kept * h), new, old, np.array(rows))
+    motion = modal_motion(force, substeps, whole, np.exp(kept * h), new, old, np.array(rows))
     return np.asarray(motion.reshape(len(masses), 2, -1))
+
+
+def modal_motion(
+    force: Floats,
+    substeps: int,
+    whole: int,
+    decay: Complexes,
+    new: Complexes,
+    old: Complexes,
+    weights: Complexes,
+) -> Floats:
+    """Rows of weighted sums over modes that a held force drives, from rest.
+
+    Parameters
+    ----------
+    force : ndarray, shape (N,)
+        Held over a period of `substeps` steps, and `whole` steps late.
+    decay : complex ndarray, shape (P,)
+        What is left of a mode after a step.
+    new, old : complex ndarray, shape (P,)
+        What a force gives a mode in a step, and the force of the step before.
+    weights : complex ndarray, shape (R, P)
+
+    Returns
+    -------
+    ndarray, shape (R, N * substeps)
+        Real parts.
+    """
+    from bayeshaptic.models.response.motion_kernel import driven_modes
+
+    # After some steps of a period a mode is what is left of it, and what the two forces gave it.
+    left, of_new, of_old = [np.ones_like(decay)], [np.zeros_like(new)], [np.zeros_like(old)]
+    for step in range(substeps):
+        first = step == 0
+        left.append(decay * left[-1])
+        of_new.append(decay * of_new[-1] + (new if first else new + old))
+        of_old.append(decay * of_old[-1] + (old if first else 0.0))
+    modes = driven_modes(np.ascontiguousarray(force, float), left[-1], of_new[-1], of_old[-1])
+    motion = np.zeros((len(weights), len(force) * substeps))
+    for row, weight in zip(motion, weights, strict=True):
+        seen = weight * np.array(left[:-1])
+        given = np.array([of_new[:-1], of_old[:-1]]) @ weight
+        table = np.concatenate([seen.real, -seen.imag, given.real.T], axis=1)
+        row[whole:] = (modes @ table.T).ravel()[: max(len(row) - whole, 0)]
+    return motion
 
 
 def _residues(system: LinearSystem, poles: Complexes, mass: int) -> Complexes:

@@ -1,4 +1,4 @@
-"""Sums over poles in time, compiled."""
+"""Modes in time, compiled."""
 
 from __future__ import annotations
 
@@ -9,39 +9,32 @@ from bayeshaptic.types import Complexes, Floats
 
 
 @kernel
-def modal_motion(
-    force: Floats,
-    substeps: int,
-    whole: int,
-    decay: Complexes,
-    new: Complexes,
-    old: Complexes,
-    weights: Complexes,
-) -> Floats:
-    """Rows of weighted sums over modes that a held force drives, from rest.
+def driven_modes(force: Floats, decay: Complexes, new: Complexes, old: Complexes) -> Floats:
+    """Modes that a held force drives, from rest, at the start of each of its periods.
 
     Parameters
     ----------
     force : ndarray, shape (N,)
-        Held over a period of `substeps` steps, and `whole` steps late.
     decay : complex ndarray, shape (P,)
-        What is left of a mode after a step.
+        What is left of a mode after a period.
     new, old : complex ndarray, shape (P,)
-        What a force gives a mode in a step, and the force of the step before.
-    weights : complex ndarray, shape (R, P)
+        What the force gives a mode in a period, and the force of the period before.
 
     Returns
     -------
-    ndarray, shape (R, N * substeps)
-        Real parts.
+    ndarray, shape (N, 2 P + 2)
+        Real parts, imaginary parts, the force and that before.
     """
-    motion = np.zeros((len(weights), len(force) * substeps))
-    for mode in range(len(decay)):
-        state, before = 0j, 0.0
-        for k in range(motion.shape[1]):
-            for row in range(len(weights)):
-                motion[row, k] += (weights[row, mode] * state).real
-            held = force[(k - whole) // substeps] if k >= whole else 0.0
-            state = state * decay[mode] + (new[mode] * held + old[mode] * before)
-            before = held
-    return motion
+    modes = len(decay)
+    found = np.empty((len(force), 2 * modes + 2))
+    state = np.zeros(modes, np.complex128)
+    before = 0.0
+    for k in range(len(force)):
+        for mode in range(modes):
+            found[k, mode] = state[mode].real
+            found[k, modes + mode] = state[mode].imag
+            driven = new[mode] * force[k] + old[mode] * before
+            state[mode] = state[mode] * decay[mode] + driven
+        found[k, 2 * modes], found[k, 2 * modes + 1] = force[k], before
+        before = force[k]
+    return found
