@@ -210,4 +210,4 @@ def _between(samples: Floats) -> Floats:
     """Along straight lines to the fine grid, the last sample held, shape (N * SUBSTEPS,)."""
     ahead = np.append(samples[1:], samples[-1])
     weight = np.arange(SUBSTEPS) / SUBSTEPS
-    return np.asarray(samples[:, None] + (ahead - samples)[:, None] * weight).ravel()
+    return np.asarray(np.stack([samples, ahead], axis=1) @ np.stack([1 - weight, weight])).ravel()
