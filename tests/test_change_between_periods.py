@@ -90,3 +90,6 @@ def test_of_a_device_that_changes_no_stiffness_is_recommended(repeats: bool) -> 
     assert closed.verdict == "unexplained"
     told = headline(closed)
     assert told.stiffness is None and "is not the same" in told.sentence
+    found = closed.analysis
+    wider = found.stated.draws.std(axis=0) / found.posterior.draws.std(axis=0)
+    assert wider[found.model.names.index("m2")] > 1.2

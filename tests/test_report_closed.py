@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import needs_browser, probe
-from fake_analysis import fake_analysis, fake_closed
+from fake_analysis import FakeAnalysis, fake_analysis, fake_closed
 
 from bayeshaptic import read_recording, write_report
 from bayeshaptic.diagnosis.residuals.columns import motions
@@ -27,6 +27,7 @@ from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.tables import candidates, errors, estimates, found, outcomes
 from bayeshaptic.report.loop.words import lacked, verdict
+from bayeshaptic.report.words import widened
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
 FAMILIES = ("linear", "nonlinear", "time-varying")
@@ -65,6 +66,25 @@ def test_of_a_drift_what_changed_most_is_named() -> None:
     text = lacked(fake_closed(family="time-varying"))
     assert "lacked a grip that changes during the recording (kh ends at 1.58 times" in text
     assert "parameter" not in text
+
+
+@pytest.mark.parametrize(
+    "made, force, rest",
+    [(("unexplained", "linear"), False, True), (("explained", "nonlinear"), True, False)],
+)
+def test_wider_intervals_say_what_widens_them(
+    made: tuple[str, str], force: bool, rest: bool
+) -> None:
+    closed = fake_closed(*made)
+    assert widened(closed) == ""
+    posterior = closed.analysis.posterior
+    middle = posterior.draws.mean(axis=0)
+    wide = replace(posterior, chains=middle + 2 * (posterior.chains - middle))
+    analysis = FakeAnalysis(**{**vars(closed.analysis), "widened": wide})
+    text = widened(replace(closed, analysis=analysis))
+    assert text.startswith("The intervals of m1")
+    assert ("the force that was taken off" in text) == force
+    assert ("what is unexplained may bend the response" in text) == rest
 
 
 def test_two_effects_are_both_named() -> None:

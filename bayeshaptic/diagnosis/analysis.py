@@ -73,7 +73,8 @@ class Analysis(Shown):
         False where feedback makes the response worthless: `posterior` is then normal draws around
         the fit, for a picture, and no limit is stated.
     widened : Posterior or None
-        The posterior with the error of a force that was taken off; None where none was.
+        The posterior with the error of a force that was taken off, and with what is unexplained;
+        None where there is neither.
     """
 
     recording: Recording | None

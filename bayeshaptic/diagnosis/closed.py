@@ -28,6 +28,7 @@ from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
+from bayeshaptic.diagnosis.widening.rest import with_rest
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
@@ -176,6 +177,8 @@ def close_loop(
         notices += other_valley(state.fit, state.etfe, analysis.limit)
     seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
     wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
+    stated, louder = wide or analysis.posterior, analysis.noise_scale
+    wide = with_rest(stated, state.fit, traced, louder, chosen.seed) or wide
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)
     closed = Closed(base, analysis, traced, _error(base), _error(analysis))
     return with_average(closed, prior, chosen) if chosen.hidden else closed

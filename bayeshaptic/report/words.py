@@ -14,6 +14,7 @@ from bayeshaptic.quantities import estimate, interval, percent, pure, quantity
 from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
 from bayeshaptic.report.numbers.octaves import EXPECTED, third_octaves
+from bayeshaptic.report.numbers.result import families_of, is_unexplained
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 
 if TYPE_CHECKING:
@@ -213,7 +214,7 @@ def doubtful(result: Result) -> str:
 
 
 def widened(result: Result) -> str:
-    """Which intervals the error of a force makes wider; empty where it does not."""
+    """Which intervals a force or what is unexplained makes wider; empty where neither does."""
     analysis = result.analysis
     if analysis.widened is None:
         return ""
@@ -222,9 +223,14 @@ def widened(result: Result) -> str:
     names = [n for n, more in zip(analysis.model.names, ratio, strict=True) if more > worth]
     if not names:
         return ""
+    why = []
+    if "nonlinear" in families_of(result):
+        why.append("the force that was taken off is known with an error, its law never quite right")
+    if is_unexplained(result):
+        why.append("what is unexplained may bend the response that they are read from")
     return (
         f"The intervals of {', '.join(names)} are wider than the posterior's, as that of the limit "
-        "is: the force that was taken off is known with an error, and its law is never quite right."
+        f"is: {', and '.join(why)}."
     )
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.headline import headline
-from benchmarks.strangers.recordings import make
+from benchmarks.strangers.recordings import Case, make
 
 
 def one(seed: int) -> dict[str, Any]:
@@ -37,7 +37,7 @@ def one(seed: int) -> dict[str, Any]:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
-            found |= _of(close_loop(case.recording, **case.told), case.truth)
+            found |= _of(close_loop(case.recording, **case.told), case)
         except InputError as error:
             found |= {"outcome": "refused", "why": str(error)}
         except Exception:
@@ -47,9 +47,9 @@ def one(seed: int) -> dict[str, Any]:
     return found
 
 
-def _of(closed: Closed, truth: float) -> dict[str, Any]:
+def _of(closed: Closed, case: Case) -> dict[str, Any]:
     told = headline(closed)
-    limit = closed.analysis.limit.quantile(np.array([0.05, 0.5, 0.95])) / truth
+    limit = closed.analysis.limit.quantile(np.array([0.05, 0.5, 0.95])) / case.truth
     return {
         "outcome": "refused" if told.status == "untrusted" else "recommended",
         "why": told.sentence,
@@ -57,8 +57,18 @@ def _of(closed: Closed, truth: float) -> dict[str, Any]:
         "verdict": closed.verdict,
         "found": closed.effect_names,
         "limit": [float(value) for value in limit],
-        "stiffness": None if told.stiffness is None else float(told.stiffness / truth),
+        "stiffness": None if told.stiffness is None else float(told.stiffness / case.truth),
+        "parameters": _intervals(closed, case),
     }
+
+
+def _intervals(closed: Closed, case: Case) -> dict[str, list[float]]:
+    """90 % intervals over the truth; none where the base model is another than the device."""
+    if closed.base.model.name != case.base:
+        return {}
+    stated = closed.analysis.stated
+    ends = dict(zip(stated.names, stated.quantile(np.array([0.05, 0.95])).T, strict=True))
+    return {name: (ends[name] / value).tolist() for name, value in case.parameters.items()}
 
 
 def line(row: dict[str, Any]) -> str:
@@ -99,6 +109,14 @@ def summary(rows: list[dict[str, Any]]) -> None:
             f"{100 * inside:.0f} %, wholly above {np.sum(limits[:, 0] > 1)}, below "
             f"{np.sum(limits[:, 2] < 1)}, median width {width:.2f} dB; stiffness above the truth "
             f"{above}; CPU s median {np.median(seconds):.1f}, worst {seconds.max():.0f}"
+        )
+    for verdict in ("consistent", "explained", "unexplained"):
+        some = [row for row in rows if row.get("verdict") == verdict]
+        known = [ends for row in some for ends in row.get("parameters", {}).values()]
+        inside = sum(row["limit"][0] <= 1 <= row["limit"][2] for row in some)
+        print(
+            f"{verdict}: 90 % intervals hold {inside} of {len(some)} limits and "
+            f"{sum(low <= 1 <= high for low, high in known)} of {len(known)} parameters"
         )
     defects = [row["seed"] for row in rows if row["outcome"] == "DEFECT"]
     print(f"defects: {defects or 'none'}; warnings: {[r['seed'] for r in rows if r['warned']]}")

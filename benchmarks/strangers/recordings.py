@@ -45,13 +45,18 @@ _COUNT = {"lhifam": 3.14e-6, "phantom": 2 * np.pi / 40000}
 
 @dataclass(frozen=True)
 class Case:
-    """A recording, what is told of it, what is in it, and the stiffness that it should show."""
+    """A recording, what is told of it, what is in it, and what it should show.
+
+    `parameters` are those of the base model `base`, by the package's names.
+    """
 
     recording: Recording
     told: dict[str, Any]
     what: str
     effects: tuple[str, ...]
     truth: float
+    base: str
+    parameters: dict[str, float]
 
 
 @dataclass
@@ -110,7 +115,18 @@ def make(seed: int) -> Case | None:
         told["delay_s"] = delay_s
     who = "held" if draw.held else "free"
     what = f"{kind} {who}, {excitation}, {seconds:.0f} s, told {', '.join(told) or 'nothing'}"
-    return Case(recording, told, what, effects, truth)
+    return Case(recording, told, what, effects, truth, *_base(draw.values))
+
+
+def _base(values: dict[str, Any]) -> tuple[str, dict[str, float]]:
+    """The base model that the device is without its effects, and its parameters."""
+    masses = values["m"]
+    if len(masses) == 1:
+        return "rigid", {"m": float(masses[0]), "b": float(values["b1"] + values["b2"])}
+    names = ("m1", "m2", "mh")[: len(masses)]
+    found = dict(zip(names, map(float, masses), strict=True))
+    found |= {name: float(value) for name, value in values.items() if name != "m"}
+    return ("free" if len(masses) == 2 else "grasped"), found
 
 
 def _effects(draw: _Draw) -> tuple[str, ...]:

@@ -10,11 +10,12 @@ uncertain by that share of how far the effect has moved it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
+from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.inference.fit import Fit
@@ -23,8 +24,6 @@ from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
-_SIZES = np.geomspace(3e-4, 1.0, 12)
-_LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -121,58 +120,22 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
     return max(_LEAST[family], float(np.log(here / max(lowest, 1e-3 * here))))
 
 
-@dataclass(frozen=True)
-class _Deviation:
-    """Relative deviation of the measured response from the model, window by window."""
-
-    log_f: Floats
-    value: Complexes
-    variance: Floats
-
-
-def _deviation(fit: Fit) -> _Deviation:
-    windows = fit.windows
-    g = fit.response(windows.frequency_hz.ravel()).reshape(windows.frequency_hz.shape)
-    column = np.einsum("wij,wj->wi", windows.design, g)
-    size = np.sum(np.abs(column) ** 2, axis=1)
-    noise = np.sqrt(fit.likelihood.noise_variance)[:, None]
-    left = fit.residual.reshape(windows.target.shape) * noise
-    value = np.sum(column.conj() * left, axis=1) / size
-    log_f = np.log10(windows.frequency_hz.mean(axis=1))
-    return _Deviation(log_f, value, fit.likelihood.noise_variance / size)
-
-
-def _matern(distance: Floats, length: float) -> Floats:
-    scaled = np.sqrt(3) * np.abs(distance) / length
-    return (1 + scaled) * np.exp(-scaled)
-
-
 def _draws_of_deviation(
-    found: _Deviation, at: Floats, count: int, rng: np.random.Generator
+    found: Deviation, at: Floats, count: int, rng: np.random.Generator
 ) -> Complexes:
     """Draws of delta at log frequencies `at`, over sizes and lengths by their evidence."""
+    cases, weight = evidence(found)
+    picked = rng.multinomial(count, weight)
     between = found.log_f[:, None] - found.log_f[None, :]
-    cases = []
-    for length in _LENGTHS:
-        shape = _matern(between, length)
-        for size in _SIZES:
-            root = np.linalg.cholesky(size**2 * shape + np.diag(found.variance))
-            white = np.linalg.solve(root, found.value)
-            # A complex variable: half of the variance in each part.
-            evidence = -float(np.sum(np.abs(white) ** 2)) - 2 * float(np.log(np.diag(root)).sum())
-            cases.append((evidence, size, length))
-    logs = np.array([case[0] for case in cases])
-    weight = np.exp(logs - logs.max())
-    picked = rng.multinomial(count, weight / weight.sum())
     parts = []
-    for (_, size, length), number in zip(cases, picked, strict=True):
+    for (size, length), number in zip(cases, picked, strict=True):
         if number == 0:
             continue
-        own = size**2 * _matern(between, length) + np.diag(found.variance)
-        cross = size**2 * _matern(at[:, None] - found.log_f[None, :], length)
+        own = size**2 * matern(between, length) + np.diag(found.variance)
+        cross = size**2 * matern(at[:, None] - found.log_f[None, :], length)
         back = np.linalg.solve(own, cross.T).T
         mean = back @ found.value
-        cover = size**2 * _matern(at[:, None] - at[None, :], length) - back @ cross.T
+        cover = size**2 * matern(at[:, None] - at[None, :], length) - back @ cross.T
         values, vectors = np.linalg.eigh(cover)
         root = vectors * np.sqrt(np.maximum(values, 0))
         normal = rng.standard_normal((2, len(at), number))
@@ -188,7 +151,7 @@ def _with_linear(
     assert period is not None
     grid = 1500
     frequency = np.geomspace(0.05 * fit.frequency_hz.min(), 0.5 / period, grid)
-    found = _deviation(fit)
+    found = deviation(fit)
     # Below the band the mechanism alone speaks; above it the deviation may go on.
     beyond = np.arange(found.log_f[-1] + 0.05, np.log10(frequency[-1]), 0.05)
     knots = np.concatenate([found.log_f, beyond])

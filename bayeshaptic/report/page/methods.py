@@ -136,7 +136,8 @@ def _loop(result: Result) -> tuple[str, ...]:
     text = f"The residual was put to {count} tests for effects that the model lacks"
     text += f", and {found} was added." if found else "; none was added."
     if is_unexplained(result):
-        text += " What remained unexplained widens the limit by a random discrepancy [kennedy2001]."
+        text += " What remained unexplained widens limit and parameters by a random discrepancy "
+        text += "[kennedy2001]."
     return (text,)
 
 
