@@ -49,6 +49,9 @@ def kernel(
     _listen()
     njit: Any = numba.njit
     options = {"fastmath": False if exact else _FAST, "error_model": "numpy", "nogil": True}
+    # A part that stayed a function would be another copy of it, rounded otherwise, in the process
+    # that compiles it than in those that load what calls it.
+    options["forceinline"] = inline
     try:
         compiled: F = njit(cache=not inline, **options)(function)
     except RuntimeError:  # no folder that can be written: compiled anew in each process

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 from bayeshaptic.compiled import kernel, when_compiling
 
 
@@ -25,3 +30,24 @@ def test_a_compilation_is_told_once() -> None:
     finally:
         when_compiling(None)
     assert told == [1]
+
+
+_DIGEST = """
+import hashlib
+import numpy as np
+from bayeshaptic.models import build_model
+model = build_model("grasped", "lhifam").with_period(1e-3)
+theta = model.values * np.exp(0.1 * np.random.default_rng(1).standard_normal((200, model.size)))
+response = model.response(theta, np.linspace(1.0, 450.0, 200))
+print(hashlib.sha256(np.ascontiguousarray(response)).hexdigest())
+"""
+
+
+def test_whoever_compiles_finds_the_numbers_of_those_who_load(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    line = [sys.executable, "-c", _DIGEST]
+    compiled, loaded = (
+        subprocess.run(line, env=environment, check=True, capture_output=True, text=True).stdout
+        for _ in range(2)
+    )
+    assert compiled == loaded
