@@ -12,9 +12,19 @@ from plain_stepping import step_through
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
 from bayeshaptic.effects.library import effect_class
-from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, forced_motion, steps
+from bayeshaptic.effects.nonlinear.internal_force import (
+    CONNECTION,
+    LOAD,
+    MOTOR,
+    Internal,
+    forced_motion,
+    numbers_of,
+    steps,
+)
+from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
+from bayeshaptic.models.response.motion import linear_motions
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -22,7 +32,8 @@ from bayeshaptic.rig.excitation import Prescribed
 
 LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 6.0, 4
-STEP_S = 1e-3 / 8
+PERIOD_S = 1e-3
+STEP_S = PERIOD_S / 8
 
 # Name, fields on the bench, strength, shape, place.
 FORCES: tuple[tuple[str, dict[str, float], float, dict[str, float], Any], ...] = (
@@ -65,6 +76,11 @@ OURS = {"hardening_connection": "hardening_spring"}
 BENCHS = {"rising_friction": "stribeck_friction"}  # with less at rest than in motion
 
 
+def driven(bench: ForceBench, force: Acting, theta: Any) -> Any:
+    """What it does to the motor's position."""
+    return bench.driven((force,), theta, bench.added_motions((force,), theta))
+
+
 @cache
 def command() -> Any:
     """White noise without a mean: a free device then does not run away."""
@@ -77,6 +93,15 @@ def recorded(bench: Bench) -> Recording:
     return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
 
 
+def plainly(mechanism: Any, forces: list[Internal]) -> Any:
+    """As `forced_motion`, in plain NumPy."""
+    linear = steps(mechanism, [force.place for force in forces], STEP_S)
+    motion = np.array([[force.position, force.velocity] for force in forces])
+    laws = tuple(force.law.force for force in forces)
+    sticks = [force.law.sticks for force in forces]
+    return step_through(*linear, motion, STEP_S, 8, laws, sticks, *numbers_of(forces))
+
+
 @pytest.mark.parametrize("case", COMPILED, ids=[force[0] for force in COMPILED])
 def test_compiled_steps_are_the_plain_ones(case: Any) -> None:
     name, _, strength, shape, place = case
@@ -85,10 +110,9 @@ def test_compiled_steps_are_the_plain_ones(case: Any) -> None:
     mechanism = model.system(model.values).mechanism
     wander = np.cumsum(np.random.default_rng(1).normal(size=800))
     velocity = wander * (0.005 if place == MOTOR else 1e-4)
-    motion = np.cumsum(velocity) * STEP_S, velocity, STEP_S, 8
-    constants = np.array(law.constants, float)
-    plain = step_through(*steps(mechanism, place, STEP_S), *motion, law.force, constants)
-    found = forced_motion(mechanism, place, law, *motion)
+    force = Internal(place, law, np.cumsum(velocity) * STEP_S, velocity)
+    plain = plainly(mechanism, [force])[0]
+    found = forced_motion(mechanism, [force], STEP_S, 8)[0]
     # What rounding differs by, over eight hundred steps.
     np.testing.assert_allclose(found, plain, rtol=0, atol=1e-10 * np.abs(plain).max())
     assert np.ptp(plain) > 0
@@ -102,7 +126,7 @@ def test_dry_friction_holds_a_mass_still() -> None:
     rate, time = 2 * np.pi * 5.0, STEP_S * np.arange(4000)
     size = 0.5 / float(mechanism.masses[0][0]) / rate
     velocity, position = size * np.sin(rate * time), size / rate * (1 - np.cos(rate * time))
-    added = forced_motion(mechanism, MOTOR, law, position, velocity, STEP_S, 8)
+    added = forced_motion(mechanism, [Internal(MOTOR, law, position, velocity)], STEP_S, 8)[0]
     # Velocities are exact at the ends of the steps: the trapezoidal rule is off by (w h)^2 / 12.
     assert np.abs(added + position[::8]).max() < (rate * STEP_S) ** 2 * position.max()
 
@@ -129,7 +153,7 @@ def test_added_motion_is_that_of_the_bench(
     # It begins at rest, and no constant force acts: there is no drift to look for.
     monkeypatch.setattr(ForceBench, "_drift", lambda bench, besides, theta: np.zeros(len(besides)))
     bench = ForceBench(State(etfe, fit), with_force)
-    found = bench.added_motion(effect, strength, own.values)
+    found = driven(bench, Acting(effect, strength), own.values)
     # Moves in 50 ms: a mean and a slope do not matter.
     found, added = (
         signal[50:] - signal[:-50] for signal in (found, with_force.position - without.position)
@@ -148,9 +172,43 @@ def test_a_force_with_which_the_mass_runs_away_explains_nothing() -> None:
     etfe = estimate_etfe(recording)
     fit = least_squares(build_model("free", "lhifam"), etfe)
     bench = ForceBench(State(etfe, fit), recording)
-    before = bench.added_motion(effect_class("coulomb_friction")(MOTOR, {}), 0.6, fit.theta)
+    friction = Acting(effect_class("coulomb_friction")(MOTOR, {}), 0.6)
+    before = driven(bench, friction, fit.theta)
     softening = -1e3 * float(fit.theta[0]) * 1e4 / np.mean(recording.position**2)
-    found = bench.point(effect_class("hardening_spring")(MOTOR, {}), softening, fit.theta)
+    spring = Acting(effect_class("hardening_spring")(MOTOR, {}), softening)
+    found = bench.point((spring,), fit.theta)
     assert found.gain_fit == found.gain_choose == -np.inf
-    after = bench.added_motion(effect_class("coulomb_friction")(MOTOR, {}), 0.6, fit.theta)
+    after = driven(bench, friction, fit.theta)
     assert np.array_equal(before, after)
+
+
+def test_two_forces_act_in_the_motion_that_both_make() -> None:
+    """Friction at the motor, drag at the load: against the bench, and each other's order."""
+    bench = LHIFAM.with_effect("coulomb_friction", force=0.6)
+    bench = bench.with_effect("drag", coefficient=150.0, on="m2")
+    both, without = recorded(bench), recorded(LHIFAM)
+    model = build_model("free", "lhifam")
+    values = np.array([bench.values[name] for name in model.names])
+    system = model.system(values)
+    (x, v), (x2, v2) = linear_motions(system, both.force, PERIOD_S, (0, 1), 8)
+    law = {
+        place: effect_class(name)(place).law(strength, model, values)
+        for name, place, strength in (("coulomb_friction", MOTOR, 0.6), ("drag", LOAD, 150.0))
+    }
+    friction, drag = Internal(MOTOR, law[MOTOR], x, v), Internal(LOAD, law[LOAD], x2, v2)
+
+    def added(*forces: Internal) -> Any:
+        return forced_motion(system.mechanism, forces, STEP_S, 8)
+
+    found, truth = added(drag, friction).sum(axis=0), both.position - without.position
+    apart = added(drag)[0] + added(friction)[0]
+
+    def error(motion: Any) -> float:
+        left = motion - truth
+        return float(np.std(left[50:] - left[:-50]))
+
+    moved = float(np.std(truth[50:] - truth[:-50]))
+    assert error(found) < 0.03 * moved, (error(found), moved)
+    assert error(apart) > 3 * error(found), (error(apart), error(found))
+    plain = plainly(system.mechanism, [drag, friction])
+    np.testing.assert_allclose(added(drag, friction), plain, rtol=0, atol=1e-9 * np.ptp(plain))

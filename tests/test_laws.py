@@ -13,7 +13,14 @@ from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.effects import laws, registry
 from bayeshaptic.effects.library import effect_class, effects
-from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place, forced_motion, steps
+from bayeshaptic.effects.nonlinear.internal_force import (
+    MOTOR,
+    Internal,
+    Law,
+    Place,
+    forced_motion,
+    steps,
+)
 from bayeshaptic.effects.nonlinear.protocol import Motion, NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
 from bayeshaptic.models import Model, build_model
@@ -82,15 +89,16 @@ def test_it_is_simulated() -> None:
     mechanism = model.system(model.values).mechanism
     v = 0.1 * np.sin(np.arange(400) / 20)
     law = effect_class("rounded_friction")().law(0.5, model, model.values)
-    found = forced_motion(mechanism, MOTOR, law, v, v, PERIOD_S / 8, 8)
+    found = forced_motion(mechanism, [Internal(MOTOR, law, v, v)], PERIOD_S / 8, 8)
     plain = step_through(
-        *steps(mechanism, MOTOR, PERIOD_S / 8),
-        v,
-        v,
+        *steps(mechanism, [MOTOR], PERIOD_S / 8),
+        np.array([[v, v]]),
         PERIOD_S / 8,
         8,
-        rounded,
+        (rounded,),
+        [False],
         np.array([0.5, SLOW]),
+        (0,),
     )
     np.testing.assert_allclose(found, plain, rtol=0, atol=1e-10 * np.abs(plain).max())
 

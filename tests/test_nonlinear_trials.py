@@ -14,13 +14,17 @@ from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
+from bayeshaptic.diagnosis.trials import beside
 from bayeshaptic.diagnosis.trials import nonlinear as tried
+from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
-from bayeshaptic.diagnosis.trials.force_fit import spread
-from bayeshaptic.diagnosis.trials.nonlinear import _scan, nonlinear_trials
+from bayeshaptic.diagnosis.trials.force_search import _damped, _scan
+from bayeshaptic.diagnosis.trials.force_slopes import spread
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
@@ -51,7 +55,8 @@ def state_of(bench: Bench) -> State:
 def only(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
     """Some laws of the library: each takes seconds, and the benchmarks try them all."""
     kinds = [kind for kind in effects("nonlinear") if kind.name in names]
-    monkeypatch.setattr(tried, "effects", lambda family: kinds)
+    for module in (tried, beside):
+        monkeypatch.setattr(module, "effects", lambda family: kinds)
 
 
 @pytest.fixture(autouse=True)
@@ -120,14 +125,14 @@ def test_what_goes_with_a_friction_is_where_the_rest_fits_best() -> None:
     assert recording is not None
     bench = ForceBench(state, recording)
     strength = best.accepted.estimates["friction_force"].mean
-    found = bench.point(CoulombFriction(MOTOR), strength, best.state.fit.theta, rounds=3)
+    found = bench.point((Acting(CoulombFriction(MOTOR), strength),), best.state.fit.theta, rounds=3)
     covariance, along = spread(bench, found)
     here, low, high = search_box(bench.model)
     phi, sd = here.coordinate(found.theta[None]), np.sqrt(covariance[0, 0])
 
     def gain(log: float, moved: bool) -> float:
         theta = here.natural(np.clip(phi + log * moved * along.T, low, high))[0]
-        return bench.as_it_is(found.effect, strength * np.exp(log), theta).gain_fit
+        return bench.as_it_is((Acting(found.effect, strength * np.exp(log)),), theta).gain_fit
 
     def fall(moved: bool) -> float:
         """From four standard deviations to eight, either way."""
@@ -312,11 +317,11 @@ def test_a_law_that_takes_all_damping_and_a_motion_that_runs_away_spoil_no_other
     state, _ = rubbed(0.5)
     recording, without = state.etfe.unbroken, state.fit.theta
     assert recording is not None
-    bench, friction = ForceBench(state, recording), CoulombFriction(MOTOR)
+    bench, friction = ForceBench(state, recording), Acting(CoulombFriction(MOTOR), 0.5)
     bench.remember(np.full(recording.samples, np.nan))
-    assert bench.point(friction, 0.5, without).gain_fit > 100
+    assert bench.point((friction,), without).gain_fit > 100
     ground = np.isin(state.model.names, ("b1", "b2"))
-    damped = tried._damped(bench, np.where(ground, 0.0, without))
+    damped = _damped(bench, np.where(ground, 0.0, without))
     assert damped == pytest.approx(np.where(ground, 0.2 * without, without))
 
 
@@ -336,13 +341,69 @@ def test_scores_of_few_lines_count_for_less() -> None:
 def test_a_scan_goes_on_to_fainter_forces_where_its_faintest_is_too_strong() -> None:
     """A force of 0.01, and scans from one on: gains are a parabola, 40 at the force itself."""
 
-    def point(_: object, strength: float, start: object) -> SimpleNamespace:
+    def point(forces: tuple[Acting], start: object) -> SimpleNamespace:
+        strength = forces[-1].strength
         share = strength / 0.01
         return SimpleNamespace(strength=strength, gain_fit=80 * share - 40 * share**2, theta=start)
 
     bench = SimpleNamespace(point=point)
-    found = _scan(bench, None, np.array([1.0, 3.0]), None, beyond=8)  # type: ignore[arg-type]
+    found = _scan(bench, (), None, np.array([1.0, 3.0]), None, beyond=8)  # type: ignore[arg-type]
     best = max(found, key=lambda one: one.gain_fit)
     assert 0.01 / np.sqrt(3) < best.strength < 0.01 * np.sqrt(3)
-    beside = _scan(bench, None, np.array([0.8, 1.0]), None)  # type: ignore[arg-type]
+    beside = _scan(bench, (), None, np.array([0.8, 1.0]), None)  # type: ignore[arg-type]
     assert [one.strength for one in beside] == [0.8, 1.0], "a known force is looked for there"
+
+
+@cache
+def rubbed_and_dragged() -> State:
+    """Friction at the motor and a drag at the load, explained by the friction."""
+    bench = LHIFAM.with_effect("coulomb_friction", force=0.5)
+    return best_trial(state_of(bench.with_effect(Drag(600.0, "m2"))), "sign(v)").state
+
+
+def best_trial(state: State, *raised: str) -> Trial:
+    return max(nonlinear_trials(state, set(raised), Meter()), key=lambda trial: trial.score)
+
+
+def error_db(state: State) -> float:
+    return abs(limit_db(state) - 20 * np.log10(LHIFAM.true_critical_stiffness()))
+
+
+def test_a_drag_is_found_beside_friction_and_both_are_what_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each by itself, a drag half as large and a limit 8 % too high."""
+    first = rubbed_and_dragged()
+    only(monkeypatch, "coulomb_friction", "drag", "cubic_damping")
+    raised = {test.name for test in beside_tests(first) if test.flagged}
+    assert raised == {"load velocity beside"}
+    both = best_trial(first, *raised)
+    friction, drag = both.state.accepted
+    assert drag.name == "drag" and drag.title.endswith("at the load") and both.convincing
+    assert friction.estimates["friction_force"].mean == pytest.approx(0.5, rel=0.02)
+    assert drag.estimates["drag_coefficient"].mean == pytest.approx(600.0, rel=0.05)
+    assert not any(test.flagged for test in beside_tests(both.state))
+    assert error_db(both.state) < 0.2 < 0.5 < error_db(first)
+
+
+def test_friction_alone_has_nothing_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring stood 8 standard deviations out while friction turned at the ends of steps only."""
+    _, trials = rubbed(0.5)
+    only(monkeypatch, "coulomb_friction", "drag", "cubic_damping", "hardening_spring", "backlash")
+    tests = beside_tests(max(trials, key=lambda trial: trial.score).state)
+    assert {test.name.removesuffix(" beside") for test in tests} >= {"velocity", "stretch"}
+    assert all(test.statistic < 3.5 for test in tests), [test.text for test in tests]
+
+
+def test_an_earlier_force_gets_the_law_that_it_has_beside_the_later_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first = rubbed_and_dragged()
+    only(monkeypatch, "cubic_damping")
+    wrong = best_trial(first, "load velocity beside").state
+    wrong = replace(wrong, accepted=wrong.accepted[::-1])
+    assert [one.name for one in wrong.accepted] == ["cubic_damping", "coulomb_friction"]
+    only(monkeypatch, "coulomb_friction", "drag", "cubic_damping")
+    found = reconsidered(wrong, Meter())
+    assert [one.name for one in found.accepted] == ["coulomb_friction", "drag"]
+    assert reconsidered(found, Meter()) is found

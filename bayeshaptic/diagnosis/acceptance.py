@@ -115,7 +115,22 @@ def remaining(
 def _allowing(test: Test, explained: float) -> Test:
     """`test` with the threshold that it has after something was taken off the recording."""
     least = thresholds.LAW_ERROR * explained if test.family == "nonlinear" else 0.0
-    return replace(test, threshold=max(thresholds.MENDED * test.threshold, least))
+    allowed = max(thresholds.MENDED * test.threshold, least)
+    return replace(test, threshold=allowed, usual=test.threshold)
+
+
+def wanted(tests: Sequence[Test], accepted: Sequence[Accepted]) -> tuple[Test, ...]:
+    """The tests that call for one more effect.
+
+    An allowance for what a law of a force may leave is for the verdict: what is left may be another
+    force beside it, which is tried.
+    """
+    if any(test.flagged for test in tests):
+        return tuple(tests)
+    if not any(one.change and one.change.acting for one in accepted):
+        return ()
+    noticed = [test for test in tests if test.family == "nonlinear" and test.noticed]
+    return tuple(replace(test, threshold=test.usual or test.threshold) for test in noticed)
 
 
 def excess(tests: Iterable[Test]) -> float:

@@ -41,6 +41,12 @@ class Trials(Protocol):
     ) -> list[Trial]:
         """Trials of every class that a test raises."""
 
+    def beside(self, state: State) -> tuple[Test, ...]:
+        """Tests for another force beside those that a state has."""
+
+    def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
+        """With another law in the place of an earlier force, or the very same."""
+
     def without_needless(self, state: State) -> tuple[State, str | None]:
         """Without the earlier effect that a later one made needless, and its name; or as it is."""
 
@@ -138,13 +144,13 @@ class Loop:
         with counting(self.meter):
             if not self._path:
                 self._begin()
-            if self.misfits:
+            if wanted := self._wanted:
                 self._number += 1
-                if self._round():
+                if self._round(wanted):
                     self._mend()
                 else:
                     self.done = True
-            self.done |= not self.misfits
+            self.done |= not self._wanted
 
     @property
     def misfits(self) -> bool:
@@ -152,6 +158,11 @@ class Loop:
         if not self._path:
             return self.state.fit.misfits
         return any(test.flagged for test in self._tests)
+
+    @property
+    def _wanted(self) -> tuple[Test, ...]:
+        """The tests that call for one more round."""
+        return acceptance.wanted(self._tests, self.state.accepted) if self._path else ()
 
     @property
     def traced(self) -> Traced:
@@ -195,9 +206,9 @@ class Loop:
         ]
         self._accept(mended, self._remaining(mended))
 
-    def _round(self) -> bool:
+    def _round(self, wanted: tuple[Test, ...]) -> bool:
         """Go on to one more effect, and what is left; False where nothing convinces."""
-        trials = self._kind.trials(self.state, self._tests, self.meter, self._tick)
+        trials = self._kind.trials(self.state, wanted, self.meter, self._tick)
         left: dict[int, tuple[Test, ...]] = {}
 
         def remaining(trial: Trial) -> tuple[Test, ...]:
@@ -219,8 +230,9 @@ class Loop:
         if chosen is None:
             return False
         found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
-        lighter, gone = self._kind.without_needless(found)
-        if gone is not None:
+        better = self._kind.reconsidered(found, self.meter, self._tick)
+        lighter, gone = self._kind.without_needless(better)
+        if lighter is not found:
             found, tests = lighter, self._remaining(lighter)
             self._candidates = [
                 replace(c, taken_out=c.taken_out or (c.accepted and c.name == gone))
@@ -230,6 +242,9 @@ class Loop:
         return True
 
     def _accept(self, state: State, tests: tuple[Test, ...]) -> None:
+        if not any(test.flagged for test in tests):
+            beside = self._kind.beside(state)
+            tests = (*tests, *acceptance.remaining(beside, state.accepted, self._seen))
         self._seen = (*self._seen, *tests)
         self._path.append(state)
         self.state, self._tests = state, tests

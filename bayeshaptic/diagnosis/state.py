@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.likelihood import Likelihood
@@ -46,6 +47,8 @@ class Change:
     ----------
     effect : Extension or None
         What it added to the model.
+    acting : Acting or None
+        The force that was simulated.
     force, position : complex ndarray, shape (L,)
         What it took off the spectra.
     command, motion : ndarray, shape (N,)
@@ -53,6 +56,7 @@ class Change:
     """
 
     effect: Extension | None = None
+    acting: Acting | None = None
     force: Complexes | float = 0.0
     position: Complexes | float = 0.0
     command: Floats | float = 0.0

@@ -14,10 +14,15 @@ def tested() -> dict[str, Shape]:
     return {shape.name: shape for kind in effects("nonlinear") for shape in kind.tests}
 
 
+BESIDE = " beside"
+"""Behind a variable, the name of a test for another force over it beside those that were found."""
+
+
 def variables(raised: Iterable[str]) -> set[str]:
     """What raised tests are over; tests that are of no shape stay as they are."""
     shapes = tested()
-    return {shapes[name].over if name in shapes else name for name in raised}
+    names = (name.removesuffix(BESIDE) for name in raised)
+    return {shapes[name].over if name in shapes else name for name in names}
 
 
 def fitted(place: Place, usual: Usual) -> list[tuple[str, Shape]]:

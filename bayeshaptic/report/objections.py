@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.feedback.other_valley import VALLEY
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.effects.laws import tested, variables
+from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
@@ -129,16 +128,14 @@ def changes(closed: Closed) -> bool:
 def _rubs_otherwise(closed: Closed) -> bool:
     """Whether a force over the velocity stays unexplained: such a damping ends in small motions.
 
-    A law of friction may leave a share of what it explained.  Where nobody holds the device that
-    may be a drag beside it: nine such recordings had six stiffnesses 1.02 to 8 times the
-    truth, and four of these are seen so; of nine with friction alone none leaves more than 3.
+    A law may leave a share of what it explained.  Where nobody holds the device that may be another
+    force beside it, which was looked for and not found.
     """
     left = _left(closed)
-    rubs = any("friction_force" in effect.estimates for effect in closed.effects)
-    if rubs and closed.force is None and not closed.model.held:
-        usual = thresholds.two_sided()  # as where nothing was taken off
-        left |= {test.name for test in closed.traced.after if test.statistic > usual}
-    return bool(variables(left & set(tested())) & {VELOCITY, LOAD_VELOCITY})
+    acts = any(effect.family == "nonlinear" for effect in closed.effects)
+    if acts and closed.force is None and not closed.model.held:
+        left |= {test.name for test in closed.traced.after if test.noticed}
+    return bool(variables(left) & {VELOCITY, LOAD_VELOCITY})
 
 
 def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:

@@ -136,6 +136,9 @@ def internal_force(name: str) -> Callable[[], Any]:
     motion = linear_motion(system, made.force, made.period_s, 0, SUBSTEPS)
     law = effect.law(strength, model, model.values)
     step = made.period_s / SUBSTEPS
+    if hasattr(force, "Internal"):
+        acting = [force.Internal(place, law, *motion)]
+        return lambda: force.forced_motion(system.mechanism, acting, step, SUBSTEPS)
     return lambda: force.forced_motion(system.mechanism, place, law, *motion, step, SUBSTEPS)
 
 

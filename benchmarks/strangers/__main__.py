@@ -27,11 +27,15 @@ from benchmarks.strangers.recordings import Case, make
 
 
 def one(seed: int) -> dict[str, Any]:
-    """What became of one recording; limits over the truth."""
-    case = make(seed)
+    """What became of the recording of a seed."""
+    return {"seed": seed} | analysed(make(seed))
+
+
+def analysed(case: Case | None) -> dict[str, Any]:
+    """What became of a recording; limits over the truth."""
     if case is None:
-        return {"seed": seed, "outcome": "ran away"}
-    found: dict[str, Any] = {"seed": seed, "what": case.what, "effects": case.effects}
+        return {"outcome": "ran away"}
+    found: dict[str, Any] = {"what": case.what, "effects": case.effects}
     found["file"] = "device" in case.told
     began = time.process_time()
     with warnings.catch_warnings(record=True) as told:
@@ -57,6 +61,16 @@ def _of(closed: Closed, case: Case) -> dict[str, Any]:
         "verdict": closed.verdict,
         "found": closed.effect_names,
         "limit": [float(value) for value in limit],
+        "left": [
+            f"{test.name} {test.statistic:.1f}/{test.usual or test.threshold:.1f}"
+            for test in closed.traced.after
+            if test.excess > 0.6 or test.noticed
+        ],
+        "estimates": {
+            name: [one.mean, one.sd]
+            for effect in closed.effects
+            for name, one in effect.estimates.items()
+        },
         "stiffness": None if told.stiffness is None else float(told.stiffness / case.truth),
         "parameters": _intervals(closed, case),
     }
@@ -81,6 +95,10 @@ def line(row: dict[str, Any]) -> str:
         low, middle, high = row["limit"]
         named = ", ".join(row["found"]) or "nothing"
         text += f" {row['model']}, {row['verdict']}: {named}, {low:.3g} {middle:.3g} {high:.3g}"
+        if row["stiffness"] is not None:
+            text += f", stiffness {row['stiffness']:.3g}"
+        if row["outcome"] == "recommended" and (row["stiffness"] or 0) > 1:
+            text += " ABOVE"
     if row["outcome"] != "recommended":
         text += f" ({row['why'].splitlines()[-1][:90]})"
     return f"{text}, {row['seconds']:.1f} s {' '.join(row['warned'])}"

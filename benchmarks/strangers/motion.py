@@ -18,9 +18,9 @@ class Forces:
     """What pushes besides the command; zero is none.
 
     Dry friction at the motor, more by `sticking` at rest, and e times more every 1/`tighter` of the
-    way; in the transmission a cubic spring and a gap in the linear one; quadratic drag on the body;
-    cogging (as a force) and ripple (as a share of the command) over the motor's position; a command
-    that is compressed as tanh.
+    way; in the transmission a cubic spring and a gap in the linear one; quadratic and cubic drag on
+    the body; cogging (as a force) and ripple (as a share of the command) over the motor's position;
+    a command that is compressed as tanh; a cubic spring from the motor to the ground.
     """
 
     friction: float = 0.0
@@ -36,6 +36,8 @@ class Forces:
     ripples: float = 0.0
     compressed: float = 0.0
     tighter: float = 0.0
+    cubed: float = 0.0
+    grounded: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,23 @@ class Motion:
 
 
 @njit(cache=True)
+def _rubbed(begins, ends, inverse, most):  # type: ignore[no-untyped-def]
+    """Dry friction in the mean of a step; without it a mass begins and ends at these velocities."""
+    way = np.sign(begins) if begins != 0 else np.sign(ends)
+    if way * ends >= most * inverse:  # it slides on
+        return -way * most
+    pulled = abs(ends - begins)
+    if pulled <= most * inverse:  # it comes to rest
+        return -ends / inverse
+    # It turns, and slides back for the rest of the step.
+    back = 1 - abs(begins) / (pulled + most * inverse)
+    return (-way * back * (pulled - most * inverse) - ends) / inverse
+
+
+@njit(cache=True)
 def _run(transitions, every, entry, entries, position, late, command, hand, numbers):  # type: ignore[no-untyped-def]
     friction, sticking, slow, cubic, gap, spring, drag = numbers[:7]
-    cogging, cogs, ripple, ripples, compressed, tighter = numbers[7:]
+    cogging, cogs, ripple, ripples, compressed, tighter, cubed, grounded = numbers[7:]
     samples, row = len(command), entries.shape[1]
     state, found, inner = np.zeros(len(entry)), np.zeros(samples), np.zeros(row)
     for k in range(samples):
@@ -84,26 +100,29 @@ def _run(transitions, every, entry, entries, position, late, command, hand, numb
             if compressed > 0:
                 force = np.tanh(force * compressed) / compressed
             force *= 1 + ripple * np.sin(ripples * state[0])
-            inner[:] = 0.0
+            free = transition @ state + entry * force
+            ahead = free
             # Inner forces are those in the middle of the step: at its beginning they would be late,
             # and a gap of a stiff spring late by 60 us damps as much again as the transmission.
-            free = transition @ state + entry * force
-            middle = 0.5 * (state + free)
-            if row > 1:
-                stretch = middle[0] - middle[1]
-                pull = spring * (cubic * stretch**3 - max(-gap, min(gap, stretch)))
-                inner[0] -= pull
-                inner[1] += pull
-            body = min(row - 1, 1)
-            inner[body] -= drag * abs(middle[row + body]) * middle[row + body]
-            inner[0] += cogging * np.sin(cogs * middle[0])
-            inner[-1] += hand[k]
-            ahead = free + entries @ inner
-            if friction > 0:  # what would stop the motor, as far as friction reaches
-                most = friction * (1 + (sticking - 1) * np.exp(-((ahead[row] / slow) ** 2)))
-                most *= np.exp(tighter * state[0])
-                stop = max(-most, min(most, -ahead[row] / entries[row, 0]))
-                ahead += entries[:, 0] * stop
+            for _ in range(3):  # the middle is where these forces take it
+                middle = 0.5 * (state + ahead)
+                inner[:] = 0.0
+                if row > 1:
+                    stretch = middle[0] - middle[1]
+                    pull = spring * (cubic * stretch**3 - max(-gap, min(gap, stretch)))
+                    inner[0] -= pull
+                    inner[1] += pull
+                body = min(row - 1, 1)
+                speed = middle[row + body]
+                inner[body] -= (drag * abs(speed) + cubed * speed**2) * speed
+                inner[0] += cogging * np.sin(cogs * middle[0]) - grounded * middle[0] ** 3
+                inner[-1] += hand[k]
+                ahead = free + entries @ inner
+                if friction > 0:
+                    most = friction * (1 + (sticking - 1) * np.exp(-((middle[row] / slow) ** 2)))
+                    most *= np.exp(tighter * state[0])
+                    rubbed = _rubbed(state[row], ahead[row], entries[row, 0], most)
+                    ahead = ahead + entries[:, 0] * rubbed
             state = ahead
         if not abs(state[0]) < 1e6:
             return found[:k]

@@ -116,6 +116,14 @@ class LineTrials:
                 self._keep(found, (basis.name, basis.place), self._with_force(state, basis))
         return list(found.values())
 
+    def beside(self, state: State) -> tuple[Test, ...]:
+        """None: the tests of lines are of forces fitted together."""
+        return ()
+
+    def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
+        """As it is."""
+        return state
+
     def without_needless(self, state: State) -> tuple[State, str | None]:
         """Without the earlier effect that is worth least, if that is next to nothing."""
         assert isinstance(state, BalancedState)

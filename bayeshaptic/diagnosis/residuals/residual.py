@@ -56,6 +56,8 @@ class Test:
         What was found, in words.
     force : ForceSeen or None
         What a test for a force found.
+    usual : float or None
+        The threshold before something was taken off the recording, where it is another.
     """
 
     name: str
@@ -65,10 +67,16 @@ class Test:
     frequency_hz: float | None
     text: str
     force: ForceSeen | None = None
+    usual: float | None = None
 
     @property
     def flagged(self) -> bool:
         return self.statistic > self.threshold
+
+    @property
+    def noticed(self) -> bool:
+        """Whether it would be flagged without an allowance for what was taken off."""
+        return self.statistic > (self.threshold if self.usual is None else self.usual)
 
     @property
     def excess(self) -> float:

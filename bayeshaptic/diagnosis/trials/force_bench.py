@@ -1,12 +1,15 @@
 """One recording and one linear model, on which internal forces are tried.
 
-What a force adds to the motion is simulated and taken off the recording; the linear parameters are
-fitted to what is left.  What goes into the law is the simulated motion, without encoder noise;
-taking sign(v) from the encoder would miss half of the friction.
+What forces add to the motion is simulated and taken off the recording; the linear parameters are
+fitted to what is left.  What goes into the laws is the simulated motion, without encoder noise;
+taking sign(v) from the encoder would miss half of the friction.  Forces that were found before are
+put back and simulated with the one that is tried: each acts in the motion that all of them make,
+and what one was taken for may be another's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -14,49 +17,65 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.diagnosis.residuals.columns import drift_velocity, line_transform
-from bayeshaptic.diagnosis.state import State, fit_part, log_likelihoods
+from bayeshaptic.diagnosis.state import Change, State, fit_part, log_likelihoods
 from bayeshaptic.effects.nonlinear.internal_force import (
     CONNECTION,
     LOAD,
     MOTOR,
+    Internal,
     Place,
     forced_motion,
 )
-from bayeshaptic.effects.nonlinear.protocol import CommandEffect, Motion, NonlinearEffect
+from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 SUBSTEPS = 8
 
+_Simulated = tuple[tuple[Change, ...], Etfe, Windows]
+
 
 @dataclass(frozen=True)
 class Point:
-    """What one force gives.
+    """What forces give.
 
     Attributes
     ----------
-    effect : NonlinearEffect
-    strength : float
+    forces : tuple of Acting
+        Those that were found before, and the one that is tried.
     theta : ndarray, shape (P,)
-        Linear parameters fitted beside it.
+        Linear parameters fitted beside them.
+    changes : tuple of Change
+        What each of them takes off the recording.
     etfe : Etfe
-        Less the motion that the force adds.
+        Less that.
     windows : Windows
     gain_fit, gain_choose : float
         Gain in log likelihood on the windows to fit and on those to choose by.
     """
 
-    effect: NonlinearEffect
-    strength: float
+    forces: tuple[Acting, ...]
     theta: Floats
+    changes: tuple[Change, ...]
     etfe: Etfe
     windows: Windows
     gain_fit: float
     gain_choose: float
+
+    @property
+    def effect(self) -> NonlinearEffect:
+        """The one that is tried."""
+        return self.forces[-1].effect
+
+    @property
+    def strength(self) -> float:
+        """Of the one that is tried."""
+        return self.forces[-1].strength
 
 
 class ForceBench:
@@ -66,26 +85,38 @@ class ForceBench:
     ----------
     state : State
     recording : Recording
+
+    Attributes
+    ----------
+    before : tuple of Acting
+        The forces of the state, which act beside what is tried.
     """
 
     def __init__(self, state: State, recording: Recording) -> None:
         self.state = state
         self.model = state.model
         self.held = self.model.held
-        self.recording = recording
-        self.force = recording.force - recording.force.mean()
+        there = [e.change for e in state.accepted if e.change and e.change.acting]
+        self.before = tuple(change.acting for change in there if change.acting)
+        self._etfe = with_forces(replace(state.etfe, recording=recording), there)
+        assert self._etfe.recording is not None
+        self.recording = self._etfe.recording
+        self.force = self.recording.force - self.recording.force.mean()
         self._transform = line_transform(state.etfe, recording)
-        self._extra: Floats = np.zeros(recording.samples)
-        self._measured = _between(recording.position)
+        self._extra: Floats = np.zeros(recording.samples) + sum(c.motion for c in there)
+        self._measured = _between(self.recording.position)
         self._base = self._likelihoods(state.fit.theta, state.fit.windows)
 
-    def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
-        """Position and velocity at places, on the fine grid, without the force."""
+    def motions(
+        self, theta: Floats, places: tuple[Place, ...], command: Floats | None = None
+    ) -> dict[Place, Motion]:
+        """Position and velocity at places, on the fine grid, without forces."""
+        command = self.force if command is None else command
         system, period = self.model.system(theta), self.recording.period_s
         masses = tuple(range(min(len(system.mechanism.masses), 2)))
         if set(places) == {MOTOR}:
             masses = masses[:1]
-        (x, v), *others = linear_motions(system, self.force, period, masses, SUBSTEPS)
+        (x, v), *others = linear_motions(system, command, period, masses, SUBSTEPS)
         found = {}
         along: Floats | float = 0.0
         if {MOTOR, LOAD} & set(places):
@@ -93,11 +124,11 @@ class ForceBench:
             measured = self.recording.position
             besides = measured - x[::SUBSTEPS] - self._extra
             along = _between(self._hand(besides) if self.held else self._drift(besides, theta))
-            found[MOTOR] = Motion(self._measured, v + along, self.force)
+            found[MOTOR] = Motion(self._measured, v + along, command)
         for x2, v2 in others:
-            found[CONNECTION] = Motion(x - x2, v - v2, self.force)
+            found[CONNECTION] = Motion(x - x2, v - v2, command)
             if LOAD in places:  # what is slow moves both masses
-                found[LOAD] = Motion(x2, v2 + along, self.force)
+                found[LOAD] = Motion(x2, v2 + along, command)
         return found
 
     def _hand(self, besides: Floats) -> Floats:
@@ -111,99 +142,132 @@ class ForceBench:
         """Velocity of a free device from how it began and from a constant force."""
         return drift_velocity(self.model.system(theta), besides, self.recording.period_s)
 
-    def added_motion(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Floats:
-        """What the force adds to the motor's position at the samples, shape (N,).
+    def added_motions(self, forces: tuple[Acting, ...], theta: Floats) -> Floats:
+        """What each force adds to the motor's position at the samples, shape (F, N).
 
-        nan where the mass runs away with it, as one does behind a spring that softens too much.
+        nan where the mass runs away with them, as one does behind a spring that softens too much.
+        An actuator's adds nothing: it takes some of the command away.
         """
-        system, period = self.model.system(theta), self.recording.period_s
-        if isinstance(effect, CommandEffect):
-            return linear_motion(system, effect.lost(strength, self.force), period)[0] * -1.0
+        inner = [i for i, one in enumerate(forces) if not isinstance(one.effect, CommandEffect)]
+        added = np.zeros((len(forces), self.recording.samples))
+        if not inner:
+            return added
+        inner.sort(key=lambda i: forces[i].effect.sticks)
         step = 4.0  # what a step costs, with the motion around it, in values of a rational model
-        spend(step * SUBSTEPS * self.recording.samples)
-        motion = self.motions(theta, (effect.place,))[effect.place]
-        added = forced_motion(
-            system.mechanism,
-            effect.place,
-            effect.law(strength, self.model, theta),
-            motion.position,
-            motion.velocity,
-            period / SUBSTEPS,
-            SUBSTEPS,
-        )
+        spend(step * SUBSTEPS * self.recording.samples * len(inner))
+        places = tuple(dict.fromkeys(forces[i].effect.place for i in inner))
+        motion = self.motions(theta, places, self.force - self.lost(forces))
+        acting = []
+        for i in inner:
+            effect = forces[i].effect
+            law, there = effect.law(forces[i].strength, self.model, theta), motion[effect.place]
+            acting.append(Internal(effect.place, law, there.position, there.velocity))
+        period = self.recording.period_s
+        mechanism = self.model.system(theta).mechanism
+        added[inner] = forced_motion(mechanism, acting, period / SUBSTEPS, SUBSTEPS)
         away = 1e3  # times the range of what was measured
         stays = np.abs(added) < away * np.ptp(self.recording.position)
         return added if np.all(stays) else np.full_like(added, np.nan)
 
+    def stays(self, forces: tuple[Acting, ...], theta: Floats) -> bool:
+        """Whether the mass does not run away with forces."""
+        return bool(np.isfinite(self.added_motions(forces, theta)).all())
+
+    def lost(self, forces: tuple[Acting, ...]) -> Floats:
+        """What of the command does not arrive, shape (N,)."""
+        lost = np.zeros_like(self.force)
+        for one in forces:
+            if isinstance(one.effect, CommandEffect):
+                lost = lost + one.effect.lost(one.strength, self.force - lost)
+        return lost
+
+    def driven(self, forces: tuple[Acting, ...], theta: Floats, added: Floats) -> Floats:
+        """The sum of motions added, and what an actuator's forces do by the command's lack."""
+        lacking = any(isinstance(one.effect, CommandEffect) for one in forces)
+        if not lacking:
+            return np.asarray(added.sum(axis=0))
+        system, period = self.model.system(theta), self.recording.period_s
+        return np.asarray(added.sum(axis=0) - linear_motion(system, self.lost(forces), period)[0])
+
     def remember(self, extra: Floats) -> None:
-        """Take this for what the force adds, when the slow motion is read off the encoder.
+        """Take this for what forces add, when the slow motion is read off the encoder.
 
         Not a motion that ran away (nan): with it every law after it would, too.
         """
         if np.isfinite(extra[0]):
             self._extra = extra
 
-    def point(
-        self, effect: NonlinearEffect, strength: float, theta: Floats, rounds: int = 1
-    ) -> Point:
+    def point(self, forces: tuple[Acting, ...], theta: Floats, rounds: int = 1) -> Point:
         """Simulate, take off, fit; several times over, because the fit changes the motion."""
         for _ in range(rounds):
-            found = self._simulated(effect, strength, theta)
+            found = self._simulated(forces, theta)
             if found is None:
                 break
-            theta = fit_part(self.model, found[1], theta)
-        return self._valued(effect, strength, theta, found)
+            theta = fit_part(self.model, found[-1], theta)
+        return self._valued(forces, theta, found)
 
-    def as_it_is(self, effect: NonlinearEffect, strength: float, theta: Floats) -> Point:
+    def as_it_is(self, forces: tuple[Acting, ...], theta: Floats) -> Point:
         """Simulate and take off, with the linear parameters as given."""
-        return self._valued(effect, strength, theta, self._simulated(effect, strength, theta))
+        return self._valued(forces, theta, self._simulated(forces, theta))
 
-    def without(self, effect: NonlinearEffect, strength: float, extra: Floats) -> Etfe:
-        """The measurement without what a force does: the motion `extra`, or of the command less."""
-        own, spectra = self.recording, self.state.etfe.spectra
-        if isinstance(effect, CommandEffect):
-            lost = effect.lost(strength, self.force)
-            force = spectra.force - self._transform(lost)  # type: ignore[attr-defined]
-            own = replace(own, force=own.force - lost)
-            spectra = replace(spectra, force=force)  # type: ignore[call-arg, type-var]
-        else:
-            position = spectra.position - self._transform(extra)  # type: ignore[attr-defined]
-            own = replace(own, position=own.position - extra)
-            spectra = replace(spectra, position=position)  # type: ignore[call-arg, type-var]
-        return replace(self.state.etfe, spectra=spectra, recording=own)
+    def without(self, changes: Sequence[Change]) -> Etfe:
+        """The measurement without what forces do."""
+        return with_forces(self._etfe, changes, -1.0)
+
+    def changes(self, forces: tuple[Acting, ...], added: Floats) -> tuple[Change, ...]:
+        """What each force takes off the recording, of the motions that they add, (F, N)."""
+        found, command = [], self.force
+        for one, motion in zip(forces, added, strict=True):
+            if isinstance(one.effect, CommandEffect):
+                lost = one.effect.lost(one.strength, command)
+                command = command - lost
+                found.append(Change(None, one, self._transform(lost), 0.0, lost, 0.0))
+            else:
+                found.append(Change(None, one, 0.0, self._transform(motion), 0.0, motion))
+        return tuple(found)
 
     def windows(self, etfe: Etfe, theta: Floats, columns: list[Floats] | None = None) -> Windows:
         """Windows of a measurement, with motions as further inputs."""
         inputs = np.stack([self._transform(column) for column in columns]) if columns else None
         return compress(etfe, partial(self.model.response, theta), inputs)
 
-    def _simulated(
-        self, effect: NonlinearEffect, strength: float, theta: Floats
-    ) -> tuple[Etfe, Windows] | None:
-        """The measurement without what the force adds, and its windows; None where it runs away."""
-        if not isinstance(effect, CommandEffect):  # that adds no motion
-            added = self.added_motion(effect, strength, theta)
-            if np.isnan(added[0]):
-                return None
-            self._extra = added
-        etfe = self.without(effect, strength, self._extra)
-        return etfe, self.windows(etfe, theta)
+    def _simulated(self, forces: tuple[Acting, ...], theta: Floats) -> _Simulated | None:
+        """What forces do, the measurement without it and its windows; None where it runs away."""
+        added = self.added_motions(forces, theta)
+        if np.isnan(added[0, 0]):
+            return None
+        self._extra = added.sum(axis=0)
+        changes = self.changes(forces, added)
+        etfe = self.without(changes)
+        return changes, etfe, self.windows(etfe, theta)
 
-    def _valued(
-        self,
-        effect: NonlinearEffect,
-        strength: float,
-        theta: Floats,
-        found: tuple[Etfe, Windows] | None,
-    ) -> Point:
+    def _valued(self, forces: tuple[Acting, ...], theta: Floats, found: _Simulated | None) -> Point:
         if found is None:  # nothing that runs away explains what was measured
             state = self.state
-            return Point(effect, strength, theta, state.etfe, state.fit.windows, -np.inf, -np.inf)
-        gains = self._likelihoods(theta, found[1]) - self._base
-        return Point(effect, strength, theta, *found, float(gains[0]), float(gains[1]))
+            return Point(forces, theta, (), state.etfe, state.fit.windows, -np.inf, -np.inf)
+        gains = self._likelihoods(theta, found[-1]) - self._base
+        return Point(forces, theta, *found, float(gains[0]), float(gains[1]))
 
     def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
         return log_likelihoods(self.model, windows, theta)
+
+
+def with_forces(etfe: Etfe, changes: Sequence[Change], sign: float = 1.0) -> Etfe:
+    """The measurement with what forces took off put back; with a sign of -1 once more without."""
+    own, spectra = etfe.recording, etfe.spectra
+    assert own is not None and isinstance(spectra, RandomSpectra)
+    for change in changes:
+        own = replace(
+            own,
+            force=own.force + sign * change.command,
+            position=own.position + sign * change.motion,
+        )
+        spectra = replace(
+            spectra,
+            force=spectra.force + sign * change.force,
+            position=spectra.position + sign * change.position,
+        )
+    return replace(etfe, spectra=spectra, recording=own)
 
 
 def _between(samples: Floats) -> Floats:

@@ -11,14 +11,15 @@ from bayeshaptic.diagnosis.battery import model_tests, residual_tests
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.samples.mend import SampleLook, look_at_samples, repair_measurement
 from bayeshaptic.diagnosis.state import Change, State, Trial, fit_part, log_likelihoods
+from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.drift import drift_trials
+from bayeshaptic.diagnosis.trials.force_bench import with_forces
 from bayeshaptic.diagnosis.trials.linear import linear_trials
-from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
-from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.types import Floats, Tick
 
 
@@ -71,9 +72,16 @@ class WindowTrials:
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
         if "nonlinear" in families:
-            forces = nonlinear_trials(state, raised, meter, tick)
-            found += [_with_change(state, trial) for trial in forces]
+            found += nonlinear_trials(state, raised, meter, tick)
         return found
+
+    def beside(self, state: State) -> tuple[Test, ...]:
+        """Tests for another force beside those that a state has."""
+        return beside_tests(state)
+
+    def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
+        """With another law in the place of an earlier force, or the very same."""
+        return reconsidered(state, meter, tick)
 
     def without_needless(self, state: State) -> tuple[State, str | None]:
         """The state without the earlier effect that is worth least, if that is next to nothing.
@@ -104,24 +112,6 @@ def _is_mended(state: State) -> bool:
     return any(effect.family == "measurement" for effect in state.accepted)
 
 
-def _with_change(before: State, trial: Trial) -> Trial:
-    """The trial, with what its force took off the recording."""
-    old, new = before.etfe.spectra, trial.state.etfe.spectra
-    first, last = before.etfe.recording, trial.state.etfe.recording
-    if not (isinstance(old, RandomSpectra) and isinstance(new, RandomSpectra) and first and last):
-        return trial
-    change = Change(
-        None,
-        old.force - new.force,
-        old.position - new.position,
-        first.force - last.force,
-        first.position - last.position,
-    )
-    accepted = replace(trial.accepted, change=change)
-    state = replace(trial.state, accepted=(*trial.state.accepted[:-1], accepted))
-    return replace(trial, accepted=accepted, state=state)
-
-
 def _on_other_samples(trial: Trial) -> Trial:
     """The trial's state, where what was taken off before can no longer be put back."""
     linear = tuple(
@@ -138,17 +128,7 @@ def _undone(state: State, change: Change) -> tuple[Model, Etfe, Floats]:
         gone = {parameter.name for parameter in change.effect.parameters}
         kept = [name not in gone for name in model.names]
         return model.without_effect(change.effect), etfe, theta[kept]
-    spectra, recording = etfe.spectra, etfe.recording
-    assert isinstance(spectra, RandomSpectra) and recording is not None
-    spectra = replace(
-        spectra, force=spectra.force + change.force, position=spectra.position + change.position
-    )
-    recording = replace(
-        recording,
-        force=recording.force + change.command,
-        position=recording.position + change.motion,
-    )
-    return model, replace(etfe, spectra=spectra, recording=recording), theta
+    return model, with_forces(etfe, (change,)), theta
 
 
 def _held_out(model: Model, etfe: Etfe, theta: Floats) -> float:

@@ -45,6 +45,7 @@ class _DryFriction(NonlinearEffect):
     """A force against the motion: one mass has one, by whichever law."""
 
     strength = ("friction_force", "force")
+    sticks = True
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
@@ -78,13 +79,11 @@ class CoulombFriction(_DryFriction):
         return (Shape("coulomb", title, VELOCITY, force, positive=True, jumps=True),)
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        return Law(_coulomb, (strength,))
+        return Law(_coulomb, (strength,), sticks=True)
 
 
 def _coulomb(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
-    """What stops the mass within the step, or as much of it as friction can."""
-    bound = constants[0]
-    return min(max(-last / gain, -bound), bound)
+    return constants[0]
 
 
 @register
@@ -117,7 +116,7 @@ class StribeckFriction(_DryFriction):
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         shape = self.shape["static_excess"], self.shape["stribeck_velocity"]
-        return Law(_stribeck, (strength, *shape))
+        return Law(_stribeck, (strength, *shape), sticks=True)
 
 
 def _slow_friction(part: float, usual: Usual) -> Shape:
@@ -133,8 +132,7 @@ def _slow_friction(part: float, usual: Usual) -> Shape:
 
 def _stribeck(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
     rise, slow = constants[1], constants[2]
-    bound = constants[0] * (1 + rise * math.exp(-((v / slow) ** 2)))
-    return min(max(-last / gain, -bound), bound)
+    return constants[0] * (1 + rise * math.exp(-((v / slow) ** 2)))
 
 
 @register
@@ -163,7 +161,7 @@ class RisingFriction(_DryFriction):
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         shape = self.shape["lack_at_rest"], self.shape["rising_velocity"]
-        return Law(_stribeck, (strength, -shape[0], shape[1]))
+        return Law(_stribeck, (strength, -shape[0], shape[1]), sticks=True)
 
 
 @register
@@ -191,12 +189,11 @@ class FrictionAlongTheWay(_DryFriction):
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         shape = self.shape
         fast = math.log(shape["friction_ratio"]) / shape["way_span"]
-        return Law(_along_the_way, (strength, fast, shape["way_middle"]))
+        return Law(_along_the_way, (strength, fast, shape["way_middle"]), sticks=True)
 
 
 def _along_the_way(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
-    bound = constants[0] * math.exp(constants[1] * (x - constants[2]))
-    return min(max(-last / gain, -bound), bound)
+    return constants[0] * math.exp(constants[1] * (x - constants[2]))
 
 
 @register

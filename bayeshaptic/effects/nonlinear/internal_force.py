@@ -1,14 +1,17 @@
-"""Simulating an internal force that depends on the motion it changes.
+"""Simulating internal forces that depend on the motion they change.
 
-The command drives the linear mechanism; the force (friction, a hardening spring, a gap) acts
-inside it and moves it further.  Only the further motion is simulated, on a fine grid, with the
-exact step of the linear mechanism; the force of a step is found together with its end, so that dry
-friction sticks exactly.
+The command drives the linear mechanism; forces (friction, a hardening spring, a gap) act inside it
+and move it further, each in the motion that all of them make.  Only the further motion is
+simulated, on a fine grid, with the exact step of the linear mechanism; the force of a step is found
+together with its end, so that dry friction sticks exactly, and turns within the step in which the
+motion does: with one force for all of that step a drag beside friction would have to stand out of
+what the steps are off by.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,10 +47,13 @@ class Law:
     ----------
     force : Force
     constants : tuple of float
+    sticks : bool
+        Whether it is dry friction, which holds the mass where it can: `force` is its largest size.
     """
 
     force: Force
     constants: tuple[float, ...]
+    sticks: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,26 +76,36 @@ LOAD = Place(1, None)
 CONNECTION = Place(0, 1)
 
 
+@dataclass(frozen=True)
+class Internal:
+    """An internal force and the motion at its place without any.
+
+    Attributes
+    ----------
+    place : Place
+    law : Law
+    position, velocity : ndarray, shape (N * substeps,)
+        Of the mass, or of the first mass relative to the second. Against the ground the position is
+        the one with the forces: it is measured.
+    """
+
+    place: Place
+    law: Law
+    position: Floats
+    velocity: Floats
+
+
 def forced_motion(
-    mechanism: Mechanism,
-    place: Place,
-    law: Law,
-    position: Floats,
-    velocity: Floats,
-    step_s: float,
-    substeps: int,
+    mechanism: Mechanism, forces: Sequence[Internal], step_s: float, substeps: int
 ) -> Floats:
-    """Simulate what an internal force adds to the motion.
+    """Simulate what internal forces add to the motion, all of them at the same time.
 
     Parameters
     ----------
     mechanism : Mechanism
         A batch of one.
-    place : Place
-    law : Law
-    position, velocity : ndarray, shape (N * substeps,)
-        Motion at `place` without the force: of the mass, or of the first mass relative to the
-        second. Against the ground the position is the one with the force: it is measured.
+    forces : sequence of Internal
+        Within a step each knows those before it: what sticks comes last.
     step_s : float
         Step of the fine grid.
     substeps : int
@@ -97,41 +113,50 @@ def forced_motion(
 
     Returns
     -------
-    ndarray, shape (N,)
-        What the force adds to the motor's position at the samples.
+    ndarray, shape (F, N)
+        What each force adds to the motor's position at the samples.
     """
+    from numba import NumbaExperimentalFeatureWarning
+
     from bayeshaptic.effects.nonlinear.stepping_kernel import step_through
 
-    return step_through(
-        *steps(mechanism, place, step_s),
-        np.ascontiguousarray(position),
-        np.ascontiguousarray(velocity),
-        step_s,
-        substeps,
-        callback(law.force),
-        np.array(law.constants, float),
-    )
+    linear = steps(mechanism, [force.place for force in forces], step_s)
+    motion = np.array([[force.position, force.velocity] for force in forces])
+    laws = tuple(callback(force.law.force) for force in forces)
+    sticks = np.array([force.law.sticks for force in forces])
+    constants, begins = numbers_of(forces)
+    with warnings.catch_warnings():  # numba calls tuples of functions an experiment
+        warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+        return step_through(*linear, motion, step_s, substeps, laws, sticks, constants, begins)
+
+
+def numbers_of(forces: Sequence[Internal]) -> tuple[Floats, tuple[int, ...]]:
+    """Strengths and shapes one after the other, and where those of each force begin."""
+    numbers = [force.law.constants for force in forces]
+    ends = np.cumsum([len(own) for own in numbers])
+    return np.array(sum(numbers, ()), float), (0, *ends[:-1].tolist())
 
 
 def steps(
-    mechanism: Mechanism, place: Place, step_s: float
-) -> tuple[Floats, Floats, float, Floats]:
-    """Exact steps, as `stepping_kernel.step_through` takes them: matrix, drive, gain, reading."""
+    mechanism: Mechanism, places: Sequence[Place], step_s: float
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Exact steps, as `step_through` takes them: matrix, rows, drive, gains, reading."""
     a = mechanism.state_matrix()[0]
-    size, n = len(a), len(mechanism.masses)
-    push = np.zeros(size)
-    at_position, at_velocity = np.zeros(size), np.zeros(size)
-    for mass, sign in ((place.first, 1.0), (place.second, -1.0)):
-        if mass is not None:
-            push[n + mass] = sign / float(mechanism.masses[mass][0])
-            # Against the ground the measured position counts, which holds everything already.
-            at_position[mass] = sign if place.second is not None else 0.0
-            at_velocity[n + mass] = sign
-    block = np.zeros((size + 1, size + 1))
-    block[:size, :size], block[:size, size] = a, push
+    size, n, count = len(a), len(mechanism.masses), len(places)
+    push, at = np.zeros((size, count)), np.zeros((count, 2, size))
+    for i, place in enumerate(places):
+        for mass, sign in ((place.first, 1.0), (place.second, -1.0)):
+            if mass is not None:
+                push[n + mass, i] = sign / float(mechanism.masses[mass][0])
+                # Against the ground the measured position counts, which holds everything already.
+                at[i, 0, mass] = sign if place.second is not None else 0.0
+                at[i, 1, n + mass] = sign
+    block = np.zeros((size + count, size + count))
+    block[:size, :size], block[:size, size:] = a, push
     step = expm(block * step_s)
-    state, drive = step[:size, :size], np.ascontiguousarray(step[:size, size])
-    middle = [0.5 * (row + row @ state) for row in (at_position, at_velocity)]
-    matrix = np.concatenate([state, np.stack([*middle, at_velocity @ state])])
+    state, drive = step[:size, :size].copy(), step[:size, size:]
+    middle = 0.5 * (at + at @ state)
+    rows = np.concatenate([middle, at[:, 1:] @ state], axis=1)
+    gains = np.concatenate([0.5 * at @ drive, at[:, 1:] @ drive], axis=1)
     reading = np.concatenate([mechanism.drive_vector(), np.zeros(size // 2)])
-    return matrix, drive, float(at_velocity @ drive), reading
+    return state, rows, drive.T.copy(), np.swapaxes(gains, 1, 2).copy(), reading

@@ -62,6 +62,8 @@ class NonlinearEffect(ABC):
     """The largest values of those that have one."""
     ties: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
+    sticks: ClassVar[bool] = False
+    """Whether it may hold a mass still, against whatever else acts in the same step."""
 
     @classmethod
     def candidates(
@@ -91,6 +93,20 @@ class NonlinearEffect(ABC):
     @abstractmethod
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         """Strengths to begin a search with, from faint to strong, shape (S,)."""
+
+
+@dataclass(frozen=True)
+class Acting:
+    """A force as it acts.
+
+    Attributes
+    ----------
+    effect : NonlinearEffect
+    strength : float
+    """
+
+    effect: NonlinearEffect
+    strength: float
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,9 @@ def outcomes(closed: Closed) -> Rows:
 def raised(closed: Closed) -> bool:
     """Whether any threshold is another one after than before."""
     before = {test.name: test.threshold for test in closed.traced.before}
-    return any(test.threshold != before.get(test.name) for test in closed.traced.after)
+    return any(
+        test.threshold != before.get(test.name, test.threshold) for test in closed.traced.after
+    )
 
 
 def errors(closed: Closed) -> Rows:

@@ -1,0 +1,54 @@
+"""Is there another force beside those that were found?
+
+The tests of the residual compare each window with what no smooth response explains, in the motion
+without forces: they see little of a drag under friction.  Here the motion is that with the forces,
+and everything that was fitted moves along.
+"""
+
+from __future__ import annotations
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench
+from bayeshaptic.diagnosis.trials.force_slopes import hints
+from bayeshaptic.diagnosis.trials.nonlinear import is_there
+from bayeshaptic.effects.laws import BESIDE
+from bayeshaptic.effects.library import effects
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
+from bayeshaptic.effects.nonlinear.protocol import CommandEffect
+from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
+
+_OVER = {  # by the first of a law's variables, and its place
+    (VELOCITY, MOTOR): VELOCITY,
+    (VELOCITY, LOAD): LOAD_VELOCITY,
+    (POSITION, MOTOR): POSITION,
+    (POSITION, CONNECTION): STRETCH,
+    (STRETCH, CONNECTION): STRETCH,
+}
+
+
+def beside_tests(state: State) -> tuple[Test, ...]:
+    """One test for each variable that another force may be a function of; none without forces.
+
+    Of the laws that tests look for, at all their places; not of what is there already.
+    """
+    recording = state.etfe.unbroken
+    if recording is None or not any(one.change and one.change.acting for one in state.accepted):
+        return ()
+    bench = ForceBench(state, recording)
+    motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    looked_for = [
+        effect
+        for kind in effects("nonlinear")
+        if kind.tests and not issubclass(kind, CommandEffect) and not is_there(kind, state)
+        for effect in kind.candidates(state.model, motion)
+    ]
+    tests: dict[str, Test] = {}
+    for hint in hints(bench, looked_for):
+        over = _OVER[hint.effect.over[0], hint.effect.place]
+        text = f"{hint.effect.title} beside it stands {hint.score:.1f} standard deviations out"
+        test = Test(over + BESIDE, "nonlinear", hint.score, thresholds.two_sided(), None, text)
+        if over not in tests or tests[over].statistic < hint.score:
+            tests[over] = test
+    return tuple(tests.values())

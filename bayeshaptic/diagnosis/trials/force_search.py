@@ -1,0 +1,155 @@
+"""Searching for a force: a coarse scan of strengths of every variant, and fits of the best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.force_fit import fit_force
+from bayeshaptic.diagnosis.trials.force_slopes import hints
+from bayeshaptic.effects.nonlinear.internal_force import Place
+from bayeshaptic.effects.nonlinear.protocol import Acting, Motion, NonlinearEffect
+from bayeshaptic.models.structures import GROUND_DAMPERS
+from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.types import Floats
+
+Variants = list[NonlinearEffect]  # of one effect
+
+_STANDS_OUT = 3.0  # standard deviations: worth 9/4 on the windows to fit, where 10 are asked for
+_IN_REACH = 0.5  # of the largest score: the rest is worth less than a quarter of the best
+_PARTS = 1.0, 0.3, 0.1  # of a strength to first order, which may be far too much
+_NEAR = np.array([0.8, 1.0])
+
+
+def fitted(
+    bench: ForceBench, points: list[Point], meter: Meter, before: Sequence[Point] = ()
+) -> list[Point]:
+    """The points fitted, the most promising first; the hopeless as they are, the faint left out."""
+    found = list(before)
+    hopeless = 0.3  # share of the best gain so far below which a scan is not followed up
+    faint = 10.0  # gain below which nothing is tried
+    for point in sorted(points, key=lambda point: -point.gain_fit):
+        if point.gain_fit < faint:
+            continue
+        best = max((other.gain_fit for other in found), default=0.0)
+        worth = point.gain_fit > hopeless * best
+        follow = worth and meter.affords(f"{point.effect.title}, its fit")
+        found.append(fit_force(bench, point) if follow else point)
+    # The linear parameters were fitted once more after the motion was simulated.
+    return [one for one in found if bench.stays(one.forces, one.theta)]
+
+
+def search(
+    bench: ForceBench,
+    variants: Variants,
+    motion: dict[Place, Motion],
+    tick: Callable[[str], None] | None = None,
+    known: Point | None = None,
+) -> Point:
+    """The best variant on a coarse scan of strengths, or beside that of a known force."""
+    if tick:
+        tick(variants[0].title)
+    theta = bench.state.fit.theta
+    points: list[Point] = []
+    for effect in variants:
+        if known:
+            before, near = known.forces[:-1], _NEAR * known.strength
+            beside = _scan(bench, before, effect, near, known.theta)
+            if not any(np.isfinite(point.gain_fit) for point in beside):
+                beside = _scan(bench, before, effect, near, _damped(bench, known.theta))
+            points += beside
+            continue
+        firsts = effect.first_strengths(bench.model, theta, motion[effect.place])
+        for strengths in (firsts, -firsts) if effect.signed else (firsts,):
+            points += _scan(bench, bench.before, effect, strengths, theta, beyond=8)
+    return max(points, key=lambda point: point.gain_fit)
+
+
+def beside_others(
+    bench: ForceBench,
+    laws: Sequence[Variants],
+    meter: Meter,
+    tick: Callable[[str], None] | None = None,
+) -> list[Point]:
+    """The best variant of each law beside the forces that the state has, where it stands out.
+
+    A scan would be lost there in how roughly a motion that sticks goes with the linear parameters:
+    where a force was worth 263 in log likelihood, the best of five strengths had -9.
+    """
+    found, theta = [], bench.state.fit.theta
+    every = hints(bench, [effect for law in laws for effect in law])
+    most = max((hint.score for hint in every), default=0.0)
+    for law in laws:
+        own = [hint for hint in every if any(hint.effect is effect for effect in law)]
+        best = max(own, key=lambda hint: hint.score, default=None)
+        if best is None or best.score < max(_STANDS_OUT, _IN_REACH * most):
+            continue
+        if tick:
+            tick(best.effect.title)
+        starts = [
+            bench.point((*bench.before, Acting(best.effect, part * best.strength)), theta)
+            for part in _PARTS
+        ]
+        start = max(starts, key=lambda point: point.gain_fit)
+        if np.isfinite(start.gain_fit) and meter.affords(best.effect.title):
+            found.append(fit_force(bench, start))
+    return [one for one in found if bench.stays(one.forces, one.theta)]
+
+
+def _damped(bench: ForceBench, theta: Floats) -> Floats:
+    """Linear parameters beside a force that may have taken all damping: any other runs away there.
+
+    A fifth of what the ground dampers are without a force.
+    """
+    share, without = 0.2, bench.state.fit.theta
+    ground = np.isin(bench.model.names, GROUND_DAMPERS)
+    return np.where(ground, np.maximum(theta, share * without), theta)
+
+
+def _scan(
+    bench: ForceBench,
+    before: tuple[Acting, ...],
+    effect: NonlinearEffect,
+    strengths: Floats,
+    theta: Floats,
+    beyond: int = 0,
+) -> list[Point]:
+    """From faint to strong beside the forces before it, until it is clearly too strong.
+
+    Where the strongest is still the best, up to `beyond` more, each three times the last: friction
+    that the linear model took for a damper leaves a motion from which it looks faint.
+    """
+
+    def point(strength: float, start: Floats) -> Point:
+        return bench.point((*before, Acting(effect, strength)), start)
+
+    points: list[Point] = []
+    too_strong = 10.0  # drop of the log likelihood at which a scan stops
+    further = strengths[-1] * 3.0 ** np.arange(1, beyond + 1)
+    for number, strength in enumerate([*strengths, *further]):
+        start = points[-1].theta if points else theta
+        points.append(point(float(strength), start))
+        gained = points[-1].gain_fit - points[-2].gain_fit if len(points) > 1 else np.inf
+        if gained < -too_strong or (number >= len(strengths) - 1 and not gained > 0):
+            break
+    rising = abs(strengths[-1]) > abs(strengths[0])  # the less an actuator's limit, the stronger
+    return points + (_fainter(point, points[0], theta, beyond) if rising else [])
+
+
+def _fainter(
+    at: Callable[[float, Floats], Point], first: Point, theta: Floats, most: int
+) -> list[Point]:
+    """Where the faintest of a scan is too strong already: ever fainter, until less is no better.
+
+    Tests see forces that are a hundredth of what a scan begins with.
+    """
+    points = [first]
+    no_trace = 1.0  # of the log likelihood
+    while first.gain_fit < 0 and len(points) <= most:
+        points.append(at(points[-1].strength / 3.0, theta))
+        gained = points[-1].gain_fit - points[-2].gain_fit
+        if not gained > 0 or abs(points[-1].gain_fit) < no_trace:
+            break
+    return points[1:]

@@ -1,0 +1,242 @@
+"""What forces' motion does to the likelihood, to first order in everything that is fitted.
+
+Around the present forces their motion is linear in the logarithms of strength and shape, and in the
+linear parameters: its slopes, simulated, enter the likelihood as further inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.diagnosis.state import share
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
+from bayeshaptic.inference.fit import search_box
+from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.types import Floats
+
+NUDGE = 0.1  # relative, of strength and shape for the slopes
+_SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
+_FAINT = 0.01  # of the faintest strength to begin a search with, for the slope over it
+_SMOOTH = 1e-3  # share of these distances where a sticking mass's motion goes smoothly
+
+
+@dataclass(frozen=True)
+class Form:
+    """What of forces is fitted: the logarithms of the strength and the tuned shape of each."""
+
+    forces: tuple[Acting, ...]
+    highest: Floats
+    """The largest logarithms, shape (J,)."""
+    shape: NDArray[np.bool_]
+    """Which of them are of a shape."""
+
+    @classmethod
+    def of(cls, found: Point) -> Form:
+        bounds, shape = [], []
+        for effect in (one.effect for one in found.forces):
+            bounds += [np.inf, *(effect.most.get(name, np.inf) for name in effect.tuned)]
+            shape += [False, *(True for _ in effect.tuned)]
+        return cls(found.forces, np.log(bounds), np.array(shape))
+
+    def logs(self, found: Point) -> Floats:
+        numbers = []
+        for one in found.forces:
+            numbers += [abs(one.strength), *(one.effect.shape[name] for name in one.effect.tuned)]
+        return np.asarray(np.log(numbers))
+
+    def at(self, logs: Floats) -> tuple[Acting, ...]:
+        """The forces."""
+        numbers = iter(np.exp(np.minimum(logs, self.highest)).tolist())
+        found = []
+        for one in self.forces:
+            strength = float(np.sign(one.strength)) * next(numbers)
+            tuned = {name: next(numbers) for name in one.effect.tuned}
+            effect = replace(one.effect, shape={**one.effect.shape, **tuned})
+            found.append(Acting(effect, strength))
+        return tuple(found)
+
+
+def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
+    """How well fitted forces are known, and what goes with them.
+
+    Parameters
+    ----------
+    bench : ForceBench
+    found : Point
+
+    Returns
+    -------
+    covariance : ndarray, shape (J, J)
+        Of the logarithms of each force's strength and tuned shape.
+    along : ndarray, shape (P, J)
+        Change of the linear parameters' coordinates (`search_box`) with each logarithm, all else
+        fitted anew: friction that is a little more leaves a damper that is far less.
+    """
+    _, linear, forces, free = _slopes(bench, found)
+    size, count = len(free), forces.shape[1]
+    along = np.zeros((size, count))
+    along[free] = -np.linalg.lstsq(linear, forces, rcond=None)[0]
+    left = forces + linear @ along[free]
+    return np.asarray(np.linalg.pinv(left.T @ left, hermitian=True)), along
+
+
+@dataclass(frozen=True)
+class Hint:
+    """What a further force would be, to first order.
+
+    Attributes
+    ----------
+    effect : NonlinearEffect
+    strength : float
+    score : float
+        How far it stands out of the noise; not below zero where it can only be positive.
+    """
+
+    effect: NonlinearEffect
+    strength: float
+    score: float
+
+
+def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
+    """What each further force would be beside those that the bench's state has.
+
+    Everything that is fitted moves along: a score is standard normal where there is no such force
+    (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).  Those that run away are left out.
+
+    Parameters
+    ----------
+    bench : ForceBench
+    effects : sequence of NonlinearEffect
+        Not of actuators.
+    """
+    theta = bench.state.fit.theta
+    own = bench.added_motions(bench.before, theta).sum(axis=0)
+    usual = bench.motions(theta, tuple({effect.place for effect in effects}))
+    tried, moved = [], []
+    for effect in effects:
+        faint = _FAINT * float(effect.first_strengths(bench.model, theta, usual[effect.place])[0])
+        with_it = bench.added_motions((*bench.before, Acting(effect, faint)), theta).sum(axis=0)
+        if np.isfinite(with_it[0]):
+            tried.append(effect)
+            moved.append((with_it - own) / faint)
+    if not tried or not np.isfinite(own[0]):
+        return []
+    residual, linear, forces, _ = _slopes(bench, bench.as_it_is(bench.before, theta), moved)
+    known, further = np.split(forces, [forces.shape[1] - len(moved)], axis=1)
+    base = np.linalg.qr(np.concatenate([linear, known], axis=1))[0]
+    further = further - base @ (base.T @ further)
+    size = np.maximum(np.linalg.norm(further, axis=0), 1e-300)
+    found = []
+    for effect, score, one in zip(tried, -(residual @ further) / size, size, strict=True):
+        score = score if effect.signed else max(score, 0.0)
+        found.append(Hint(effect, float(score / one), abs(float(score))))
+    return found
+
+
+def _slopes(
+    bench: ForceBench, found: Point, motions: list[Floats] | None = None
+) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    """Residuals of all windows at fitted forces, and their slopes.
+
+    Over the linear parameters that are free, over the logarithms of strengths and shapes, and last
+    over further `motions`; and which of the linear parameters are free.
+    """
+    form = Form.of(found)
+    logs, everything = form.logs(found), (0, 1, 2, 3)
+    residuals, start = linearised(
+        bench, form, logs, found.theta, 0 * logs, nudges_of(bench), _SMOOTH, everything, motions
+    )
+    here, size = residuals(start), bench.model.size
+    slopes = jacobian(residuals, start, here)[0]
+    _, low, high = search_box(bench.model)
+    free = (start[0, :size] > low) & (start[0, :size] < high)
+    return here[0], slopes[:, :size][:, free], slopes[:, size:], free
+
+
+def nudges_of(bench: ForceBench) -> Floats:
+    """How far each linear parameter goes for the slopes of the motion: some standard deviations.
+
+    Less would see how a sticking mass jumps, not where it goes; more would leave a resonance.
+    """
+    fit = bench.state.fit
+    here, _, _ = search_box(bench.model)
+    relative = fit.sd / np.where(here.log, np.maximum(fit.theta, 1e-300), here.scale)
+    return np.clip(np.nan_to_num(_SDS * relative, nan=np.inf), _LEAST, _FARTHEST)
+
+
+def linearised(
+    bench: ForceBench,
+    form: Form,
+    logs: Floats,
+    theta: Floats,
+    moved: Floats,
+    nudges: Floats,
+    near: float,
+    parts: tuple[int, ...],
+    motions: list[Floats] | None = None,
+) -> tuple[Callable[[Floats], Floats], Floats]:
+    """Residuals around forces, which go on along their slopes, and where they begin, (1, P + J).
+
+    From coordinates, changes of the logarithms, which have moved by `moved` so far, and sizes of
+    further `motions`.  `near` is the share of the usual distances to take the slopes over, `parts`
+    which windows there are.
+    """
+
+    def motion(logs: Floats, theta: Floats) -> Floats:
+        forces = form.at(logs)
+        return bench.driven(forces, theta, bench.added_motions(forces, theta))
+
+    further = motions or []
+    forces = form.at(logs)
+    added = bench.added_motions(forces, theta)
+    inner, extra = added.sum(axis=0), bench.driven(forces, theta, added)
+    bench.remember(inner)
+    sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
+    slopes = [
+        (motion(logs + side * unit, theta) - extra) / side
+        for side, unit in zip(sides, np.eye(len(logs)), strict=True)
+    ]
+    here, _, _ = search_box(bench.model)
+    # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
+    linear = not bench.held or any(one.effect.place != MOTOR for one in forces)
+    if linear:
+        around = here.natural(here.coordinate(theta[None]) + np.diag(near * nudges))
+        slopes += [
+            (bench.added_motions(forces, vector).sum(axis=0) - inner) / (near * nudge)
+            for vector, nudge in zip(around, nudges, strict=True)
+        ]
+    slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
+    slopes += further
+    etfe = bench.without(bench.changes(forces, added))
+    windows = bench.windows(etfe, theta, slopes)
+    # The many slopes leave too little of a window to read its noise from.
+    noise = Likelihood(bench.model, bench.windows(etfe, theta)).noise_variance
+    chosen = share(windows, parts)
+    windows, weight = windows.part(chosen), np.sqrt(2 / noise[chosen])[:, None]
+    nodes, size = windows.frequency_hz.shape[1], bench.model.size
+    columns = windows.design[:, :, nodes:]
+    own = Likelihood(bench.model, replace(windows, design=windows.design[:, :, :nodes]))
+    start = np.concatenate([here.coordinate(theta[None])[0], np.zeros(len(logs) + len(further))])[
+        None
+    ]
+    shape_sd = 1.0  # log; how far a shape may be from the grid's
+
+    def residuals(phi: Floats) -> Floats:
+        steps, sizes = np.split(phi[:, size:], [len(logs)], axis=1)
+        far = (moved + steps)[:, form.shape] / shape_sd
+        if linear:
+            steps = np.concatenate([steps, phi[:, :size] - start[:, :size]], axis=1)
+        steps = np.concatenate([steps, sizes], axis=1)
+        left = own.deviations(here.natural(phi[:, :size]))
+        left = (left - np.einsum("wrj,bj->bwr", columns, steps)) * weight
+        flat = left.reshape(len(phi), -1)
+        return np.concatenate([flat.real, flat.imag, far], axis=1)
+
+    return residuals, start
