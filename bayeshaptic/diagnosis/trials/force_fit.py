@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.state import FIT
+from bayeshaptic.diagnosis.state import FIT, fit_part
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.force_slopes import NUDGE, Form, linearised, nudges_of
-from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.types import Floats
@@ -56,7 +55,7 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     form, found = Form.of(found), bench.as_it_is(found.forces, found.theta)
     first, before, best = form.logs(found), found, found
     nudges, near, furthest = nudges_of(bench), 1.0, 1.0
-    rounds = 60  # along a bent ridge; where nothing bends it is some five
+    rounds = 60 if bench.before else 20  # ridges of two forces are long
     for _ in range(rounds):
         logs = form.logs(best)
         step = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near)
@@ -87,7 +86,7 @@ def _advanced(bench: ForceBench, form: Form, best: Point, step: _Step) -> tuple[
     factor, point = 1.0, along(1.0)
     if point.gain_fit < best.gain_fit:
         for factor in (_BACK, _BACK**2):
-            polished = _polished(bench, form.at(logs + factor * step.logs), best.theta, rounds=2)
+            polished = _polished(bench, bench.point(form.at(logs + factor * step.logs), best.theta))
             point = max(along(factor), polished, key=lambda point: point.gain_fit)
             if point.gain_fit > best.gain_fit:
                 break
@@ -98,19 +97,19 @@ def _advanced(bench: ForceBench, form: Form, best: Point, step: _Step) -> tuple[
         if further.gain_fit < point.gain_fit + _NO_GAIN:
             break
         factor, point = _ON * factor, further
-    polished = _polished(bench, point.forces, point.theta)
+    polished = _polished(bench, point)
     return factor, max(point, polished, key=lambda point: point.gain_fit)
 
 
-def _polished(
-    bench: ForceBench, forces: tuple[Acting, ...], theta: Floats, rounds: int = 1
-) -> Point:
+def _polished(bench: ForceBench, point: Point) -> Point:
     """With the linear parameters fitted anew, and the motion that they make.
 
     Beside the motion before that fit a point may seem worth more than it is: steps then lead to and
     fro across a ridge, from a damper at zero away from it and back.
     """
-    return bench.as_it_is(forces, bench.point(forces, theta, rounds).theta)
+    if not np.isfinite(point.gain_fit):
+        return point
+    return bench.as_it_is(point.forces, fit_part(bench.model, point.windows, point.theta))
 
 
 def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
