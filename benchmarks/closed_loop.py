@@ -289,9 +289,8 @@ def beside_the_bound(count: int, noise: float) -> None:
         widths.append(found.sd / least)
         errors.append(np.abs(found.values - case.truth) / least)
     print(f"a white force of {100 * noise:g} % of the command, {len(widths)} recordings, medians:")
-    for name, width, error in zip(
-        NAMES, np.nanmedian(widths, axis=0), np.nanmedian(errors, axis=0), strict=True
-    ):
+    middles = np.nanmedian(widths, axis=0), np.nanmedian(errors, axis=0)
+    for name, width, error in zip(NAMES, *middles, strict=True):
         print(f"{name:8s} sd over the bound {width:.3g}, |error| over the bound {error:.3g}")
 
 

@@ -103,7 +103,8 @@ def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
 def is_open(analysis: Analysis) -> bool:
     """Whether the limit's 90 % interval reaches below a tenth of its median.
 
-    A rare crossing far below is no such case: its share of the draws is a probability.
+    A rare crossing far below is no such case: its share of the draws is a probability.  So open was
+    one of 103 limits of strangers' recordings (docs/door.md).
     """
     low, middle = (analysis.limit.quantile(p) for p in (0.05, 0.5))
     return bool(low * _OPEN < middle < math.inf)
@@ -132,7 +133,8 @@ def _rubs_otherwise(closed: Closed) -> bool:
     """Whether a force over the velocity stays unexplained: such a damping ends in small motions.
 
     A law may leave a share of what it explained.  Where nobody holds the device that may be another
-    force beside it, which was looked for and not found.
+    force beside it, which was looked for and not found: so it is of none of 17 recordings with one
+    force or none, and of one of 18 with two.
     """
     left = _left(closed)
     acts = any(effect.family == "nonlinear" for effect in closed.effects)

@@ -15,6 +15,7 @@ import sys
 import time
 import traceback
 import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.headline import headline
 from benchmarks.strangers.recordings import Case, make
+
+Row = dict[str, Any]
 
 
 def one(seed: int) -> dict[str, Any]:
@@ -140,21 +143,25 @@ def summary(rows: list[dict[str, Any]]) -> None:
     print(f"defects: {defects or 'none'}; warnings: {[r['seed'] for r in rows if r['warned']]}")
 
 
-def main() -> None:
-    arguments = [*sys.argv[1:], *("40", "0", "")[len(sys.argv) - 1 :]]
-    count, first, kept = int(arguments[0]), int(arguments[1]), arguments[2]
-    path = Path(kept) if kept else None
-    rows: dict[int, dict[str, Any]] = {}
+def kept(seeds: Sequence[int], path: Path | None, found: Callable[[int], Row]) -> None:
+    """What becomes of each seed, a line each, then the table; `path` keeps what is done."""
+    rows: dict[int, Row] = {}
     if path and path.exists():
         rows = {row["seed"]: row for row in map(json.loads, path.read_text().splitlines())}
-    for seed in range(first, first + count):
+    for seed in seeds:
         if seed not in rows:
-            rows[seed] = one(seed)
+            rows[seed] = found(seed)
             if path:
                 with path.open("a") as file:
                     file.write(json.dumps(rows[seed]) + "\n")
         print(line(rows[seed]), flush=True)
-    summary([rows[seed] for seed in range(first, first + count)])
+    summary([rows[seed] for seed in seeds])
+
+
+def main() -> None:
+    arguments = [*sys.argv[1:], *("40", "0", "")[len(sys.argv) - 1 :]]
+    count, first = int(arguments[0]), int(arguments[1])
+    kept(range(first, first + count), Path(arguments[2]) if arguments[2] else None, one)
 
 
 if __name__ == "__main__":

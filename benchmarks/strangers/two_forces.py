@@ -9,7 +9,6 @@ recording: the way of the command line's defaults.  FILE keeps what is done, a l
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
@@ -17,7 +16,7 @@ import numpy as np
 from scipy.signal import butter, lfilter
 
 from bayeshaptic.recordings.recording import Recording
-from benchmarks.strangers.__main__ import analysed, line, summary
+from benchmarks.strangers.__main__ import Row, analysed, kept
 from benchmarks.strangers.device import Masses
 from benchmarks.strangers.motion import STEPS, Forces, Motion
 from benchmarks.strangers.recordings import Case
@@ -117,19 +116,12 @@ def make(kind: str, seed: int) -> Case | None:
 def main() -> None:
     arguments = [*sys.argv[1:], *("nothing", "20", "0", "")[len(sys.argv) - 1 :]]
     kinds, count, first = arguments[0].split(","), int(arguments[1]), int(arguments[2])
-    path = Path(arguments[3]) if arguments[3] else None
-    rows = {}
-    if path and path.exists():
-        rows = {row["seed"]: row for row in map(json.loads, path.read_text().splitlines())}
-    for seed in range(first, first + count):
-        if seed not in rows:
-            kind = kinds[seed % len(kinds)]
-            rows[seed] = {"seed": seed, "kind": kind} | analysed(make(kind, seed))
-            if path:
-                with path.open("a") as file:
-                    file.write(json.dumps(rows[seed]) + "\n")
-        print(line(rows[seed]), flush=True)
-    summary([rows[seed] for seed in range(first, first + count)])
+
+    def found(seed: int) -> Row:
+        kind = kinds[seed % len(kinds)]
+        return {"seed": seed, "kind": kind} | analysed(make(kind, seed))
+
+    kept(range(first, first + count), Path(arguments[3]) if arguments[3] else None, found)
 
 
 if __name__ == "__main__":
