@@ -154,7 +154,12 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
 
 
 def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Optimum:
-    """`refine`, and from starting points of the model's own where what is left is not noise.
+    """`refine`, and from starting points of the model's own where what is left is not noise."""
+    return anew(model, etfe, windows, refine(model, windows, start))
+
+
+def anew(model: Model, etfe: Etfe, windows: Windows, found: Optimum) -> Optimum:
+    """What starting points of the model's own lead to, or `found` where that is as good.
 
     A fit without an effect may be bent so far that no value of the effect beside it leads on.  Of a
     second mode on the motor of a held LHIfAM without a device file none of ten fits did; starting
@@ -163,7 +168,6 @@ def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Op
     than this effect is lacking a valley that is a little deeper is but bent in another way: the far
     one must halve what is left.
     """
-    found = refine(model, windows, start)
     if found.reduced_chi_square <= MISFIT or not model.system(found.theta).rational:
         return found
     other = refine(model, windows, starting_points(model, etfe, np.random.default_rng(0)))

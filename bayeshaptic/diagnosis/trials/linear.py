@@ -26,7 +26,7 @@ from bayeshaptic.diagnosis.state import (
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.fit import MISFIT, search_box, weighted_residuals
-from bayeshaptic.inference.least_squares import Optimum, least_squares, refine, refine_anew
+from bayeshaptic.inference.least_squares import Optimum, anew, least_squares, refine
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.screening import promising_starts, starting_bases
 from bayeshaptic.models import Model
@@ -92,20 +92,13 @@ def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[
     base = log_likelihoods(state.model, windows, theta)
     bases = starting_bases(state.model, state.fit.theta, state.fit.elsewhere)
     found = sieve(state.model, state.etfe, windows.part(share(windows, FIT)), bases)
+    optima = _followed(state, windows, found, meter, tick)
     best: dict[str, Trial] = {}
-    explained = False
-    for one in found:
-        effect = one.effect
-        optimum: Optimum | None = None
-        near = one.gain >= thresholds.REACH * found[0].gain
-        if near and meter.affords(effect.title):
-            if tick:
-                tick(effect.title)
-            optimum = _followed(state, windows, one, anew=not explained)
-            explained |= optimum.reduced_chi_square <= MISFIT
-        trial = _try(state, windows, one, base, optimum)
-        if effect.name not in best or trial.score > best[effect.name].score:
-            best[effect.name] = trial
+    for number, one in enumerate(found):
+        trial = _try(state, windows, one, base, optima.get(number))
+        name = one.effect.name
+        if name not in best or trial.score > best[name].score:
+            best[name] = trial
     return list(best.values())
 
 
@@ -141,16 +134,29 @@ def sieve(model: Model, etfe: Etfe, windows: Windows, bases: Floats) -> list[Sie
     return sorted(found, key=lambda one: -one.gain)
 
 
-def _followed(state: State, windows: Windows, one: Sieved, anew: bool) -> Optimum:
-    """A candidate fitted in full.
+def _followed(
+    state: State, windows: Windows, found: list[Sieved], meter: Meter, tick: Tick | None
+) -> dict[int, Optimum]:
+    """The candidates within reach of the first fitted in full, by their number.
 
-    From points that no fit has bent (`anew`) only while nothing explains it: whatever explains it
-    was reached from the present fit, and then no way is barred.
+    From points that no fit has bent only where nothing explains it, and until something does:
+    whatever explains it was reached from the present fit, and then no way is barred.
     """
-    model, part = state.model.with_effect(one.effect), windows.part(share(windows, FIT))
-    if anew:
-        return refine_anew(model, state.etfe, part, one.starts)
-    return refine(model, part, one.starts)
+    part = windows.part(share(windows, FIT))
+    models = [state.model.with_effect(one.effect) for one in found]
+    optima: dict[int, Optimum] = {}
+    for number, one in enumerate(found):
+        near = one.gain >= thresholds.REACH * found[0].gain
+        if near and meter.affords(one.effect.title):
+            if tick:
+                tick(one.effect.title)
+            optima[number] = refine(models[number], part, one.starts)
+    for number, optimum in optima.items():
+        if any(one.reduced_chi_square <= MISFIT for one in optima.values()):
+            break
+        if meter.affords(f"{found[number].effect.title}, from other starts"):
+            optima[number] = anew(models[number], state.etfe, part, optimum)
+    return optima
 
 
 def _try(state: State, windows: Windows, one: Sieved, base: Floats, first: Optimum | None) -> Trial:
