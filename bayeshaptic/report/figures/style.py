@@ -7,8 +7,9 @@ style or marker.
 
 from __future__ import annotations
 
-import io
 import re
+import struct
+import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -37,7 +38,7 @@ FONT = 8.5
 SMALL = 7.0
 DPI = 140
 _LAYER = "layer-"
-MOST_SVG = 110_000  # characters: beyond, whichever is smaller, PNG or SVG, is in the page
+MOST_SVG = 120_000  # characters: beyond, whichever is smaller, PNG or SVG, is in the page
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
@@ -226,24 +227,36 @@ def layer(artists: Iterable[Any], name: str) -> None:
 
 
 def png(pixels: Bytes) -> bytes:
-    """Pixels of shape (height, width, 3) as PNG."""
-    from PIL import Image
+    """Pixels of shape (height, width, 3) as PNG.
 
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, format="png", dpi=(DPI, DPI), compress_level=1)
-    return buffer.getvalue()
+    Its rows are not filtered: drawings are smaller without, and it takes a third of the time.
+    """
+    height, width, _ = pixels.shape
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)  # the first byte of each: no filter
+    rows[:, 1:] = pixels.reshape(height, -1)
+    bits, colours = 8, 2  # of a channel; red, green and blue
+    per_metre = round(DPI / 0.0254)
+    chunks = {
+        b"IHDR": struct.pack(">IIBBBBB", width, height, bits, colours, 0, 0, 0),
+        b"pHYs": struct.pack(">IIB", per_metre, per_metre, 1),
+        b"IDAT": zlib.compress(rows.data, level=3),
+        b"IEND": b"",
+    }
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks.items()
+    )
 
 
 def for_a_page(svg: str, name: str) -> str:
     """An SVG file as an element of a page.
 
-    Without what a page does not need; hundredths of a point are enough, and parts are named after
-    the figure, so that those of several figures do not meet.
+    Without what a page does not need; parts are named after the figure, so that those of several
+    figures do not meet.
     """
-    text = svg[svg.index("<svg") :]
+    text = svg[svg.index("<svg") :].replace(" \n", " ")
     text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = text.replace(f'id="{_LAYER}', 'class="')
-    text = re.sub(r' d="([^"]*)"', lambda found: f' d="{_rounded(found[1])}"', text)
     used = set(re.findall(r'href="#([^"]+)"', text)) | set(re.findall(r"url\(#([^)]+)\)", text))
     names = {key: f"{name}-{number}" for number, key in enumerate(_ids(text)) if key in used}
     text = re.sub(r' id="([^"]+)"', lambda m: f' id="{names[m[1]]}"' if m[1] in used else "", text)
@@ -274,8 +287,3 @@ def _joined(text: str) -> str:
 
 def _ids(text: str) -> list[str]:
     return list(dict.fromkeys(re.findall(r' id="([^"]+)"', text)))
-
-
-def _rounded(path: str) -> str:
-    path = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", path)
-    return " ".join(path.split())

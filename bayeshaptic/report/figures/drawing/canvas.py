@@ -11,6 +11,7 @@ import io
 from typing import Any
 
 import numpy as np
+from matplotlib._path import convert_to_string  # type: ignore[attr-defined]
 from matplotlib.backend_bases import FigureCanvasBase, GraphicsContextBase, RendererBase
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.backends.backend_svg import RendererSVG
@@ -44,6 +45,23 @@ class _Canvas(FigureCanvasBase):
         self.get_renderer = lambda: both
 
 
+class _Vector(RendererSVG):
+    """Writes paths to the hundredth of a point, which is enough."""
+
+    def _convert_path(
+        self,
+        path: Any,
+        transform: Any = None,
+        clip: Any = None,
+        simplify: Any = None,
+        sketch: Any = None,
+    ) -> str:
+        corners = (0.0, 0.0, self.width, self.height) if clip else None
+        commands = [b"M", b"L", b"Q", b"C", b"z"]
+        text = convert_to_string(path, transform, corners, simplify, sketch, 2, commands, False)
+        return str(text, "ascii")
+
+
 class _Both(RendererBase):
     """Hands every stroke to Agg, in pixels, and to the SVG writer, in points."""
 
@@ -56,7 +74,7 @@ class _Both(RendererBase):
         self._layer = self._pixels  # another one while parts are drawn that the SVG has as pixels
         self._text = io.StringIO()
         points_per_inch = 72.0  # the unit of SVG
-        self._vector = RendererSVG(
+        self._vector = _Vector(
             width * points_per_inch,
             height * points_per_inch,
             self._text,
