@@ -60,8 +60,13 @@ def rounds_of(
     loops: dict[str, Any],
     from_a_hand: float = 0.0,
     scores: dict[str, float] | None = None,
+    glances: dict[str, bool] | None = None,
 ) -> tuple[str, list[str]]:
-    """The base model in the end, and whose rounds the loop went through."""
+    """The base model in the end, and whose rounds the loop went through.
+
+    `glances` say of base models whether an effect explains everything at first sight; rounds
+    without patience are then told apart.
+    """
     seen = []
 
     def deviance(of: Any, noise: float) -> tuple[float, float]:
@@ -96,8 +101,12 @@ def rounds_of(
             own = SimpleNamespace(model=SimpleNamespace(size=size))
             return SimpleNamespace(fit=own, accepted=effects)
 
-        def go_on(self) -> None:
-            seen.append(self.name)
+        def glance(self) -> bool | None:
+            return (glances or {}).get(self.name)
+
+        def go_on(self, patient: bool = True) -> None:
+            at_length = patient or glances is None
+            seen.append(self.name if at_length else f"{self.name}, at first sight")
             self.rounds += 1
 
     monkeypatch.setattr(base_model, "Loop", Loop)
@@ -224,6 +233,30 @@ def test_what_would_need_no_fewer_parameters_than_what_explains_is_given_up(monk
     found["free"] = traced("free", EXPLAINED, 1.0, 4, 1)
     best, rounds = rounds_of(monkeypatch, "chain-2", misfits, found)
     assert (best, rounds) == ("grasped", ["chain-2", "grasped", "free"])
+
+
+def test_what_explains_at_first_sight_goes_first_and_ends_all_long_ways(monkeypatch) -> None:
+    """Where a hand with a lag explains everything, no other base model is searched at length."""
+    found = {
+        "chain-2": traced("chain-2", UNEXPLAINED, 40.0, 1),
+        "grasped": traced("grasped", EXPLAINED, 1.0, 1),
+        "free": traced("free", UNEXPLAINED, 40.0, 1, 3),
+    }
+    misfits = {"free": 2e4, "chain-2": 4900.0, "grasped": 5100.0}
+    for seen, rounds in [
+        (
+            {"chain-2": False, "grasped": True},
+            ["grasped", "chain-2, at first sight", *2 * ["free, at first sight"]],
+        ),
+        # No other base model is looked at before one that first sight tells nothing of.
+        ({"grasped": True}, ["chain-2", "grasped", *2 * ["free, at first sight"]]),
+        (
+            {"chain-2": False, "grasped": False},
+            ["chain-2", "grasped", *2 * ["free, at first sight"]],
+        ),
+    ]:
+        best = rounds_of(monkeypatch, "chain-2", misfits, found, glances=seen)
+        assert best == ("grasped", rounds)
 
 
 def test_beside_a_chain_that_misfits_a_mode_may_be_on_the_motor(monkeypatch) -> None:

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.diagnosis.loop import Loop, trace
+from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
 from bayeshaptic.diagnosis.residuals.residual import smooth_columns
 from bayeshaptic.diagnosis.state import Accepted, State, compared_errors, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
-from bayeshaptic.diagnosis.trials import linear
+from bayeshaptic.diagnosis.trials import linear, windows
+from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit, summarise, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares
@@ -66,6 +68,51 @@ def test_candidates_begin_afresh_only_while_nothing_explains(monkeypatch) -> Non
     monkeypatch.setattr(linear, "MISFIT", 0.0)  # nothing explains
     linear.linear_trials(State(etfe, fit), Meter())
     assert calls == ["refine"] * (1 + followed) + ["anew"] * followed
+
+
+def test_at_first_sight_more_noise_is_no_sign_of_a_force(monkeypatch) -> None:
+    """A hand is noise, too: without patience no force is simulated for it while a mode lacks."""
+    _, etfe, fit = fitted(False, 8.0, MODE)
+    tried: list[str] = []
+
+    def noted(name: str) -> Any:
+        return lambda *_: tried.append(name) or []
+
+    for name in ("linear_trials", "nonlinear_trials"):
+        monkeypatch.setattr(windows, name, noted(name))
+    state = State(etfe, fit)
+    trials = windows.WindowTrials(state)
+    mode, noise, drag = (
+        ResidualTest(name, family, 99.0, 5.0, None, "")
+        for name, family in (
+            ("bands", "linear"),
+            (EXCESS_NOISE, "nonlinear"),
+            ("v|v|", "nonlinear"),
+        )
+    )
+
+    def classes(tests: tuple[ResidualTest, ...], patient: bool) -> list[str]:
+        tried.clear()
+        trials.trials(state, tests, Meter(), lambda _: None, patient)
+        return list(tried)
+
+    both = ["linear_trials", "nonlinear_trials"]
+    assert classes((mode, noise), True) == both
+    assert classes((mode, noise), False) == ["linear_trials"]
+    assert classes((mode, noise, drag), False) == both
+    assert classes((noise,), False) == ["nonlinear_trials"]
+
+
+def test_first_sight_tells_what_a_mode_explains_and_is_taken_once(monkeypatch) -> None:
+    _, etfe, fit = fitted(False, 8.0, MODE)
+    sieved: list[str] = []
+    own = linear.sieve
+    monkeypatch.setattr(linear, "sieve", lambda *given: sieved.append("") or own(*given))
+    loop = Loop(etfe, fit, 40.0)
+    assert loop.glance() is True
+    loop.go_on()
+    assert [effect.name for effect in loop.state.accepted] == ["second_mode"]
+    assert len(sieved) == 1
 
 
 def one(name: str, **fields: Any) -> Effects:

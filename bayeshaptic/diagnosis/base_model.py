@@ -73,7 +73,8 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
     share = _OWN if rivals or doubted else 1.0
     loops = _Loops(begun, options)
     own = loops.begin(begun.fit.model.name, share * options.budget_s)
-    own.go_on()
+    loops.glance(rivals)
+    own.go_on(loops.patient)
     while not (rivals or own.done):
         own.go_on()
     if not rivals and own.traced.verdict == UNEXPLAINED:
@@ -112,6 +113,7 @@ class _Loops:
 
     def __init__(self, begun: Begun, options: Options) -> None:
         self._begun, self._options = begun, options
+        self._whole = options.budget_s * RATE
         self.running: dict[str, Loop] = {}
         self.given_up: set[str] = set()
 
@@ -125,15 +127,34 @@ class _Loops:
         self.running[name] = Loop(begun.etfe, fit, budget_s, self._options.report, like=own)
         return self.running[name]
 
+    @property
+    def patient(self) -> bool:
+        """Whether none explains everything yet: then no way is too long."""
+        return not self._explained
+
+    def glance(self, rivals: Sequence[str]) -> None:
+        """A round of the first rival that explains at first sight, where the chosen one does not.
+
+        Before the long ways on a base model that is the wrong one.
+        """
+        (own,) = self.running.values()
+        if not rivals or own.glance() is not False:
+            return
+        for name in rivals:
+            other = self.begin(name, 0.0)
+            other.meter.limit = (self._whole - own.meter.spent) / len(rivals)
+            if other.glance():
+                other.go_on()
+                break
+
     def take_turns(self, rivals: Sequence[str]) -> None:
         """Go on with all of them, until each is done or given up.
 
         The chosen one is a round ahead: the others come first.
         """
-        ((chosen, own),) = self.running.items()
-        others = [self.begin(name, 0.0) for name in rivals]
+        chosen, own = next(iter(self.running.items()))
+        others = [self.running.get(name) or self.begin(name, 0.0) for name in rivals]
         order = (*rivals, chosen)
-        whole = self._options.budget_s * RATE
         own_share = own.meter.limit
         while open_ := [name for name in order if not self._ended(name)]:
             for name in open_:
@@ -141,10 +162,10 @@ class _Loops:
                     self.given_up.add(name)
                     continue
                 for other in others:
-                    other.meter.limit = (whole - own.meter.spent) / len(others)
+                    other.meter.limit = (self._whole - own.meter.spent) / len(others)
                 spent = sum(other.meter.spent for other in others)
-                own.meter.limit = min(own_share, whole - spent)
-                self.running[name].go_on()
+                own.meter.limit = min(own_share, self._whole - spent)
+                self.running[name].go_on(self.patient)
 
     def _ended(self, name: str) -> bool:
         return self.running[name].done or name in self.given_up
@@ -157,13 +178,15 @@ class _Loops:
         loop = self.running[name]
         if not loop.misfits:
             return False
-        explained = [
-            _parameters(other.state)
-            for other in self.running.values()
-            if other.done and other.traced.verdict != UNEXPLAINED
-        ]
         least_effect = 2  # one parameter, and that it is this one
-        return any(_parameters(loop.state) + least_effect >= size for size in explained)
+        least = _parameters(loop.state) + least_effect
+        return any(least >= _parameters(other.state) for other in self._explained)
+
+    @property
+    def _explained(self) -> list[Loop]:
+        """Those in which nothing is left."""
+        done = [loop for loop in self.running.values() if loop.done]
+        return [loop for loop in done if loop.traced.verdict != UNEXPLAINED]
 
 
 def _parameters(state: State) -> int:

@@ -36,10 +36,15 @@ class Trials(Protocol):
     def mended(self, state: State) -> State:
         """With what is wrong with the samples mended; the very same where nothing is."""
 
-    def trials(
+    def explains(
         self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
+    ) -> bool | None:
+        """Whether an effect explains everything at first sight; None where that is no question."""
+
+    def trials(
+        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick, patient: bool = True
     ) -> list[Trial]:
-        """Trials of every class that a test raises."""
+        """Trials of every class that a test raises; at first sight where there is no patience."""
 
     def beside(self, state: State) -> tuple[Test, ...]:
         """Tests for another force beside those that a state has."""
@@ -139,14 +144,25 @@ class Loop:
         self._number = 0
         self._told, self._tried = 0, 0  # the round that was told of, how many candidates of it
 
-    def go_on(self) -> None:
-        """One more round."""
+    def glance(self) -> bool | None:
+        """Whether the next round will explain everything; None where first sight does not tell.
+
+        What it finds is not looked for again.
+        """
+        with counting(self.meter):
+            if not self._path:
+                self._begin()
+            wanted = self._wanted
+            return self._kind.explains(self.state, wanted, self.meter, self._tick)
+
+    def go_on(self, patient: bool = True) -> None:
+        """One more round; of what is seen at first sight where there is no patience."""
         with counting(self.meter):
             if not self._path:
                 self._begin()
             if wanted := self._wanted:
                 self._number += 1
-                if self._round(wanted):
+                if self._round(wanted, patient):
                     self._mend()
                 else:
                     self.done = True
@@ -206,9 +222,9 @@ class Loop:
         ]
         self._accept(mended, self._remaining(mended))
 
-    def _round(self, wanted: tuple[Test, ...]) -> bool:
+    def _round(self, wanted: tuple[Test, ...], patient: bool) -> bool:
         """Go on to one more effect, and what is left; False where nothing convinces."""
-        trials = self._kind.trials(self.state, wanted, self.meter, self._tick)
+        trials = self._kind.trials(self.state, wanted, self.meter, self._tick, patient)
         left: dict[int, tuple[Test, ...]] = {}
 
         def remaining(trial: Trial) -> tuple[Test, ...]:

@@ -91,8 +91,16 @@ class LineTrials:
         """As it is: samples are averaged over the periods."""
         return state
 
+    def explains(self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick) -> None:
+        """Unasked: a test does not tell the classes of candidates apart."""
+
     def trials(
-        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
+        self,
+        state: State,
+        tests: tuple[Test, ...],
+        meter: Meter,
+        tick: Tick,
+        patient: bool = True,
     ) -> list[Trial]:
         """All candidates, the best variant of each: a test does not tell their classes apart."""
         assert isinstance(state, BalancedState)

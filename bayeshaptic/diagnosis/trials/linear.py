@@ -6,6 +6,7 @@ within reach of the best are fitted in full.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -72,8 +73,36 @@ def linear_candidates(model: Model, etfe: Etfe) -> list[LinearEffect]:
     ]
 
 
-def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[Trial]:
-    """One trial for each candidate effect that is worth it; of an effect's variants the best.
+@dataclass(frozen=True)
+class Sight:
+    """What linear effects are worth at first sight, from the present fit.
+
+    Attributes
+    ----------
+    state : State
+    windows : Windows
+        Compressed around the fit to those to fit.
+    base : ndarray, shape (2,)
+        Log likelihoods without any: see `log_likelihoods`.
+    found : list of Sieved
+    optima : mapping
+        Those within reach of the first fitted in full, by their number.
+    """
+
+    state: State
+    windows: Windows
+    base: Floats
+    found: list[Sieved]
+    optima: Mapping[int, Optimum]
+
+    @property
+    def explains(self) -> bool:
+        """Whether one of them leaves noise."""
+        return any(one.reduced_chi_square <= MISFIT for one in self.optima.values())
+
+
+def first_sight(state: State, meter: Meter, tick: Tick | None = None) -> Sight | None:
+    """All candidates sieved, the near ones fitted in full; None where not even that is affordable.
 
     Parameters
     ----------
@@ -85,17 +114,52 @@ def linear_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[
     """
     affords = [meter.affords(one.title) for one in linear_candidates(state.model, state.etfe)]
     if not all(affords):
-        return []  # not even sieved
+        return None
     whole, start = state.fit.windows, state.fit.theta[None]
     first = refine(state.model, whole.part(share(whole, FIT)), start)
     theta, windows = _around(state.model, state.etfe, first)
     base = log_likelihoods(state.model, windows, theta)
     bases = starting_bases(state.model, state.fit.theta, state.fit.elsewhere)
-    found = sieve(state.model, state.etfe, windows.part(share(windows, FIT)), bases)
-    optima = _followed(state, windows, found, meter, tick)
-    best: dict[str, Trial] = {}
+    part = windows.part(share(windows, FIT))
+    found = sieve(state.model, state.etfe, part, bases)
+    optima: dict[int, Optimum] = {}
     for number, one in enumerate(found):
-        trial = _try(state, windows, one, base, optima.get(number))
+        near = one.gain >= thresholds.REACH * found[0].gain
+        if near and meter.affords(one.effect.title):
+            if tick:
+                tick(one.effect.title)
+            optima[number] = refine(state.model.with_effect(one.effect), part, one.starts)
+    return Sight(state, windows, base, found, optima)
+
+
+def linear_trials(
+    state: State,
+    meter: Meter,
+    tick: Tick | None = None,
+    sight: Sight | None = None,
+    patient: bool = True,
+) -> list[Trial]:
+    """One trial for each candidate effect that is worth it; of an effect's variants the best.
+
+    Parameters
+    ----------
+    state : State
+    meter : Meter
+        Says whether one more fit is affordable.
+    tick : callable, optional
+        Called with the title of each candidate that is fitted in full.
+    sight : Sight, optional
+        What was seen of this very state before.
+    patient : bool
+        Whether to look further than first sight.
+    """
+    sight = sight or first_sight(state, meter, tick)
+    if sight is None:
+        return []
+    optima = _looked_further(sight, meter) if patient else sight.optima
+    best: dict[str, Trial] = {}
+    for number, one in enumerate(sight.found):
+        trial = _try(state, sight.windows, one, sight.base, optima.get(number))
         name = one.effect.name
         if name not in best or trial.score > best[name].score:
             best[name] = trial
@@ -134,29 +198,21 @@ def sieve(model: Model, etfe: Etfe, windows: Windows, bases: Floats) -> list[Sie
     return sorted(found, key=lambda one: -one.gain)
 
 
-def _followed(
-    state: State, windows: Windows, found: list[Sieved], meter: Meter, tick: Tick | None
-) -> dict[int, Optimum]:
-    """The candidates within reach of the first fitted in full, by their number.
+def _looked_further(sight: Sight, meter: Meter) -> Mapping[int, Optimum]:
+    """The optima, also from points that no fit has bent where nothing explains it, until one does.
 
-    From points that no fit has bent only where nothing explains it, and until something does:
-    whatever explains it was reached from the present fit, and then no way is barred.
+    Whatever explains it was reached from the present fit, and then no way is barred.
     """
-    part = windows.part(share(windows, FIT))
-    models = [state.model.with_effect(one.effect) for one in found]
-    optima: dict[int, Optimum] = {}
-    for number, one in enumerate(found):
-        near = one.gain >= thresholds.REACH * found[0].gain
-        if near and meter.affords(one.effect.title):
-            if tick:
-                tick(one.effect.title)
-            optima[number] = refine(models[number], part, one.starts)
-    for number, optimum in optima.items():
-        if any(one.reduced_chi_square <= MISFIT for one in optima.values()):
+    state, part = sight.state, sight.windows.part(share(sight.windows, FIT))
+    found = sight
+    for number, optimum in sight.optima.items():
+        if found.explains:
             break
-        if meter.affords(f"{found[number].effect.title}, from other starts"):
-            optima[number] = anew(models[number], state.etfe, part, optimum)
-    return optima
+        effect = sight.found[number].effect
+        if meter.affords(f"{effect.title}, from other starts"):
+            other = anew(state.model.with_effect(effect), state.etfe, part, optimum)
+            found = replace(found, optima={**found.optima, number: other})
+    return found.optima
 
 
 def _try(state: State, windows: Windows, one: Sieved, base: Floats, first: Optimum | None) -> Trial:

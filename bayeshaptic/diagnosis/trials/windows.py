@@ -14,8 +14,9 @@ from bayeshaptic.diagnosis.state import Change, State, Trial, fit_part, log_like
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.diagnosis.trials.force_bench import with_forces
-from bayeshaptic.diagnosis.trials.linear import linear_trials
+from bayeshaptic.diagnosis.trials.linear import Sight, first_sight, linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
+from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.spending import Meter
@@ -41,6 +42,7 @@ class WindowTrials:
             self._look = like._look
         elif recording is not None:
             self._look = look_at_samples(recording, state.etfe)
+        self._sight: Sight | None = None  # of the state that was looked at last
         self.first = state
 
     def tests(self, state: State) -> tuple[Test, ...]:
@@ -58,20 +60,43 @@ class WindowTrials:
             return state
         return state if _is_mended(state) else repair_measurement(state, self._look)
 
-    def trials(
+    def explains(
         self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
+    ) -> bool | None:
+        """Whether a linear effect explains everything at first sight; None where that is unasked.
+
+        It is where a test looks for a force, or nothing linear is left.
+        """
+        if not _raised(tests, "linear") or _looks_like_a_force(tests):
+            return None
+        self._sight = first_sight(state, meter, tick)
+        return None if self._sight is None else self._sight.explains
+
+    def trials(
+        self,
+        state: State,
+        tests: tuple[Test, ...],
+        meter: Meter,
+        tick: Tick,
+        patient: bool = True,
     ) -> list[Trial]:
-        """Trials of every class that a test raises."""
+        """Trials of every class that a test raises.
+
+        Without patience linear effects at first sight, and forces last where no test looks for
+        one: what a hand does besides is noise, too.
+        """
         raised = {test.name for test in tests if test.flagged}
         families = {test.family for test in tests if test.flagged}
         if state.etfe.through_reference and families != {"linear"}:
             return []  # forces are simulated under a command that answers to them in closed loop
         found: list[Trial] = []
         if "linear" in families:
-            found += linear_trials(state, meter, tick)
+            sight = self._sight if self._sight and self._sight.state is state else None
+            found += linear_trials(state, meter, tick, sight, patient)
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
-        if "nonlinear" in families:
+        now = patient or _looks_like_a_force(tests) or "linear" not in families
+        if "nonlinear" in families and now:
             found += nonlinear_trials(state, raised, meter, tick)
         return found
 
@@ -106,6 +131,15 @@ class WindowTrials:
                 worst = State(etfe, least_squares(model, etfe, start=theta), left)
                 name, least = effect.name, loss
         return worst, name
+
+
+def _raised(tests: tuple[Test, ...], family: str) -> set[str]:
+    return {test.name for test in tests if test.flagged and test.family == family}
+
+
+def _looks_like_a_force(tests: tuple[Test, ...]) -> bool:
+    """Whether a test for a force is flagged, and not only one that there is more noise."""
+    return bool(_raised(tests, "nonlinear") - {EXCESS_NOISE})
 
 
 def _is_mended(state: State) -> bool:
