@@ -20,11 +20,11 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
+from bayeshaptic.alone import look_rarely
 from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.talk import complain
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import explained
-from bayeshaptic.garbage import look_rarely
 from bayeshaptic.threads import one_thread_from_the_start
 from bayeshaptic.version import __version__
 

@@ -80,6 +80,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the reports; 0 where all came out, else 1."""
     import json
 
+    from bayeshaptic.alone import leave_unread
+
+    leave_unread()  # before what loads SciPy
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.jobs import executors
     from bayeshaptic.jobs.batch import run_batch

@@ -60,12 +60,13 @@ def report_source(
         Where the source or the settings cannot be used.
     """
     # Where many jobs are only handed out, what does them is not loaded.
-    from bayeshaptic.jobs.recording import report_recording
-    from bayeshaptic.jobs.study import report_study
-
     refuse_file(job.folder)
     if job.source.suffix.lower() == ".toml":
+        from bayeshaptic.jobs.study import report_study
+
         return report_study(job, progress, workers)
+    from bayeshaptic.jobs.recording import report_recording
+
     return (report_recording(job, progress),)
 
 

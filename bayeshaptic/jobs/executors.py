@@ -26,9 +26,9 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
+from bayeshaptic.alone import leave_unread, look_rarely
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import entry, explained
-from bayeshaptic.garbage import look_rarely
 from bayeshaptic.threads import THREADS
 from bayeshaptic.types import Executor, Work
 
@@ -276,6 +276,7 @@ def _attempt(job: Work, item: Any) -> Outcome:
 def _start_worker(parent: int) -> None:
     """Leave interrupts to the parent, and end with it however it ends."""
     look_rarely()
+    leave_unread()
     warnings.showwarning = _in_one_line
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

@@ -1,0 +1,46 @@
+"""Libraries whose docstrings are left alone compute the same."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+COMPUTE = """
+import matplotlib.figure, numpy as np
+from scipy import fft, interpolate, linalg, ndimage, signal, special, stats
+from scipy.optimize import elementwise
+x = np.sin(np.arange(60.0) ** 1.5)
+print(signal.sosfiltfilt(signal.butter(4, 0.2, output="sos"), x)[::9].tolist())
+print(signal.savgol_filter(x, 9, 3, deriv=1)[::9].tolist(), signal.welch(x)[1][::9].tolist())
+print(signal.find_peaks(x, prominence=0.3)[0].tolist(), ndimage.median_filter(x, 5)[::9].tolist())
+print(float(stats.f.logsf(3.0, 2, 40)), float(stats.chi2.sf(3.0, 2)), float(stats.norm.ppf(0.1)))
+print(float(stats.skew(x)), float(special.logsumexp(x)), linalg.expm(np.diag(x[:2])).tolist())
+print(interpolate.CubicSpline(np.arange(60.0), x)(7.5).tolist(), fft.rfft(x)[3])
+print(elementwise.find_root(lambda t: t * t - 2, (0.0, 2.0)).x)
+"""
+LEAVE = "from bayeshaptic.alone import leave_unread\nleave_unread()\n"
+ASK = """
+print("nperseg" in signal.welch.__doc__, "facecolor" in matplotlib.figure.Figure.set.__doc__)
+"""
+
+
+def printed(code: str) -> str:
+    """What a fresh interpreter prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    return done.stdout
+
+
+def test_functions_are_the_same_and_their_docstrings_gone() -> None:
+    assert printed(LEAVE + COMPUTE) == printed(COMPUTE)
+    assert printed(COMPUTE + ASK).split()[-2:] == ["True", "True"]
+    assert printed(LEAVE + COMPUTE + ASK).split()[-2:] == ["False", "False"]
+
+
+@pytest.mark.parametrize("gone", ["scipy._lib._docscrape", "matplotlib.artist"])
+def test_a_version_without_these_names_is_left_as_it_is(gone: str) -> None:
+    hidden = f"import sys\nsys.modules[{gone!r}] = None\n"
+    assert printed(hidden + LEAVE + f"del sys.modules[{gone!r}]\n" + COMPUTE) == printed(COMPUTE)
