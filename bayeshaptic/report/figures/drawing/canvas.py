@@ -8,6 +8,7 @@ renderers.
 from __future__ import annotations
 
 import io
+from base64 import b64encode
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D, Bbox, TransformedPath
 
 from bayeshaptic.report.figures.drawing.letters import Outlines, in_pixels, letters
+from bayeshaptic.report.figures.drawing.png import png
 from bayeshaptic.types import Bytes
 
 
@@ -208,9 +210,14 @@ class _Both(RendererBase):
         if not len(rows):
             return
         part = image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        x, y = columns[0], self._size[1] - 1 - rows[-1]
-        self._vector.draw_image(
-            self._vector.new_gc(), x * self._factor, y * self._factor, part[::-1]
+        height, width, _ = part.shape
+        sides = {"x": columns[0], "y": rows[0], "width": width, "height": height}
+        self._vector.writer.element(
+            "image",
+            attrib={
+                "xlink:href": "data:image/png;base64," + b64encode(png(part, self.dpi)).decode()
+            },
+            **{name: f"{side * self._factor:.2f}" for name, side in sides.items()},
         )
 
     def open_group(self, s: str, gid: str | None = None) -> None:
