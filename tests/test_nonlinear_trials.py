@@ -19,7 +19,7 @@ from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
 from bayeshaptic.diagnosis.trials.force_search import _damped, _scan
-from bayeshaptic.diagnosis.trials.force_slopes import spread
+from bayeshaptic.diagnosis.trials.force_slopes import Along, Form, linearised, nudges_of, spread
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
@@ -36,6 +36,7 @@ from bayeshaptic.rig.effects.effect import Effect as BenchEffect
 from bayeshaptic.rig.effects.friction import StribeckFriction
 from bayeshaptic.rig.effects.nonlinear import Drag
 from bayeshaptic.stability import critical_stiffness
+from bayeshaptic.types import Floats
 from benchmarks.recordings.foreign import LoadFriction, TanhSaturation, VelocityCubed
 from benchmarks.strangers.device import Masses
 from benchmarks.strangers.motion import STEPS, Forces, Motion
@@ -142,6 +143,41 @@ def test_what_goes_with_a_friction_is_where_the_rest_fits_best() -> None:
     # Half of the windows were fitted: half of (64 - 16) / 2; the slopes are good to some percent.
     assert fall(moved=True) == pytest.approx(12.0, rel=0.25)
     assert fall(moved=False) > 3 * fall(moved=True)
+
+
+def test_slopes_over_the_linear_parameters_are_taken_again_only_where_something_has_moved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    state, (trial,) = rubbed(0.5)
+    assert state.etfe.recording and trial.accepted.change and trial.accepted.change.acting
+    bench, theta = ForceBench(state, state.etfe.recording), trial.state.fit.theta
+    form = Form.of(bench.as_it_is((trial.accepted.change.acting,), theta))
+    logs, nudges, near = (
+        np.log([trial.accepted.change.acting.strength]),
+        nudges_of(bench),
+        np.ones(1),
+    )
+    simulated: list[int] = []
+    own = ForceBench.added_motions
+
+    def counted(*given: Any) -> Any:
+        simulated.append(1)
+        return own(*given)
+
+    monkeypatch.setattr(ForceBench, "added_motions", counted)
+
+    def cost(near: Floats, logs: Floats, along: Along | None) -> tuple[int, Along]:
+        simulated.clear()
+        *_, used = linearised(bench, form, logs, theta, 0 * logs, nudges, near, (0, 2), along=along)
+        return len(simulated), used
+
+    base = 2  # the motion, and its slope over the strength
+    every, along = cost(near, logs, None)
+    assert every == base + state.model.size
+    assert cost(near, logs + 0.05, along) == (base, along)
+    assert cost(0.6 * near, logs, along) == (base, along)
+    assert cost(near, logs + 0.2, along)[0] == every
+    assert cost(0.1 * near, logs, along)[0] == every
 
 
 def test_the_gain_is_on_windows_that_were_not_fitted() -> None:

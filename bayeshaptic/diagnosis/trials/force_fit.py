@@ -12,7 +12,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.state import FIT, fit_part
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_slopes import NUDGE, Form, linearised, nudges_of
+from bayeshaptic.diagnosis.trials.force_slopes import NUDGE, Along, Form, linearised, nudges_of
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.types import Floats
@@ -24,7 +24,7 @@ _ON, _BACK = 2.0, 0.3  # factors on a step that goes well, and on one that does 
 # 15 in log likelihood short of that from the truth with 0.3 for the second (limits up to 1.28 times
 # too high); 0, 4, 0 and 9 with 0.03, 0, 0, 0 and 7 with 0.01.
 _NEAREST, _CLOSE = 0.1, 0.01
-_MOST = 0.8  # log change a round
+_MOST = 0.8  # log change a step; one that wins is doubled
 
 
 @dataclass(frozen=True)
@@ -54,20 +54,22 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     """
     form, found = Form.of(found), bench.as_it_is(found.forces, found.theta)
     first, before, best = form.logs(found), found, found
-    nudges, near, furthest = nudges_of(bench), 1.0, 1.0
+    nudges, near, furthest = nudges_of(bench), np.ones(len(first)), 1.0
     rounds = 60 if bench.before else 20  # ridges of two forces are long
+    along: Along | None = None
     for _ in range(rounds):
         logs = form.logs(best)
-        step = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near)
+        step, along = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near, along)
         factor, point = _advanced(bench, form, best, step)
         gained = point.gain_fit - best.gain_fit
         if gained > 0:
             before, best = best, _onward(bench, form, before, point)
         if gained >= max(_NO_GAIN, _SHARE * best.gain_fit):
-            # Slopes over no more than what is still to go.
-            near = float(np.clip(factor * step.size / NUDGE, _NEAREST, furthest))
+            # Slopes over no more than what is still to go, each by itself.
+            near = np.clip(factor * np.abs(step.logs) / NUDGE, _NEAREST, furthest)
         elif furthest > _CLOSE:  # once more, with slopes close by
-            near = furthest = _CLOSE
+            furthest = _CLOSE
+            near = np.full(len(first), _CLOSE)
         else:
             break
     return best
@@ -91,8 +93,9 @@ def _advanced(bench: ForceBench, form: Form, best: Point, step: _Step) -> tuple[
             if point.gain_fit > best.gain_fit:
                 break
         return factor, point
-    # Slopes of a motion that sticks are rough, and steps along a ridge too short.
-    while factor * step.size < _MOST / _ON:
+    # Slopes of a motion that sticks are rough, and steps along a ridge too short; so are those to
+    # where a part of a law vanishes.
+    while factor * step.size <= _MOST:
         further = along(_ON * factor)
         if further.gain_fit < point.gain_fit + _NO_GAIN:
             break
@@ -138,13 +141,16 @@ def _joint_step(
     theta: Floats,
     moved: Floats,
     nudges: Floats,
-    near: float,
-) -> _Step:
+    near: Floats,
+    along: Along | None,
+) -> tuple[_Step, Along]:
     """To the linear parameters, strength and shape that fit best together."""
-    residuals, start = linearised(bench, form, logs, theta, moved, nudges, near, FIT)
+    residuals, start, along = linearised(
+        bench, form, logs, theta, moved, nudges, near, FIT, along=along
+    )
     here, low, high = search_box(bench.model)
     low = np.concatenate([low, np.full(len(logs), -_MOST)])
     high = np.concatenate([high, np.minimum(form.highest - logs, _MOST)])
     phi, _ = minimise(residuals, start, low, high, 20, 1e-4)
     size = bench.model.size
-    return _Step(np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:])
+    return _Step(np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:]), along
