@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayeshaptic.diagnosis.feedback.lacking import with_laws
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
@@ -250,7 +251,7 @@ def main(count: int) -> None:
         case = make(seed)
         began = time.process_time()
         try:
-            found = fit_motion(case.recording)
+            found, laws, doubts = with_laws(case.recording, None)
         except InputError as error:
             print(error)
             continue
@@ -261,7 +262,8 @@ def main(count: int) -> None:
             ranks.append(float(np.mean(limits[1:] < limits[0])))
             low, high = np.quantile(limits[1:], [0.05, 0.95])
             widths.append(float(20 * np.log10(high / low)))
-        print(f"seed {seed}: {case.what}")
+        named = ", ".join(law.effect.name for law in laws)
+        print(f"seed {seed}: {case.what}  {named} {' '.join(doubts)}")
     print(f"{len(inside)} recordings, {seconds / len(inside):.2f} s of CPU time each")
     for name, share in zip(NAMES, np.mean(inside, axis=0), strict=True):
         print(f"{name:8s} 90 % interval holds the truth in {100 * share:.0f} %")

@@ -99,7 +99,9 @@ def plainly(mechanism: Any, forces: list[Internal]) -> Any:
     motion = np.array([[force.position, force.velocity] for force in forces])
     laws = tuple(force.law.force for force in forces)
     sticks = [force.law.sticks for force in forces]
-    return step_through(*linear, motion, STEP_S, 8, laws, sticks, *numbers_of(forces))
+    return step_through(
+        *linear, motion, STEP_S, 8, laws, sticks, *numbers_of([force.law for force in forces])
+    )
 
 
 @pytest.mark.parametrize("case", COMPILED, ids=[force[0] for force in COMPILED])

@@ -37,6 +37,13 @@ def in_loop(seconds: float, friction: float, resolution: float, offset: float = 
     )
     if friction:
         bench = bench.with_effect("coulomb_friction", force=friction)
+    made = stepped(bench, seconds)
+    # A constant force on the device is a constant in the command that nobody feels.
+    return recording_from_arrays(made.force + offset, made.position, period_s=1e-3)
+
+
+def stepped(bench: Bench, seconds: float) -> Recording:
+    """A device that a PID controller moves from place to place."""
     spring, damper, integral, filter_hz = GAINS
     keep = np.exp(-2 * np.pi * filter_hz * 1e-3)
     now = {"position": 0.0, "velocity": 0.0, "sum": 0.0}
@@ -56,8 +63,7 @@ def in_loop(seconds: float, friction: float, resolution: float, offset: float = 
         )
 
     done = run_loop(bench, controller, seconds)
-    # A constant force on the device is a constant in the command that nobody feels.
-    return recording_from_arrays(done.force + offset, done.position, period_s=1e-3)
+    return recording_from_arrays(done.force, done.position, period_s=1e-3)
 
 
 def declared(recording: Recording) -> Recording:

@@ -8,13 +8,16 @@ from dataclasses import replace
 from bayeshaptic.diagnosis.analysis import NO_WITNESS, Analysis
 from bayeshaptic.diagnosis.begun import Opened
 from bayeshaptic.diagnosis.feedback.in_loop import contradictions, follow_in_loop, open_questions
+from bayeshaptic.diagnosis.feedback.lacking import Lacking
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
-from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
+from bayeshaptic.models.parameter import unit_of
+from bayeshaptic.quantities import percent
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 _BIASED = (
@@ -41,7 +44,7 @@ def analyse_in_loop(begun: Opened, one_mass: bool, options: Options) -> Analysis
         return None
     delay = options.delay_s, options.delay_sd_s
     model = rigid_with_friction(recording, found.motion, begun.device, *delay, options.prior)
-    fit = in_loop_fit(model, begun.etfe, found.motion, found.held_out)
+    fit = in_loop_fit(model, begun.etfe, found.motion, found.misfit)
     watch = LimitKnown(model)
     posterior = sample(
         model,
@@ -83,11 +86,28 @@ def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:
     """
     assert analysis.in_loop is not None
     names = ("coulomb", "offset")
-    accepted = tuple(
-        replace(effect, estimates={}, parameters=names) for effect in traced.state.accepted
-    )
+    laws = tuple(_accepted(law, analysis) for law in analysis.in_loop.laws)
+    # Another law of dry friction has Coulomb's in it.
+    dry = [] if any(law.effect.sticks for law in analysis.in_loop.laws) else traced.state.accepted
+    accepted = (*(replace(effect, estimates={}, parameters=names) for effect in dry), *laws)
     verdict, left = (EXPLAINED, accepted[0].family) if accepted else (CONSISTENT, None)
-    if analysis.in_loop.doubts or analysis.in_loop.held_out > MISFIT:
+    if analysis.in_loop.doubts:
         verdict, left = UNEXPLAINED, traced.residual_class
     state = replace(traced.state, accepted=accepted)
     return replace(traced, verdict=verdict, residual_class=left, state=state)
+
+
+def _accepted(law: Lacking, analysis: Analysis) -> Accepted:
+    """A law that joined the mass."""
+    evidence = (
+        f"takes away {percent(1 - law.score.left)} of the error's power "
+        f"(t = {law.score.t:.3g}, everything else fitted with it)"
+    )
+    effect, units = law.effect, (analysis.model.force_unit, analysis.model.position_unit)
+    dimensions = dict([effect.strength]) | dict(effect.dimensions)
+    estimates = {
+        name: Estimate(*found, unit_of(dimensions[name], *units))
+        for name, found in law.estimates.items()
+    }
+    parameters = ("coulomb",) if effect.sticks else ()
+    return Accepted(effect.name, effect.title, "nonlinear", evidence, estimates, parameters)

@@ -24,7 +24,8 @@ import numpy as np
 from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.headline import headline
-from benchmarks.strangers.recordings import Case, make
+from benchmarks.strangers.draw import Case
+from benchmarks.strangers.recordings import make
 
 Row = dict[str, Any]
 

@@ -41,6 +41,21 @@ class Forces:
 
 
 @dataclass(frozen=True)
+class Law:
+    """A controller at the samples: gains of position, its rate and its sum, of the counts it reads.
+
+    The rate keeps the share `keep` of itself; the command is cut off at `most`.
+    """
+
+    spring: float
+    damper: float
+    integral: float
+    keep: float
+    most: float
+    count: float
+
+
+@dataclass(frozen=True)
 class Motion:
     """A device over one step: transitions that follow each other every so many samples.
 
@@ -54,8 +69,13 @@ class Motion:
     position: Array
     delay_steps: int
 
-    def under(self, command: Array, hand: Array, forces: Forces) -> Array | None:
-        """The position at the samples; none where it runs away."""
+    def under(
+        self, command: Array, hand: Array, forces: Forces, law: Law | None = None
+    ) -> Array | None:
+        """The position at the samples; none where it runs away.
+
+        With a law `command` holds what it follows, and then what it commanded.
+        """
         numbers = np.array(astuple(forces))
         made = _run(
             np.ascontiguousarray(self.transitions),
@@ -67,6 +87,7 @@ class Motion:
             command,
             hand,
             numbers,
+            np.array(astuple(law)) if law else np.zeros(0),
         )
         return made if len(made) == len(command) else None
 
@@ -86,13 +107,21 @@ def _rubbed(begins, ends, inverse, most):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _run(transitions, every, entry, entries, position, late, command, hand, numbers):  # type: ignore[no-untyped-def]
+def _run(transitions, every, entry, entries, position, late, command, hand, numbers, law):  # type: ignore[no-untyped-def]
     friction, sticking, slow, cubic, gap, spring, drag = numbers[:7]
     cogging, cogs, ripple, ripples, compressed, tighter, cubed, grounded = numbers[7:]
     samples, row = len(command), entries.shape[1]
     state, found, inner = np.zeros(len(entry)), np.zeros(samples), np.zeros(row)
+    rate, total, last = 0.0, 0.0, 0.0
     for k in range(samples):
         found[k] = position @ state
+        if len(law):
+            read = law[5] * np.round(found[k] / law[5])
+            rate = law[3] * rate + (1 - law[3]) * (read - last)
+            last = read
+            total += command[k] - read
+            push = law[0] * (command[k] - read) - law[1] * rate + law[2] * total
+            command[k] = max(-law[4], min(law[4], push))
         transition = transitions[min(k // every, len(transitions) - 1)]
         for step in range(STEPS):
             begun = k * STEPS + step - late  # the command of this step

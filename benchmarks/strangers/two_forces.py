@@ -18,8 +18,8 @@ from scipy.signal import butter, lfilter
 from bayeshaptic.recordings.recording import Recording
 from benchmarks.strangers.__main__ import Row, analysed, kept
 from benchmarks.strangers.device import Masses
+from benchmarks.strangers.draw import Case
 from benchmarks.strangers.motion import STEPS, Forces, Motion
-from benchmarks.strangers.recordings import Case
 
 _PERIOD_S = 1e-3
 # As in the tables of Diaz and Gil (2010); b2 of the PHANToM a little above its zero.

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.diagnosis.feedback.lacking import Lacking, with_laws
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.models import HalfNormal
 from bayeshaptic.models.parameter import unit_of
-from bayeshaptic.quantities import quantity
+from bayeshaptic.quantities import pure, quantity
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.stability.critical import CriticalStiffness
@@ -21,9 +23,9 @@ from bayeshaptic.types import Floats
 # Half a recording has too few strokes to say much: the halves may differ by so many of their sds.
 _APART = 4.0
 WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
-# Standard deviations (Student's t, eight degrees of freedom: 1 in 1000) from which on the motion
+# Standard deviations (Student's t, eight degrees of freedom: 1 in 200) from which on the motion
 # contradicts what was given.
-_CONTRADICTED = 5.04
+_CONTRADICTED = 3.83
 _CENTRAL = 1.6449  # standard deviations that hold 90 %
 _DIMENSIONS = {"m": "mass", "b": "damping", "delay_s": "time"}
 _WORDS = {"m": "mass", "b": "viscous damping", "delay_s": "delay"}
@@ -40,20 +42,27 @@ class InLoop:
         Empty where a half is too short for itself.
     held_out : float
         Power of each half's error with the other half's values, over that with its own.
+    misfit : float
+        The same power over the most that the halves' standard deviations account for; above 1.3
+        something is left that they do not.
     covered : float
         Share of each half's samples that lie in the 90 % band of the other half's error.
     doubts : tuple of str
         Why neither parameters nor limit can be relied on.
     questions : tuple of str
         Why no stiffness can be recommended where the parameters can be relied on.
+    laws : tuple of Lacking
+        Forces over the velocity that joined mass, damping and dry friction.
     """
 
     motion: MotionFit
     halves: tuple[MotionFit, ...]
     held_out: float
+    misfit: float
     covered: float
     doubts: tuple[str, ...] = ()
     questions: tuple[str, ...] = ()
+    laws: tuple[Lacking, ...] = ()
 
 
 def follow_in_loop(recording: Recording) -> InLoop | None:
@@ -61,21 +70,50 @@ def follow_in_loop(recording: Recording) -> InLoop | None:
     follower = _declared(recording)
     parts = _halves(recording)
     try:
-        motion = fit_motion(recording, follower)
+        motion, laws, doubts = with_laws(recording, follower)
     except (InputError, np.linalg.LinAlgError):
         return None
     try:
-        halves = tuple(fit_motion(part, follower) for part in parts)
+        forces = motion.forces.at(motion.numbers)
+        halves = tuple(fit_motion(part, follower, forces, motion.inside) for part in parts)
     except (InputError, np.linalg.LinAlgError):
-        return InLoop(motion, (), float("inf"), 0.0, ("half of the recording is not enough",))
+        short = ("half of the recording is not enough",)
+        return InLoop(motion, (), np.inf, np.inf, 0.0, short, laws=laws)
     own = [half.error_on(part) for half, part in zip(halves, parts, strict=True)]
     other = [half.error_on(part) for half, part in zip(halves[::-1], parts, strict=True)]
     bands = [_CENTRAL * np.sqrt(np.mean(error**2)) for error in own]
     covered = [np.mean(np.abs(e) < b) for e, b in zip(other, bands[::-1], strict=True)]
-    doubts = _differences(*halves)
+    doubts += _differences(*halves)
     if not motion.converged:
         doubts += ("the fit of the motion did not settle",)
-    return InLoop(motion, halves, _power(other) / _power(own), float(np.mean(covered)), doubts)
+    power = _power(own)
+    most = power + _APART**2 * _by_chance(halves, parts)
+    misfit = _power(other) / most
+    if misfit > MISFIT:
+        doubts += (
+            "what one half of the recording says leaves "
+            f"{pure(_power(other) / power, 3)} times the error on the other half that its own "
+            "values do",
+        )
+    return InLoop(
+        motion, halves, _power(other) / power, misfit, float(np.mean(covered)), doubts, laws=laws
+    )
+
+
+def _by_chance(halves: tuple[MotionFit, ...], parts: tuple[Recording, ...]) -> float:
+    """Power of the error that the halves' standard deviations make on each other."""
+    spread = sum(half.covariance for half in halves)
+    errors = []
+    for half, part in zip(halves, parts, strict=True):
+        loop = half.loop(part)
+        values = loop.with_beginnings(loop.begun(half.inside, half.numbers), half.uneven)
+        columns = loop.columns(values, half.uneven, loop.error(values, half.uneven))
+        # Where the pieces begin is fitted to each.
+        begins = columns[:, len(NAMES) : loop.plain - len(half.numbers)]
+        own = columns[:, : len(NAMES)]
+        own = own - begins @ np.linalg.lstsq(begins, own, rcond=None)[0]
+        errors.append(np.sum((own @ spread) * own, axis=1))
+    return float(np.mean(np.concatenate(errors)))
 
 
 def open_questions(

@@ -262,10 +262,13 @@ class _PowerOfVelocity(NonlinearEffect):
 
 def _power_of_velocity(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
     """Implicit, so that it never reverses the motion."""
-    resistance = constants[0]
-    for _ in range(int(constants[1]) - 1):
-        resistance *= abs(v)
-    return -resistance * v / (1 + 0.5 * resistance * gain)
+    middle, resistance = v, 0.0
+    for _ in range(2):  # the second time with the velocity that the first one leaves
+        resistance = constants[0]
+        for _ in range(int(constants[1]) - 1):
+            resistance *= abs(middle)
+        middle = v / (1 + 0.5 * resistance * gain)
+    return -resistance * middle
 
 
 def _power(power: int) -> Callable[[Floats], Floats]:

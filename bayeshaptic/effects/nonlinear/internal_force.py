@@ -124,15 +124,15 @@ def forced_motion(
     motion = np.array([[force.position, force.velocity] for force in forces])
     laws = tuple(callback(force.law.force) for force in forces)
     sticks = np.array([force.law.sticks for force in forces])
-    constants, begins = numbers_of(forces)
+    constants, begins = numbers_of([force.law for force in forces])
     with warnings.catch_warnings():  # numba calls tuples of functions an experiment
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         return step_through(*linear, motion, step_s, substeps, laws, sticks, constants, begins)
 
 
-def numbers_of(forces: Sequence[Internal]) -> tuple[Floats, tuple[int, ...]]:
-    """Strengths and shapes one after the other, and where those of each force begin."""
-    numbers = [force.law.constants for force in forces]
+def numbers_of(laws: Sequence[Law]) -> tuple[Floats, tuple[int, ...]]:
+    """Strengths and shapes one after the other, and where those of each law begin."""
+    numbers = [law.constants for law in laws]
     ends = np.cumsum([len(own) for own in numbers])
     return np.array(sum(numbers, ()), float), (0, *ends[:-1].tolist())
 

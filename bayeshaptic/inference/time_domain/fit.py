@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.acting import COULOMB, Acting
 from bayeshaptic.inference.time_domain.days import between_pieces
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
 from bayeshaptic.inference.time_domain.loop import Loop
@@ -56,6 +57,12 @@ class MotionFit:
         The force that changes along the way: its waves forward and backward.
     way : Way
     follower : Follower
+    whole : ndarray
+        All values of the `Loop`: `inside`, where pieces begin, numbers of the laws.
+    forces : Acting
+        Dry friction's law, and further ones.
+    number_sd : ndarray
+        Of the laws' numbers.
     """
 
     values: Floats
@@ -69,18 +76,40 @@ class MotionFit:
     uneven: Floats = field(repr=False)
     way: Way
     follower: Follower
+    whole: Floats = field(repr=False)
+    forces: Acting
+    number_sd: Floats
+
+    @property
+    def numbers(self) -> Floats:
+        """Of the laws, one for each of `forces.names`."""
+        return self.whole[len(self.whole) - len(self.number_sd) :]
+
+    def loop(self, recording: Recording) -> Loop:
+        """The loop that was followed, or that of another recording."""
+        loop = Loop.of(recording, self.bandwidth_hz, self.way, self.forces)
+        return replace(loop, follower=self.follower)
 
     @property
     def sd(self) -> Floats:
         return np.sqrt(np.diag(self.covariance))
 
     def error_on(self, recording: Recording) -> Floats:
-        """Measured less simulated position of another recording, with these values; (N,)."""
-        loop = replace(Loop.of(recording, self.bandwidth_hz, self.way), follower=self.follower)
-        return loop.error(loop.begun(self.inside), self.uneven)
+        """Measured less simulated position of another recording, with these values; (N,).
+
+        Where its pieces begin is fitted to it.
+        """
+        loop = self.loop(recording)
+        begun = loop.begun(self.inside, self.numbers)
+        return loop.error(loop.with_beginnings(begun, self.uneven), self.uneven)
 
 
-def fit_motion(recording: Recording, feedback: Follower | None = None) -> MotionFit:
+def fit_motion(
+    recording: Recording,
+    feedback: Follower | None = None,
+    forces: Acting = COULOMB,
+    start: Floats | None = None,
+) -> MotionFit:
     """Fit one mass with friction to a recording made in closed loop.
 
     Parameters
@@ -89,6 +118,10 @@ def fit_motion(recording: Recording, feedback: Follower | None = None) -> Motion
     feedback : Follower, optional
         The controller's feedback of the position, as a force for measured - simulated.  Unknown by
         default: a spring and a damper as wide as the command's spectrum stand for it.
+    forces : Acting
+        Laws of forces on the mass, whose numbers are inferred; Coulomb's friction by default.
+    start : ndarray, shape (5,), optional
+        Values to begin with; by default those of the inverse dynamics.
 
     Returns
     -------
@@ -101,14 +134,15 @@ def fit_motion(recording: Recording, feedback: Follower | None = None) -> Motion
     """
     width = bandwidth_hz(recording.force, recording.period_s)
     way = Way.of(recording.position)
-    loop = Loop.of(recording, width, way)
-    start = loop.begun(_inverse_dynamics(recording))
-    loop = loop.led(feedback, start)
-    first = _fit(loop, start, recording.name)
+    loop = Loop.of(recording, width, way, forces)
+    begun = loop.begun(_inverse_dynamics(recording) if start is None else start)
+    loop = loop.led(feedback, begun)
+    first = _fit(loop, begun, recording.name)
     other = 0.4  # bandwidth of the second follower over that of the first
-    second = _fit(loop.led(None, start, other), first.inside, recording.name)
-    apart = (second.values - first.values)[: len(NAMES)]
-    spread = first.covariance[: len(NAMES), : len(NAMES)] + np.outer(apart, apart)
+    second = _fit(loop.led(None, begun, other), first.inside, recording.name)
+    apart = second.values - first.values
+    whole = first.covariance + np.outer(apart, apart)
+    spread = whole[: len(NAMES), : len(NAMES)].copy()
     for index in (NAMES.index("coulomb"), NAMES.index("offset")):
         spread[index, index] += 0.5 * mean_of_uneven(first.found)
     assert loop.follower is not None
@@ -124,6 +158,9 @@ def fit_motion(recording: Recording, feedback: Follower | None = None) -> Motion
         first.uneven,
         way,
         loop.follower,
+        first.inside,
+        forces,
+        np.sqrt(np.diag(whole)[loop.plain - len(forces.names) :]),
     )
 
 
@@ -189,12 +226,12 @@ def _step(
     loop: Loop, values: Floats, uneven: Floats, error: Floats, solved: Ridge
 ) -> tuple[Floats, Floats, float] | None:
     """As much of the step as lowers the penalised error, and by which share; None where none."""
-    plain, lowest = loop.plain, loop.lowest
+    plain, lowest, highest = loop.plain, loop.lowest, loop.highest
     penalty = solved.share[plain:]
     before = float(error @ error + penalty @ uneven**2)
     share = 1.0
     for _ in range(6):
-        trial = np.maximum(values + share * solved.solution[:plain], lowest)
+        trial = np.clip(values + share * solved.solution[:plain], lowest, highest)
         trial[0] = np.clip(trial[0], 0.5 * values[0], 2 * values[0])
         more = uneven + share * (solved.solution[plain:] - uneven)
         left = loop.error(trial, more)

@@ -1,10 +1,12 @@
-"""One mass with viscous and dry friction in a sampled loop, in one compiled pass."""
+"""One mass with friction and other forces on it in a sampled loop, in one compiled pass."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayeshaptic.compiled import kernel
 from bayeshaptic.types import Floats
@@ -56,6 +58,16 @@ def _coast(
     return x, v
 
 
+@kernel(inline=True)
+def _middle(v: float, force: float, damping: float, dry: float, gain: float) -> tuple[float, float]:
+    """About the velocity in the middle and at the end of a step of length gain * mass."""
+    way = 1.0 if v > 0 else -1.0 if v < 0 else 0.0
+    last = v + gain * (force - way * dry - damping * v)
+    if last * v < 0:
+        last = 0.0
+    return 0.5 * (v + last), last
+
+
 @kernel
 def follow(
     values: Floats,
@@ -66,14 +78,18 @@ def follow(
     above: Floats,
     below: Floats,
     period_s: float,
+    laws: tuple[Callable[..., float], ...],
+    sticks: NDArray[np.bool_],
+    constants: Floats,
+    begins: tuple[int, ...],
 ) -> Floats:
     """The simulated position at the samples, shape (N,); inf from where it runs away.
 
     Parameters
     ----------
-    values : ndarray, shape (7,)
-        Mass, viscous damping, dry friction, constant force against the motor, delay, and position
-        and velocity at the beginning.
+    values : ndarray, shape (6,)
+        Mass, viscous damping, constant force against the motor, delay, and position and velocity at
+        the beginning.
     forward, backward : ndarray, shape (N,)
         A further force, s samples long, while the mass moves forward or backward.
     command, measured : ndarray, shape (N,)
@@ -81,14 +97,23 @@ def follow(
     above, below : ndarray
         Numerator and denominator (first coefficient 1) of that feedback, in powers of 1/z.
     period_s : float
+    laws : tuple of callable
+        Further forces, as `Law.force`: compiled callbacks.
+    sticks : ndarray of bool, shape (F,)
+        Which of them are dry friction, and give its largest size.
+    constants : ndarray
+        Strength and shape of all laws, one after the other.
+    begins : tuple of int
+        Where those of each law begin.
     """
-    mass, damping, dry, offset, delay, x, v = values
+    mass, damping, offset, delay, x, v = values
     count = len(command)
     whole = int(math.floor(delay / period_s))
     late = delay - whole * period_s
     rate = damping / mass
     acting, apart, back, out = np.zeros((4, count))
-    ahead = True
+    ahead, dry = True, 0.0
+    before = np.zeros(len(laws))
     for k in range(count):
         out[k] = x
         if v > 0:
@@ -104,11 +129,24 @@ def follow(
         back[k] = total
         acting[k] = command[k] + total
         more = (forward[k] if ahead else backward[k]) - offset
-        now = acting[max(k - whole, 0)]
-        before = acting[max(k - whole - 1, 0)]
-        if late > 0:
-            x, v = _coast(x, v, before + more, rate, mass, dry, late)
-        x, v = _coast(x, v, now + more, rate, mass, dry, period_s - late)
+        for part in range(2):  # before and after the command of this sample arrives
+            span = late if part == 0 else period_s - late
+            if not span > 0:
+                continue
+            force = acting[max(k - whole - 1 + part, 0)] + more
+            gain = span / mass
+            middle, last = _middle(v, force, damping, dry, gain)
+            dry, pushed = 0.0, 0.0
+            for f in range(len(laws)):
+                own = constants[begins[f] :]
+                way = x + 0.5 * span * middle
+                found = laws[f](way, middle, last, gain, before[f], span, own)
+                if sticks[f]:
+                    dry += found
+                else:
+                    pushed += found
+                    before[f] = found
+            x, v = _coast(x, v, force + pushed, rate, mass, dry, span)
         if not abs(x) < 1e9:
             out[k:] = np.inf
             break

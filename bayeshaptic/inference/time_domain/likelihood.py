@@ -63,9 +63,9 @@ class MotionLikelihood:
 class InLoopFit(Fit):
     """A fit of the motion in the form of a fit of the response.
 
-    `reduced_chi_square` is the error's power on each half with the other half's values, over that
-    with its own; `windows` and `residual` are those of the response beside the model's, which
-    feedback biases.
+    `reduced_chi_square` is the error's power on each half with the other half's values, over the
+    most that standard deviations account for; `windows` and `residual` are those of the response
+    beside the model's, which feedback biases.
 
     Attributes
     ----------
@@ -83,8 +83,8 @@ class InLoopFit(Fit):
         return replace(self, theta=theta)
 
 
-def in_loop_fit(model: Model, etfe: Etfe, motion: MotionFit, held_out: float) -> InLoopFit:
-    """The fit of `model` whose `reduced_chi_square` is `held_out`."""
+def in_loop_fit(model: Model, etfe: Etfe, motion: MotionFit, misfit: float) -> InLoopFit:
+    """The fit of `model` whose `reduced_chi_square` is `misfit`."""
     kept = [NAMES.index(name) for name in model.names]
     theta = motion.inside[kept]
     support = np.array([model.prior(name).support for name in model.names])
@@ -97,7 +97,7 @@ def in_loop_fit(model: Model, etfe: Etfe, motion: MotionFit, held_out: float) ->
         theta,
         motion.covariance[np.ix_(kept, kept)],
         outcome,
-        held_out,
+        misfit,
         float(MotionLikelihood(model, motion)(theta[None])[0]),
         windows,
         windows.frequency_hz.ravel(),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bayeshaptic.inference.time_domain.acting import COULOMB, Acting, followed
 from bayeshaptic.inference.time_domain.follower import Follower, spring_and_damper
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
 from bayeshaptic.recordings.recording import Recording
@@ -19,7 +21,8 @@ _LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
 class Loop:
     """A recording with a follower, and the motion of one mass beside it.
 
-    Values are the `SHARED` ones, then position and velocity at the beginning of every piece.
+    Values are the `SHARED` ones, then position and velocity at the beginning of every piece, then
+    the numbers of the laws of force.
 
     Attributes
     ----------
@@ -29,6 +32,8 @@ class Loop:
         Of the force that changes along the way.
     follower : Follower or None
         None until `led`.
+    forces : Acting
+        Dry friction's law, and further ones.
     joints : tuple of int
         Where further pieces begin.
     """
@@ -39,10 +44,13 @@ class Loop:
     bandwidth_hz: float
     shapes: Floats = field(repr=False)
     follower: Follower | None = None
+    forces: Acting = COULOMB
     joints: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, recording: Recording, bandwidth_hz: float, way: Way) -> Loop:
+    def of(
+        cls, recording: Recording, bandwidth_hz: float, way: Way, forces: Acting = COULOMB
+    ) -> Loop:
         """Of a recording, with the waves of a way."""
         force, position = np.array(recording.force), np.array(recording.position)
         return cls(
@@ -51,18 +59,27 @@ class Loop:
             recording.period_s,
             bandwidth_hz,
             waves(position, way),
+            forces=forces,
             joints=recording.joints,
         )
 
     @property
     def plain(self) -> int:
         """How many values there are."""
-        return SHARED + 2 * (len(self.joints) + 1)
+        return SHARED + 2 * (len(self.joints) + 1) + len(self.forces.names)
 
     @property
     def lowest(self) -> Floats:
         """Below which no value may go, shape (plain,)."""
-        return np.append(_LOWEST, np.full(self.plain - SHARED, -np.inf))
+        least = 1e-3  # of a law's number: none is below zero
+        anywhere = np.full(self.plain - SHARED - len(self.forces.names), -np.inf)
+        return np.concatenate([_LOWEST, anywhere, least * self.forces.start])
+
+    @property
+    def highest(self) -> Floats:
+        """Above which no value may go, shape (plain,)."""
+        most = self.forces.most
+        return np.append(np.full(self.plain - len(most), np.inf), most)
 
     @property
     def pieces(self) -> list[slice]:
@@ -73,13 +90,15 @@ class Loop:
     @property
     def beginnings(self) -> list[Ints]:
         """Which values are position and velocity at a piece's beginning."""
-        firsts = range(SHARED, self.plain, 2)
+        firsts = range(SHARED, self.plain - len(self.forces.names), 2)
         return [np.array([first, first + 1]) for first in firsts]
 
-    def begun(self, shared: Floats) -> Floats:
+    def begun(self, shared: Floats, numbers: Floats | None = None) -> Floats:
         """Values with the pieces' beginnings as measured, at rest; shape (plain,)."""
         first = self.position[[piece.start for piece in self.pieces]]
-        return np.append(shared, np.stack([first, np.zeros_like(first)], axis=1))
+        at_rest = np.stack([first, np.zeros_like(first)], axis=1).ravel()
+        own = self.forces.start if numbers is None else numbers
+        return np.concatenate([shared, at_rest, own])
 
     @property
     def independent(self) -> float:
@@ -103,19 +122,20 @@ class Loop:
             width, feedback = width / calmer, None
         return loop
 
-    def error(self, values: Floats, uneven: Floats) -> Floats:
-        """Measured less simulated position, shape (N,)."""
-        from bayeshaptic.inference.time_domain.kernels import follow
-
+    def error(self, values: Floats, uneven: Floats, more: Floats | float = 0.0) -> Floats:
+        """Measured less simulated position, shape (N,); `more` is a force on the mass."""
         assert self.follower is not None
-        forward, backward = uneven.reshape(2, WAVES) @ self.shapes
+        mass, damping, dry, offset, delay_s = values[:SHARED]
+        laws = self.forces.laws(dry, values[self.plain - len(self.forces.names) :])
+        forward, backward = uneven.reshape(2, WAVES) @ self.shapes + more
         above, below = self.follower.above, self.follower.below
         simulated = np.empty_like(self.position)
         for number, piece in enumerate(self.pieces):
             first = SHARED + 2 * number
             with np.errstate(all="ignore"):
-                simulated[piece] = follow(
-                    np.append(values[:SHARED], values[first : first + 2]),
+                simulated[piece] = followed(
+                    np.array([mass, damping, offset, delay_s, *values[first : first + 2]]),
+                    laws,
                     forward[piece],
                     backward[piece],
                     self.force[piece],
@@ -136,26 +156,60 @@ class Loop:
                 2e-3 * size,
                 2e-3 * size,
                 0.05 * self.period_s,
-                1e-6 * np.ptp(self.position),
-                1e-4 * np.std(np.diff(self.position)) / self.period_s,
             ]
         )
         out = np.zeros((len(error), self.plain + 2 * WAVES))
         for i, step in enumerate(steps):
-            # Where the pieces begin moves in all of them at once: each answers to its own.
-            moved = [i] if i < SHARED else list(range(i, self.plain, 2))
-            up, down = values.copy(), values.copy()
-            up[moved] += step
-            down[moved] = np.maximum(down[moved] - step, self.lowest[moved])
-            span = up[i] - down[i]
-            slope = (self.error(down, uneven) - self.error(up, uneven)) / span
-            if i < SHARED:
-                out[:, i] = slope
-                continue
-            for column, piece in zip(moved, self.pieces, strict=True):
-                out[piece, column] = slope[piece]
+            out[:, i] = self._slope(values, uneven, [i], step)
+        for piece, own, slopes in self._begins(values, uneven):
+            out[piece, own] = slopes
+        numbers = self.forces.start
+        for i, number in enumerate(numbers, self.plain - len(numbers)):
+            out[:, i] = self._slope(values, uneven, [i], 1e-2 * max(values[i], 0.1 * number))
         for i in range(2 * WAVES):
             more = uneven.copy()
             more[i] += 1e-3 * size
             out[:, self.plain + i] = (error - self.error(values, more)) / (1e-3 * size)
         return out
+
+    def _begins(self, values: Floats, uneven: Floats) -> Iterator[tuple[slice, Ints, Floats]]:
+        """Every piece, which values are its beginning, and how it moves with them, shape (n, 2)."""
+        far = 1e-6 * float(np.ptp(self.position))
+        fast = 1e-4 * float(np.std(np.diff(self.position))) / self.period_s
+        # Where the pieces begin moves in all of them at once: each answers to its own.
+        slopes = np.stack(
+            [
+                self._slope(values, uneven, [own[i] for own in self.beginnings], step)
+                for i, step in enumerate((far, fast))
+            ],
+            axis=1,
+        )
+        for piece, own in zip(self.pieces, self.beginnings, strict=True):
+            yield piece, own, slopes[piece]
+
+    def with_beginnings(self, values: Floats, uneven: Floats) -> Floats:
+        """`values`, with position and velocity at the pieces' beginnings as they fit best."""
+        best, error = values, self.error(values, uneven)
+        steps = 5  # of Gauss-Newton; a motion without friction takes one
+        for _ in range(steps):
+            trial = best.copy()
+            for piece, own, slopes in self._begins(best, uneven):
+                trial[own] += np.linalg.lstsq(slopes, error[piece], rcond=None)[0]
+            left = self.error(trial, uneven)
+            if not left @ left < (1 - 1e-3) * (error @ error):
+                break
+            best, error = trial, left
+        return best
+
+    def _slope(self, values: Floats, uneven: Floats, moved: list[int], step: float) -> Floats:
+        """How the simulated position moves with values that move together, shape (N,)."""
+        up, down = values.copy(), values.copy()
+        up[moved] += step
+        down[moved] = np.maximum(down[moved] - step, self.lowest[moved])
+        span = up[moved[0]] - down[moved[0]]
+        return (self.error(down, uneven) - self.error(up, uneven)) / span
+
+    def answer(self, values: Floats, uneven: Floats, error: Floats, force: Floats) -> Floats:
+        """How the simulated position moves with the strength of a force, shape (N,)."""
+        step = 1e-3 * float(np.std(self.force)) / max(float(np.std(force)), np.finfo(float).tiny)
+        return (error - self.error(values, uneven, step * force)) / step

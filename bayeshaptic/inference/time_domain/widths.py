@@ -27,6 +27,30 @@ def covariance(columns: Floats, residual: Floats, found: Ridge, effective: float
     return lost * (slow @ slow.T / FREEDOM + still) + (held * found.prior) @ held.T
 
 
+def spread_of(
+    own: Floats, residual: Floats, along: Floats, found: Ridge, effective: float
+) -> float:
+    """Variance of the score of one more column, as `covariance` has that of the solution.
+
+    Parameters
+    ----------
+    own : ndarray, shape (N,)
+        What is left of the column when the others are fitted to it.
+    residual : ndarray, shape (N,)
+        When it is fitted, too.
+    along : ndarray, shape (C,)
+        The other columns' products with it.
+    found : Ridge
+        Of the other columns.
+    effective : float
+    """
+    lost = effective / max(effective - found.used - 1, 0.2 * effective)
+    slow = _cosines(own[:, None], residual)
+    still = float(_stationary(own[:, None], residual)[0, 0])
+    held = along @ (found.inverse * found.share)
+    return float(lost * (np.sum(slow**2) / FREEDOM + still) + held**2 @ found.prior)
+
+
 def mean_of_uneven(found: Ridge) -> float:
     """Variance of the mean of a force with that prior over the way, as far as it is not known.
 

@@ -107,6 +107,11 @@ def motion(found: InLoop, recording: Recording) -> str:
         f"same loop, stays within {quantity(found.motion.error_rms, unit)} rms of the measured "
         f"motion over {way}."
     )
+    for law in found.laws:
+        text += (
+            f" The motion called for {law.effect.title} (t = {pure(law.score.t, 3)}), which joined "
+            f"it and leaves {pure(100 * law.score.left, 2)} % of the error's power that was there."
+        )
     rms = float(np.sqrt(np.mean(np.square(recording.force))))
     worth_naming = 1e-4  # of the force
     if found.motion.uneven_rms > worth_naming * rms:

@@ -99,8 +99,14 @@ def _in_loop(analysis: Analysis) -> str:
         f"{quantity(1 / recording.period_s, 'Hz')} in closed loop: the force was computed from the "
         "motion, so that a frequency response would be biased. One mass with viscous "
         "and dry friction, a constant force and a delay, simulated in the same loop, was fitted to "
-        "the motion (closed-loop output error [janot2014])."
+        f"the motion (closed-loop output error [janot2014]){_laws(analysis)}."
     )
+
+
+def _laws(analysis: Analysis) -> str:
+    assert analysis.in_loop is not None
+    titles = [law.effect.title for law in analysis.in_loop.laws]
+    return f", with {' and '.join(titles)}, which its error called for" if titles else ""
 
 
 def _model(analysis: Analysis) -> str:

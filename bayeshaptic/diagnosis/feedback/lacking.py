@@ -1,0 +1,283 @@
+"""What the motion of one mass in its loop lacks: laws that join it, and what speaks against it.
+
+After the fit, every force of a table is asked for by the score of its strength in what is left.
+Forces over the velocity are laws of one mass, and join it.  Damping that fades with the frequency
+(a base that gives, a connection that relaxes, eddy currents) and whatever changes with time are
+not: they say that a limit from one mass is another device's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
+from bayeshaptic.diagnosis.feedback.terms import SmoothMotion, smooth_motion
+from bayeshaptic.effects.laws import corrections
+from bayeshaptic.effects.nonlinear.friction import (
+    CubicDamping,
+    DahlFriction,
+    Drag,
+    RisingFriction,
+    StribeckFriction,
+)
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
+from bayeshaptic.effects.nonlinear.shapes import Usual
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.acting import COULOMB, Acting
+from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
+from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.inference.time_domain.scores import Score, scores
+from bayeshaptic.recordings.join import unbroken
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.types import Floats
+
+# Student's t of eight degrees of freedom: 1 in 1,000 for each of some twenty forces.
+_SEEN = 5.04
+# Of the error's power, that a force must take away: steps of a sample leave up to 0.08 of an error
+# as small as the encoder's to a law that has joined.
+_WORTH = 0.1
+_ROUNDS = 2  # another law of dry friction, and a resistance
+_BAND = 0.05  # of the sampling rate: in which the motion that laws are over is smooth
+_FADING_S = (3e-3, 1e-2, 3e-2, 0.1)  # times within which damping fades
+_SLOW = "stribeck_"
+_DRY = (StribeckFriction.name, RisingFriction.name, DahlFriction.name)
+_COULOMB, _DELAY = NAMES.index("coulomb"), NAMES.index("delay_s")
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A force to ask for.
+
+    Attributes
+    ----------
+    name : str
+    force : ndarray, shape (N,)
+        Of strength one, as the measured motion says.
+    joined : callable
+        From what acts already, its dry friction and the strength asked for, to what acts with it.
+    """
+
+    name: str
+    force: Floats = field(repr=False)
+    joined: Callable[[Acting, float, float], Acting] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """A law that one mass in its loop lacks.
+
+    Attributes
+    ----------
+    effect : NonlinearEffect
+    score : Score
+        Of its force before it joined.
+    estimates : mapping
+        Its numbers beside dry friction: name to mean and standard deviation.
+    """
+
+    effect: NonlinearEffect
+    score: Score
+    estimates: Mapping[str, tuple[float, float]]
+
+
+def with_laws(
+    recording: Recording, follower: Follower | None
+) -> tuple[MotionFit, tuple[Lacking, ...], tuple[str, ...]]:
+    """The motion, fitted with the laws that it lacks; these; and why none of it is to be relied on.
+
+    Parameters
+    ----------
+    recording : Recording
+    follower : Follower or None
+
+    Raises
+    ------
+    InputError
+        Where no motion of one mass can be found beside the measured one.
+    """
+    path = _path(recording)
+    usual = Usual.of(path.velocity, path.position, recording.position_unit)
+    motion = fit_motion(recording, follower)
+    seen: dict[str, Score] = {}
+    further = _with_drag(recording, follower, motion)
+    for _ in range(_ROUNDS):
+        asked = [c for c in _laws(recording, path, usual) if c.name not in seen]
+        if motion.forces.friction.name != COULOMB.friction.name:
+            asked = [c for c in asked if c.name not in _DRY]
+        better = further + [
+            (more, candidate.name, score)
+            for candidate, score in _best_of_each(motion, recording, asked)
+            if (more := _with(motion, candidate, score, recording, follower)) is not None
+        ]
+        if not better:
+            break
+        motion, name, seen[name] = min(better, key=lambda one: one[0].error_rms)
+        further = []
+    return motion, _found(motion, seen), _against(motion, recording, path)
+
+
+def _with_drag(
+    recording: Recording, follower: Follower | None, alone: MotionFit
+) -> list[tuple[MotionFit, str, Score]]:
+    """Begun with drag, where the inverse dynamics see it: far from it no score would."""
+    name = "drag_2"
+    try:
+        found = inverse_dynamics(unbroken(recording), terms=("coulomb", name))
+    except InputError:
+        return []
+    strength, sd = found[name]
+    clear = 3.0  # standard deviations
+    if not strength > clear * sd:
+        return []
+    mass, damping, offset, dry = (found[n][0] for n in ("mass", "damping", "offset", "coulomb"))
+    start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[_DELAY]])
+    start[_DELAY] = min(start[_DELAY], recording.period_s)
+    forces = Acting(others=(Drag(MOTOR),), strengths=(strength,))
+    more = fit_motion(recording, follower, forces, start)
+    left = (more.error_rms / alone.error_rms) ** 2
+    return [(more, Drag.name, Score(strength, sd, left))] if left < 1 - _WORTH else []
+
+
+def _with(
+    motion: MotionFit,
+    candidate: _Candidate,
+    score: Score,
+    recording: Recording,
+    follower: Follower | None,
+) -> MotionFit | None:
+    """Fitted again with a law; None where that does not do what its score promised."""
+    forces = candidate.joined(motion.forces, float(motion.inside[_COULOMB]), score.strength)
+    more = fit_motion(recording, follower, forces, motion.inside)
+    if (more.error_rms / motion.error_rms) ** 2 > 1 - _WORTH:
+        return None
+    rubs = more.inside[_COULOMB] > np.sqrt(more.covariance[_COULOMB, _COULOMB])
+    return more if rubs or candidate.name not in _DRY else None
+
+
+def _found(motion: MotionFit, seen: Mapping[str, Score]) -> tuple[Lacking, ...]:
+    estimates: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in seen}
+    numbers = zip(motion.forces.names, motion.numbers, motion.number_sd, strict=True)
+    for (effect, name), value, sd in numbers:
+        estimates[effect.name][name] = float(value), float(sd)
+    acting = {effect.name: effect for effect in (motion.forces.friction, *motion.forces.others)}
+    return tuple(Lacking(acting[name], score, estimates[name]) for name, score in seen.items())
+
+
+def _best_of_each(
+    motion: MotionFit, recording: Recording, asked: Sequence[_Candidate]
+) -> list[tuple[_Candidate, Score]]:
+    """Of each law that is seen and makes sense the candidate that leaves least."""
+    scored = scores(motion, recording, [one.force for one in asked])
+    found: dict[str, tuple[_Candidate, Score]] = {}
+    for one, score in zip(asked, scored, strict=True):
+        if score is None or score.t < _SEEN or score.left > 1 - _WORTH:
+            continue
+        if one.name not in found or score.left < found[one.name][1].left:
+            found[one.name] = one, score
+    return list(found.values())
+
+
+def _against(motion: MotionFit, recording: Recording, path: SmoothMotion) -> tuple[str, ...]:
+    """What no limit of one mass goes with, where it is seen."""
+    asked = [*_fading(recording, path), *_changing(recording, path)]
+    scored = scores(motion, recording, [force for _, force in asked])
+    seen = [
+        (score.left, f"{why} (t = {abs(score.t):.3g})")
+        for (why, _), score in zip(asked, scored, strict=True)
+        if score is not None and abs(score.t) > _SEEN and score.left < 1 - _WORTH
+    ]
+    return (min(seen)[1],) if seen else ()
+
+
+def _laws(recording: Recording, path: SmoothMotion, usual: Usual) -> Iterator[_Candidate]:
+    """Other laws of dry friction, and resistances that grow with a power of the velocity."""
+    for shape in corrections(usual):
+        part = float(shape.name.removeprefix(_SLOW)) * usual.velocity
+        force = shape.force(path.velocity)
+        yield _Candidate(StribeckFriction.name, force, _stribeck(StribeckFriction, part))
+        yield _Candidate(RisingFriction.name, -force, _stribeck(RisingFriction, part))
+    for share in (0.01, 0.03, 0.1):  # of the way, in which friction begins as a spring
+        length = share * float(np.ptp(path.position))
+        yield _Candidate(DahlFriction.name, _presliding(recording, length), _dahl(length))
+    for kind in (Drag, CubicDamping):
+        (shape, *_) = kind.shapes(MOTOR, usual)
+        yield _Candidate(kind.name, shape.force(path.velocity), _beside(kind))
+
+
+def _stribeck(
+    kind: type[StribeckFriction] | type[RisingFriction], slow: float
+) -> Callable[[Acting, float, float], Acting]:
+    """Coulomb's friction, more or less near standstill."""
+
+    def joined(acting: Acting, dry: float, strength: float) -> Acting:
+        share = strength / max(dry, strength)
+        change, speed = kind.tuned
+        law = kind(MOTOR, {change: min(share, 0.9 * kind.most.get(change, np.inf)), speed: slow})
+        return replace(acting, friction=law)
+
+    return joined
+
+
+def _dahl(length: float) -> Callable[[Acting, float, float], Acting]:
+    (distance,) = DahlFriction.tuned
+    law = DahlFriction(MOTOR, {distance: length})
+    return lambda acting, dry, strength: replace(acting, friction=law)
+
+
+def _beside(kind: type[Drag] | type[CubicDamping]) -> Callable[[Acting, float, float], Acting]:
+    def joined(acting: Acting, dry: float, strength: float) -> Acting:
+        others = (*acting.others, kind(MOTOR))
+        return replace(acting, others=others, strengths=(*acting.strengths, strength))
+
+    return joined
+
+
+def _presliding(recording: Recording, length: float) -> Floats:
+    """Dahl's friction of strength one, shape (N,)."""
+    parts = []
+    for piece in recording.pieces:
+        held, found = 0.0, [0.0]
+        for step in np.diff(_path(piece).position).tolist():
+            slides = math.copysign(1.0, step)
+            held = slides + (held - slides) * math.exp(-abs(step) / length)
+            found.append(-held)
+        parts.append(found)
+    return np.concatenate(parts)
+
+
+def _path(recording: Recording) -> SmoothMotion:
+    """Of the pieces, one after the other."""
+    paths = [smooth_motion(piece, _BAND / piece.period_s) for piece in recording.pieces]
+    return SmoothMotion(*map(np.concatenate, zip(*map(astuple, paths), strict=True)))
+
+
+def _fading(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
+    """Damping that is gone within a time."""
+    from scipy.signal import lfilter
+
+    why = (
+        "the damping is another at other frequencies, as with a base that gives or a connection "
+        "that relaxes, and what it is at the limit's nobody saw"
+    )
+    for time_s in _FADING_S:
+        kept = np.exp(-recording.period_s / time_s)
+        v = path.velocity
+        slow, _ = lfilter([1 - kept], [1, -kept], v, zi=[kept * v[0]])
+        yield why, slow - v
+
+
+def _changing(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
+    """Damping, dry friction and gain that grow with the time."""
+    grows = np.linspace(-1, 1, recording.samples)
+    slow = 0.02 * float(np.std(path.velocity))
+    for name, force in (
+        ("damping", path.velocity),
+        ("dry friction", np.tanh(path.velocity / slow)),
+        ("gain from force to motion", recording.force),
+    ):
+        yield f"the {name} changes in the course of the recording", grows * force

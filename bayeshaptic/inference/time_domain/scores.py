@@ -1,0 +1,73 @@
+"""Whether a force that the fit of a motion lacks would explain what it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.inference.time_domain.fit import MotionFit
+from bayeshaptic.inference.time_domain.uneven import ridge
+from bayeshaptic.inference.time_domain.widths import spread_of
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.types import Floats
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a step of Gauss-Newton towards a further force says, everything else fitted with it.
+
+    Attributes
+    ----------
+    strength, sd : float
+        Of a force, over that of strength one.
+    left : float
+        Share of the error's power that it leaves.
+    """
+
+    strength: float
+    sd: float
+    left: float
+
+    @property
+    def t(self) -> float:
+        """Student's t, of as many degrees of freedom as the covariance of a fit."""
+        return self.strength / self.sd
+
+
+def scores(motion: MotionFit, recording: Recording, forces: Sequence[Floats]) -> list[Score | None]:
+    """A score for every force; None for one that says nothing here.
+
+    Parameters
+    ----------
+    motion : MotionFit
+        Of the recording.
+    recording : Recording
+    forces : sequence of ndarray, shape (N,)
+        Of strength one, as the measured motion says.
+    """
+    loop = motion.loop(recording)
+    values, uneven, plain = motion.whole, motion.uneven, loop.plain
+    error = loop.error(values, uneven)
+    columns = loop.columns(values, uneven, error)
+    target = error + columns[:, plain:] @ uneven
+    size = float(np.std(loop.force))
+    found = ridge(columns, target, plain, size, loop.independent)
+    left = target - columns @ found.solution
+    scored: list[Score | None] = []
+    for force in forces:
+        answer = loop.answer(values, uneven, error, force)
+        along = columns.T @ answer
+        own = answer - columns @ (found.inverse @ along)  # what no other column does
+        its_own = 1e-9  # of its power: less is rounding
+        power = float(own @ answer)
+        if not power > its_own * float(answer @ answer):
+            scored.append(None)
+            continue
+        strength = float(own @ left) / power
+        after = left - strength * own
+        variance = spread_of(own, after, along, found, loop.independent)
+        sd = float(np.sqrt(variance)) / power
+        scored.append(Score(strength, sd, float(after @ after) / float(left @ left)))
+    return scored

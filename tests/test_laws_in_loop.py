@@ -1,0 +1,119 @@
+"""What the motion of one mass in its loop lacks: laws that join it, and what speaks against it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_time_domain import GAINS, TRUTH, declared, in_loop, stepped
+
+from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop
+from bayeshaptic.diagnosis.feedback.lacking import with_laws
+from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.inference.time_domain.scores import scores
+from bayeshaptic.recordings.feedback import Feedback
+from bayeshaptic.report.headline import headline
+from bayeshaptic.rig import Bench
+
+_REACH = 4.5  # standard deviations: 1 in 500 with eight degrees of freedom
+FOLLOWER = Follower(*Feedback(*GAINS).law(1e-3))
+STRIBECK = {"force": 1.5, "static": 2.4, "velocity": 0.02}
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return Bench(
+        "rigid",
+        {"m": TRUTH["m"], "b": TRUTH["b"]},
+        delay_s=TRUTH["delay_s"],
+        encoder_resolution=2e-6,
+    )
+
+
+@pytest.mark.parametrize(
+    ("effect", "numbers", "estimate", "truth"),
+    [
+        ("drag", {"coefficient": 150.0}, "drag_coefficient", 150.0),
+        ("stribeck_friction", STRIBECK, "static_excess", 0.6),
+        ("stribeck_friction", STRIBECK, "stribeck_velocity", 0.02),
+    ],
+)
+def test_a_law_of_the_table_joins_the_mass(
+    bench: Bench, effect: str, numbers: dict[str, float], estimate: str, truth: float
+) -> None:
+    recording = stepped(bench.with_effect(effect, **numbers), 4.0)
+    motion, laws, doubts = with_laws(recording, FOLLOWER)
+    assert [law.effect.name for law in laws] == [effect]
+    assert doubts == ()
+    value, sd = laws[0].estimates[estimate]
+    assert abs(value - truth) < _REACH * sd
+    assert sd < 0.05 * truth
+    wanted = np.array([TRUTH["m"], TRUTH["b"], numbers.get("force", 0.0), 0.0, TRUTH["delay_s"]])
+    assert np.all(np.abs(motion.values - wanted) < _REACH * motion.sd)
+    # Without it the damping takes its part.
+    alone = fit_motion(recording, FOLLOWER)
+    assert motion.error_rms < 0.5 * alone.error_rms
+
+
+def test_nothing_joins_a_mass_with_dry_friction() -> None:
+    motion, laws, doubts = with_laws(in_loop(4.0, TRUTH["coulomb"], 2e-6), FOLLOWER)
+    assert laws == ()
+    assert doubts == ()
+    assert motion.error_rms < 2e-6
+
+
+def test_a_base_that_gives_and_damping_that_changes_are_seen(bench: Bench) -> None:
+    gives = bench.with_effect("base_compliance", frequency_hz=25.0, mass_ratio=3.0)
+    _, _, doubts = with_laws(stepped(gives, 4.0), FOLLOWER)
+    assert len(doubts) == 1
+    assert "the damping is another at other frequencies" in doubts[0]
+    recording = in_loop(4.0, 0.0, 2e-6)
+    motion = fit_motion(recording, FOLLOWER)
+    velocity = np.gradient(recording.position, 1e-3)
+    pulled = 2.0 * np.linspace(-1, 1, recording.samples) * velocity
+    # As if the mass had been held back less at first: in the command that is a force of its own.
+    changed = replace(recording, force=recording.force + pulled, feedback=None)
+    _, _, doubts = with_laws(changed, None)
+    assert any("the damping changes" in doubt for doubt in doubts)
+    assert motion.converged
+
+
+def test_a_score_is_the_strength_that_a_fit_finds(bench: Bench) -> None:
+    faint = stepped(bench.with_effect("drag", coefficient=5.0), 4.0)
+    motion = fit_motion(faint, FOLLOWER)
+    velocity = np.gradient(faint.position, 1e-3)
+    (found,) = scores(motion, faint, [-velocity * np.abs(velocity)])
+    assert found is not None
+    assert abs(found.strength - 5.0) < _REACH * found.sd
+    # A column that is there already says nothing.
+    assert scores(motion, faint, [np.zeros(faint.samples)]) == [None]
+
+
+def test_half_a_recording_predicts_the_other_from_wherever_it_begins() -> None:
+    found = follow_in_loop(in_loop(4.0, 0.0, 2e-6))
+    assert found is not None
+    assert found.held_out == pytest.approx(1.0, abs=0.05)
+    assert found.doubts == ()
+
+
+def test_what_is_not_one_mass_gets_no_stiffness(bench: Bench) -> None:
+    gives = bench.with_effect("base_compliance", frequency_hz=25.0, mass_ratio=3.0)
+    closed = close_loop(stepped(gives, 4.0), "rigid", ess=600)
+    assert closed.verdict == "unexplained"
+    assert headline(closed).status == "untrusted"
+
+
+def test_laws_are_named_with_their_numbers(bench: Bench) -> None:
+    closed = close_loop(
+        declared(stepped(bench.with_effect("stribeck_friction", **STRIBECK), 4.0)), "rigid", ess=600
+    )
+    assert closed.verdict == "explained"
+    assert closed.effect_names == ("stribeck_friction",)
+    named = closed.effects[0]
+    assert set(named.estimates) == {"static_excess", "stribeck_velocity"}
+    assert named.parameters == ("coulomb",)
+    assert headline(closed).status == "caution"
+    assert NAMES[2] in closed.analysis.posterior.model.names
