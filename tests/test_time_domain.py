@@ -15,7 +15,8 @@ from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood
 from bayeshaptic.inference.time_domain.loop import Loop
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
-from bayeshaptic.inference.time_domain.uneven import WAVES, Way
+from bayeshaptic.inference.time_domain.uneven import WAVES, Way, ridge
+from bayeshaptic.inference.time_domain.widths import covariance
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording
@@ -146,3 +147,18 @@ def test_a_recording_in_closed_loop_has_a_limit(
     other = close_loop(recording, "rigid", delay_s=0.2e-3, delay_sd_s=0.0, ess=600)
     assert headline(other).status == "untrusted"
     assert "the delay was given as 200 µs, and the motion says" in headline(other).sentence
+
+
+def test_what_two_columns_share_alone_is_open() -> None:
+    """Dry friction and a constant force, where the mass moves one way only."""
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((2000, 2 + 2 * WAVES))
+    columns[:, 1] = columns[:, 0]
+    noise = 0.1 * rng.standard_normal(2000)
+    found = ridge(columns, 2.0 * columns[:, 0] + noise, 2, 1.0, 2000)
+    spread = covariance(columns, noise, found, 2000)
+    assert found.solution[:2].sum() == pytest.approx(2.0, abs=0.02)
+    # Of the sum noise alone says how well it is known; of the two nobody knows anything.
+    known = np.array([1.0, 1.0])
+    assert np.all(np.diag(spread)[:2] > 100.0)
+    assert abs(known @ spread[:2, :2] @ known) < 1e-4 * spread[0, 0]

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import logsumexp
 
 from bayeshaptic.diagnosis.hidden.evidence import Evidence, sum_of
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
@@ -63,7 +64,8 @@ def _drawn_again(log_weight: Floats, rng: np.random.Generator) -> Ints:
 
 
 def _gain(meeting: Floats) -> Floats:
-    return np.log(np.exp(meeting).mean(axis=(2, 3)))
+    draws = meeting.shape[2] * meeting.shape[3]
+    return np.asarray(logsumexp(meeting, axis=(2, 3)) - np.log(draws))
 
 
 def looked_at(weighed: Sequence[Weighed], known: Around) -> Looked:

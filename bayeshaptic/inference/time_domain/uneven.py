@@ -9,6 +9,7 @@ import numpy as np
 from bayeshaptic.types import Floats
 
 WAVES = 12  # half waves along the way, a direction
+_OPEN = 1e-12  # of a column's power: the share of a prior that is none
 _LENGTHS = (1.0, 3.0, 8.0)  # waves from which they are smaller
 _SIZES = (1e-5, 1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6)  # of the command's rms
 
@@ -44,9 +45,9 @@ class Ridge:
     inverse : ndarray, shape (C, C)
         Of columns' column + the priors' share.
     share : ndarray, shape (C,)
-        That share: noise variance over prior variance; 0 without a prior.
+        That share: noise variance over prior variance; next to nothing without a prior.
     prior : ndarray, shape (C,)
-        Prior variances; 0 without a prior.
+        Prior variances; as good as infinite without a prior.
     used : float
         Effective number of columns.
     """
@@ -87,11 +88,12 @@ def ridge(columns: Floats, target: Floats, plain: int, size: float, effective: f
             evidence, at_best = found(variances)
             if evidence > best:
                 best, prior, noise = evidence, variances, at_best
-    weight = np.zeros(len(scale))
-    weight[plain:] = found.thin * noise / prior
-    inverse = np.linalg.inv(gram + np.diag(weight / scale**2 + 1e-12))
+    # What a recording leaves open (friction beside a constant force, where nothing turns) is open.
+    weight = _OPEN * scale**2
+    variances = np.append(found.thin * noise / weight[:plain], prior)
+    weight[plain:] += found.thin * noise / prior
+    inverse = np.linalg.inv(gram + np.diag(weight / scale**2))
     used = float(np.trace(inverse @ gram))
-    variances = np.append(np.zeros(plain), prior)
     solution = inverse @ along / scale
     return Ridge(solution, inverse / np.outer(scale, scale), weight, variances, used)
 
@@ -120,7 +122,7 @@ class _Evidence:
         rounds = 15
         for _ in range(rounds):
             weight[self.plain :] = self.thin * noise / prior
-            full = self.gram + np.diag(weight / self.scale**2 + 1e-12)
+            full = self.gram + np.diag(weight / self.scale**2 + _OPEN)
             left = self.power - float(self.along @ np.linalg.solve(full, self.along))
             new = max(left, 1e-12 * self.power) / self.samples * self.effective / freedom
             settled = abs(new / noise - 1) < 1e-3

@@ -22,7 +22,7 @@ def covariance(columns: Floats, residual: Floats, found: Ridge, effective: float
     inner = found.inverse
     lost = effective / max(effective - found.used, 0.2 * effective)
     slow = inner @ _cosines(columns, residual).T
-    still = inner @ _stationary(columns, residual) @ inner
+    still = inner @ _stationary(columns, residual) @ inner.T
     held = inner * found.share
     return lost * (slow @ slow.T / FREEDOM + still) + (held * found.prior) @ held.T
 
