@@ -117,3 +117,22 @@ def test_laws_are_named_with_their_numbers(bench: Bench) -> None:
     assert named.parameters == ("coulomb",)
     assert headline(closed).status == "caution"
     assert NAMES[2] in closed.analysis.posterior.model.names
+
+
+def test_friction_that_the_motion_does_not_have_is_not_named(bench: Bench) -> None:
+    # The force along the motion alone takes what a constant does in part for dry friction.
+    recording = stepped(bench.with_effect("constant_force"), 10.0)
+    closed = close_loop(recording, "rigid", ess=300)
+    assert closed.verdict == "consistent"
+    assert closed.effect_names == ()
+
+
+def test_a_response_that_says_nothing_of_the_delay_is_refused(bench: Bench) -> None:
+    """Draws around such a fit had delays of thousands of samples, each a pole to look for."""
+    recording = declared(stepped(bench.with_effect("centring_stiffness"), 10.0))
+    closed = close_loop(recording, "rigid", ess=300)
+    assert headline(closed).status == "untrusted"
+    drawn = closed.analysis.posterior.chains
+    assert np.all(np.isfinite(drawn))
+    if "delay_s" in closed.analysis.model.names:
+        assert drawn[..., closed.analysis.model.names.index("delay_s")].max() < 0.1

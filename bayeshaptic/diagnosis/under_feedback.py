@@ -14,12 +14,14 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.sampler import sample
+from bayeshaptic.inference.time_domain.fit import NAMES
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import percent
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
+_SEEN = 2.9  # Student's t of eight degrees of freedom: 1 in 100
 _BIASED = (
     "The force was computed from the motion, so that the measured response is biased, and shown "
     "for comparison only. The parameters and the limit are not read from it: they come from the "
@@ -87,8 +89,11 @@ def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:
     assert analysis.in_loop is not None
     names = ("coulomb", "offset")
     laws = tuple(_accepted(law, analysis) for law in analysis.in_loop.laws)
-    # Another law of dry friction has Coulomb's in it.
-    dry = [] if any(law.effect.sticks for law in analysis.in_loop.laws) else traced.state.accepted
+    # Another law of dry friction has Coulomb's in it; and the motion knows better than the force.
+    motion, coulomb = analysis.in_loop.motion, NAMES.index(names[0])
+    rubs = motion.values[coulomb] > _SEEN * motion.sd[coulomb]
+    named = any(law.effect.sticks for law in analysis.in_loop.laws)
+    dry = traced.state.accepted if rubs and not named else ()
     accepted = (*(replace(effect, estimates={}, parameters=names) for effect in dry), *laws)
     verdict, left = (EXPLAINED, accepted[0].family) if accepted else (CONSISTENT, None)
     if analysis.in_loop.doubts:

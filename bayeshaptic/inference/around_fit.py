@@ -12,7 +12,7 @@ _SHAPE = (4, 16, 64)  # ensembles, steps, walkers
 
 
 def draws_around(fit: Fit, seed: int = 0) -> Posterior:
-    """Normal draws with the covariance of a fit, inside of the priors' support; no posterior.
+    """Normal draws with the covariance of a fit, where the priors expect any; no posterior.
 
     Parameters
     ----------
@@ -23,8 +23,11 @@ def draws_around(fit: Fit, seed: int = 0) -> Posterior:
     spread, axes = np.linalg.eigh(np.nan_to_num(fit.covariance))
     root = axes * np.sqrt(np.maximum(spread, 0.0))
     draws = fit.theta + rng.standard_normal((*_SHAPE, len(fit.theta))) @ root.T
-    support = np.array([fit.model.prior(name).support for name in fit.model.names])
-    inside = np.where((draws > support[:, 0]) & (draws < support[:, 1]), draws, fit.theta)
+    # A fit that knows nothing of a delay may have one of hours within its standard deviations.
+    rare = 1e-6
+    ends = np.array([fit.model.prior(name).quantile([rare, 1 - rare]) for name in fit.model.names])
+    low, high = np.minimum(ends[:, 0], fit.theta), np.maximum(ends[:, 1], fit.theta)
+    inside = np.where((draws >= low) & (draws <= high), draws, fit.theta)
     message = "not sampled: nothing that depends on it is stated"
     flat = np.zeros(_SHAPE)
     return Posterior(fit.model, inside, flat, diagnose(inside), True, message, 0.0, seed)

@@ -287,11 +287,14 @@ def _limits(
 
 def _checked(limit: CriticalStiffness, model: Model, vectors: Floats) -> CriticalStiffness:
     """With draws at equal steps of probability checked against the closed loop's own poles."""
-    checked = 64
-    count = min(checked, len(vectors))
-    order = np.argsort(limit.samples)
-    pick = order[np.linspace(0, len(order) - 1, count).astype(int)]
+    checked, longest = 64, 200  # draws, and samples of delay: each is a pole
     assert model.period_s is not None
+    order = np.argsort(limit.samples)
+    order = order[model.system(vectors[order]).delay_s < longest * model.period_s]
+    if not len(order):
+        return limit
+    count = min(checked, len(order))
+    pick = order[np.linspace(0, len(order) - 1, count).astype(int)]
     held = int(confirms(model.system(vectors[pick]), model.period_s, limit.samples[pick]).sum())
     notices = limit.notices
     if held < count:
