@@ -140,6 +140,14 @@ def test_a_position_of_the_opposite_sign_is_seen(case: str) -> None:
         assert judge(force, -position).opposite
 
 
+def test_news_say_nothing_of_the_sign_where_a_force_repeats() -> None:
+    """Of 23 strangers' multisines one of the right sign was refused: their responses tell all."""
+    force, position = (signals[-1] for signals in open_loops("lhifam free"))
+    found = judge(force, -position)
+    assert found.opposite
+    assert not replace(found, repeats=True).opposite
+
+
 @pytest.mark.parametrize("excitation", ["smooth", "steps"])
 def test_the_opposite_sign_is_seen_in_a_force_with_nothing_new(excitation: str) -> None:
     """The phase of the response contradicts its slope; with the right sign it does not."""

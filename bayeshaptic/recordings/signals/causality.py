@@ -112,7 +112,12 @@ class Causality:
 
     @property
     def opposite(self) -> bool:
-        """The position moves against the force: one of them has the opposite sign."""
+        """The position moves against the force: one of them has the opposite sign.
+
+        Not said of a force that repeats: nothing is new in it, and its response tells.
+        """
+        if self.repeats:
+            return False
         now, soon, *late = self.answers
         later = max(late, key=lambda share: abs(share.value))
         answers = abs(now.value) / _AT_ONCE, abs(soon.value) / _SOON
