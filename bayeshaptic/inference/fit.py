@@ -175,7 +175,10 @@ def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) 
     inner = np.flatnonzero(~bound)
     # A direction that the data do not see at all gets a width of 50 coordinate units, not zero.
     curvature = slope[:, inner].T @ slope[:, inner] + np.eye(len(inner)) / 50.0**2
-    within = np.linalg.inv(curvature)
+    try:
+        within = np.linalg.inv(curvature)
+    except np.linalg.LinAlgError:  # of a model that is far off, some directions are all rounding
+        within = np.linalg.pinv(curvature, hermitian=True)
     stretch = np.where(here.log, theta, here.scale)[inner]
     covariance[np.ix_(inner, inner)] = within * np.outer(stretch, stretch) * max(1.0, chi_square)
     with np.errstate(invalid="ignore"):  # nan where rounding left nothing of a variance

@@ -70,7 +70,9 @@ def nothing_to_straighten(size: int) -> Straightening:
 
 def straighten(x: Floats) -> Straightening:
     """Fit the map to draws `x` of shape (B, P), by regression."""
-    mean, sd = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-300)
+    mean = x.mean(axis=0)
+    # A parameter that is the same in all draws has the rounding of its mean for a spread.
+    sd = np.maximum(x.std(axis=0), 1e-12 * np.abs(mean) + 1e-300)
     values, vectors = np.linalg.eigh(np.cov(((x - mean) / sd).T))
     order = np.argsort(-values)
     width = np.sqrt(np.maximum(values[order], 1e-12 * values.max()))

@@ -7,6 +7,7 @@ was accepted before to half of the excited lines, and judged on a quarter in bet
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -114,14 +115,17 @@ class LineTrials:
             if not (near and meter.affords(one.effect.title)):
                 continue
             tick(one.effect.title)
-            tried = self._with_linear(state.part, one.effect, one.starts, rest)
-            best = max(best, self._gained(state.part, tried))
-            trial = self._judged(state, tried, *_linear(one.effect))
-            self._keep(found, (one.effect.name, None), trial)
+            with suppress(np.linalg.LinAlgError):  # a motion that runs away has no balance
+                tried = self._with_linear(state.part, one.effect, one.starts, rest)
+                best = max(best, self._gained(state.part, tried))
+                trial = self._judged(state, tried, *_linear(one.effect))
+                self._keep(found, (one.effect.name, None), trial)
         for basis in self._promising(state.part, best):
             if meter.affords(basis.title):
                 tick(basis.title)
-                self._keep(found, (basis.name, basis.place), self._with_force(state, basis))
+                with suppress(np.linalg.LinAlgError):
+                    forced = self._with_force(state, basis)
+                    self._keep(found, (basis.name, basis.place), forced)
         return list(found.values())
 
     def beside(self, state: State) -> tuple[Test, ...]:

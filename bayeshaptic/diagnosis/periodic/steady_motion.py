@@ -169,11 +169,19 @@ def no_force(period: Period, places: tuple[Place, ...]) -> Applied:
 def apply(
     period: Period, forces: Mapping[Place, Floats], motions: Mapping[Place, Motion]
 ) -> Applied:
-    """Forces over one period, shape (N,) each, taken apart by regression on their motion."""
+    """Forces over one period, shape (N,) each, taken apart by regression on their motion.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Where the motion runs away.
+    """
     proportional, rest = [], []
     for place, force in forces.items():
         motion = np.stack([motions[place].position, motions[place].velocity], axis=1)
         size = np.sqrt(np.mean(motion**2, axis=0))
+        if not (np.all(np.isfinite(size)) and np.all(np.isfinite(force))):
+            raise np.linalg.LinAlgError("the motion runs away")
         share = np.linalg.lstsq(motion / size, force - force.mean(), rcond=None)[0] / size
         proportional.append(share[0] + share[1] * period.s)
         rest.append(period.transform(force - motion @ share))
