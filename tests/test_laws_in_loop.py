@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from test_time_domain import GAINS, TRUTH, declared, in_loop, stepped
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
-from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.scores import scores
 from bayeshaptic.recordings.feedback import Feedback
@@ -136,3 +138,18 @@ def test_a_response_that_says_nothing_of_the_delay_is_refused(bench: Bench) -> N
     assert np.all(np.isfinite(drawn))
     if "delay_s" in closed.analysis.model.names:
         assert drawn[..., closed.analysis.model.names.index("delay_s")].max() < 0.1
+
+
+def test_a_law_with_which_no_motion_stays_near_leaves_the_mass_as_it_was(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def plain_alone(*arguments: Any) -> MotionFit:
+        if len(arguments) > 2:  # with other forces than Coulomb's
+            raise InputError("no motion of one mass stays near the measured one")
+        return fit_motion(*arguments)
+
+    monkeypatch.setattr("bayeshaptic.diagnosis.feedback.lacking.fit_motion", plain_alone)
+    recording = stepped(bench.with_effect("stribeck_friction", **STRIBECK), 4.0)
+    motion, laws, _ = with_laws(recording, FOLLOWER)
+    assert laws == ()
+    assert np.array_equal(motion.values, fit_motion(recording, FOLLOWER).values)

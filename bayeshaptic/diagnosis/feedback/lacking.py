@@ -137,8 +137,9 @@ def _with_drag(
     mass, damping, offset, dry = (found[n][0] for n in ("mass", "damping", "offset", "coulomb"))
     start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[_DELAY]])
     start[_DELAY] = min(start[_DELAY], recording.period_s)
-    forces = Acting(others=(Drag(MOTOR),), strengths=(strength,))
-    more = fit_motion(recording, follower, forces, start)
+    more = _again(recording, follower, Acting(others=(Drag(MOTOR),), strengths=(strength,)), start)
+    if more is None:
+        return []
     left = (more.error_rms / alone.error_rms) ** 2
     return [(more, Drag.name, Score(strength, sd, left))] if left < 1 - _WORTH else []
 
@@ -151,12 +152,23 @@ def _with(
     follower: Follower | None,
 ) -> MotionFit | None:
     """Fitted again with a law; None where that does not do what its score promised."""
-    forces = candidate.joined(motion.forces, float(motion.inside[_COULOMB]), score.strength)
-    more = fit_motion(recording, follower, forces, motion.inside)
-    if (more.error_rms / motion.error_rms) ** 2 > 1 - _WORTH:
+    acting, dry = motion.forces.at(motion.numbers), float(motion.inside[_COULOMB])
+    forces = candidate.joined(acting, dry, score.strength)
+    more = _again(recording, follower, forces, motion.inside)
+    if more is None or (more.error_rms / motion.error_rms) ** 2 > 1 - _WORTH:
         return None
     rubs = more.inside[_COULOMB] > np.sqrt(more.covariance[_COULOMB, _COULOMB])
     return more if rubs or candidate.name not in _DRY else None
+
+
+def _again(
+    recording: Recording, follower: Follower | None, forces: Acting, start: Floats
+) -> MotionFit | None:
+    """Fitted with other forces; None where no motion stays near the measured one."""
+    try:
+        return fit_motion(recording, follower, forces, start)
+    except (InputError, np.linalg.LinAlgError):
+        return None
 
 
 def _found(motion: MotionFit, seen: Mapping[str, Score]) -> tuple[Lacking, ...]:
