@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -44,14 +44,10 @@ class Acting:
     @property
     def start(self) -> Floats:
         """Values of these to begin with."""
-        strengths = dict(zip(map(id, self.others), self.strengths, strict=True))
-        return np.array(
-            [
-                strengths[id(effect)] if name == effect.strength[0] else effect.shape[name]
-                for effect, name in self.names
-            ],
-            dtype=np.float64,
-        )
+        found = [self.friction.shape[name] for name in self.friction.tuned]
+        for effect, strength in zip(self.others, self.strengths, strict=True):
+            found += [strength, *(effect.shape[name] for name in effect.tuned)]
+        return np.array(found, dtype=np.float64)
 
     @property
     def most(self) -> Floats:
@@ -60,34 +56,30 @@ class Acting:
 
     def at(self, values: Floats) -> Acting:
         """With other numbers to begin with."""
-        found = {
-            (id(effect), name): v for (effect, name), v in zip(self.names, values, strict=True)
-        }
-
-        def moved(effect: NonlinearEffect) -> NonlinearEffect:
-            shape = {name: float(found[id(effect), name]) for name in effect.tuned}
-            return replace(effect, shape={**effect.shape, **shape})
-
-        strengths = tuple(float(found[id(e), e.strength[0]]) for e in self.others)
-        return Acting(moved(self.friction), tuple(map(moved, self.others)), strengths)
+        rest = iter(values.tolist())
+        friction = _shaped(self.friction, rest)
+        others, strengths = [], []
+        for effect in self.others:
+            strengths.append(next(rest))
+            others.append(_shaped(effect, rest))
+        return Acting(friction, tuple(others), tuple(strengths))
 
     def laws(self, dry: float, values: Floats) -> list[Law]:
         """With dry friction of strength `dry`, and values of the further numbers."""
-        rest = iter(values.tolist())
-        shape = {name: next(rest) for name in self.friction.tuned}
-        found = [_law(self.friction, dry, shape)]
-        for effect in self.others:
-            strength = next(rest)
-            found.append(_law(effect, strength, {name: next(rest) for name in effect.tuned}))
+        acting = self.at(values)
+        found = [acting.friction.law(dry, _mass(), np.zeros(0))]
+        for effect, strength in zip(acting.others, acting.strengths, strict=True):
+            found.append(effect.law(strength, _mass(), np.zeros(0)))
         return found
 
 
 COULOMB = Acting()
 
 
-def _law(effect: NonlinearEffect, strength: float, shape: dict[str, float]) -> Law:
-    whole = replace(effect, shape={**effect.shape, **shape})
-    return whole.law(strength, _mass(), np.zeros(0))
+def _shaped(effect: NonlinearEffect, numbers: Iterator[float]) -> NonlinearEffect:
+    """With the next of these numbers for its shape."""
+    shape = {name: next(numbers) for name in effect.tuned}
+    return replace(effect, shape={**effect.shape, **shape}) if shape else effect
 
 
 @cache
