@@ -153,3 +153,18 @@ def test_a_law_with_which_no_motion_stays_near_leaves_the_mass_as_it_was(
     motion, laws, _ = with_laws(recording, FOLLOWER)
     assert laws == ()
     assert np.array_equal(motion.values, fit_motion(recording, FOLLOWER).values)
+
+
+def test_what_speaks_against_a_limit_stands_where_half_is_not_enough(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def too_short(*arguments: Any) -> MotionFit:
+        raise InputError("no motion of one mass stays near the measured one")
+
+    monkeypatch.setattr("bayeshaptic.diagnosis.feedback.in_loop.fit_motion", too_short)
+    gives = bench.with_effect("base_compliance", frequency_hz=25.0, mass_ratio=3.0)
+    found = follow_in_loop(declared(stepped(gives, 4.0)))
+    assert found is not None
+    against, short = found.doubts
+    assert "the damping is another at other frequencies" in against
+    assert short == "half of the recording is not enough"

@@ -77,8 +77,8 @@ def follow_in_loop(recording: Recording) -> InLoop | None:
         forces = motion.forces.at(motion.numbers)
         halves = tuple(fit_motion(part, follower, forces, motion.inside) for part in parts)
     except (InputError, np.linalg.LinAlgError):
-        short = ("half of the recording is not enough",)
-        return InLoop(motion, (), np.inf, np.inf, 0.0, short, laws=laws)
+        doubts += ("half of the recording is not enough",)
+        return InLoop(motion, (), np.inf, np.inf, 0.0, doubts, laws=laws)
     own = [half.error_on(part) for half, part in zip(halves, parts, strict=True)]
     other = [half.error_on(part) for half, part in zip(halves[::-1], parts, strict=True)]
     bands = [_CENTRAL * np.sqrt(np.mean(error**2)) for error in own]
