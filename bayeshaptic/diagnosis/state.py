@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.effects.nonlinear.protocol import Acting
-from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.fit import Fit, summarise
 from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
@@ -221,47 +221,34 @@ def _noise_factor(power: Floats, scatter: Floats, freedom: Floats, nodes: int) -
     return float(np.exp(brentq(surplus, 0.0, max(highest, 1.0))))
 
 
-def held_out_rms(fit: Fit, part: tuple[int, ...] = REPORT, louder: Floats | None = None) -> float:
-    """Weighted rms on a quarter of the windows, with the model fitted to the others; 1 is noise.
-
-    Parameters
-    ----------
-    fit : Fit
-    part : tuple of int
-        Which quarter.
-    louder : ndarray, shape (W,), optional
-        Noise variance to weigh by, over the windows' own.
-    """
+def held_out_rms(fit: Fit, part: tuple[int, ...] = REPORT) -> float:
+    """Weighted rms on a quarter of the windows, with the model fitted to the others; 1 is noise."""
     out = share(fit.windows, part)
     theta = polish(fit.model, fit.windows.part(~out), fit.theta)
-    power = _powers(fit.model, fit.windows.part(out), theta)
-    return float(np.sqrt(np.mean(power if louder is None else power / louder[out])))
+    left = Likelihood(fit.model, fit.windows.part(out)).normalised(theta[None])[0]
+    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
 def compared_errors(before: State, after: State) -> tuple[Floats, Floats]:
     """Weighted rms of two states on windows that took no part in the fit, and on all, (2,) each.
 
     On both, because a quarter of the windows may get better at the expense of the others.  A force
-    that was taken off a recording was part of its noise, and beside the little noise that it leaves
-    what is left of it may stand out further than all of it did before: both are weighed by the
-    noise that was there before.
+    that was taken off a recording was part of its noise, and so were samples that were mended:
+    beside the little noise that they leave, what the model lacks may stand out further than all of
+    it did before.  Both are fitted and weighed with the noise that was there before.
     """
-    louder = np.ones(len(after.fit.windows.scatter))
-    if after.accepted[-1].family == "nonlinear":
-        known, at = (s.fit.windows.frequency_hz.mean(axis=1) for s in (before, after))
-        there, own = (s.fit.likelihood.noise_variance for s in (before, after))
-        louder = np.interp(at, known, there) / own
-    power = _powers(after.model, after.fit.windows, after.fit.theta) / louder
-    return (
-        np.array([held_out_rms(before.fit, CHOOSE), np.sqrt(before.fit.reduced_chi_square)]),
-        np.array([held_out_rms(after.fit, CHOOSE, louder), np.sqrt(np.mean(power))]),
+    fit = after.fit
+    if after.accepted[-1].family in ("nonlinear", "measurement"):
+        windows = fit.windows
+        known, at = (w.frequency_hz.mean(axis=1) for w in (before.fit.windows, windows))
+        there, own = (f.likelihood.noise_variance for f in (before.fit, fit))
+        louder = replace(windows, scatter=windows.scatter * np.interp(at, known, there) / own)
+        fit = summarise(fit.model, louder, polish(fit.model, louder, fit.theta))
+    was, now = (
+        np.array([held_out_rms(one, CHOOSE), np.sqrt(one.reduced_chi_square)])
+        for one in (before.fit, fit)
     )
-
-
-def _powers(model: Model, windows: Windows, theta: Floats) -> Floats:
-    """Mean squared normalised deviation of every window, shape (W,)."""
-    left = Likelihood(model, windows).normalised(theta[None])[0]
-    return np.asarray(np.mean(np.abs(left) ** 2, axis=1))
+    return was, now
 
 
 def describe_gain(gain: float) -> str:
