@@ -18,7 +18,7 @@ from bayeshaptic.diagnosis.trials import linear, windows
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit, summarise, weighted_residuals
-from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.numerics.spending import Meter
@@ -128,10 +128,10 @@ FAMILIES = [
 ]
 
 
-@pytest.mark.parametrize(("family", "raised"), [("nonlinear", False), ("linear", True)])
-def test_a_force_that_was_part_of_the_noise_is_judged_by_that_noise(
-    family: str, raised: bool
-) -> None:
+@pytest.mark.parametrize(
+    ("family", "raised"), [("nonlinear", False), ("measurement", False), ("linear", True)]
+)
+def test_what_was_part_of_the_noise_is_judged_by_that_noise(family: str, raised: bool) -> None:
     """The same misfit beside a hundredth of the noise: ten times as many noises, and no worse."""
     _, etfe, fit = fitted(False, 8.0, MODE)
     quiet = replace(fit.windows, scatter=fit.windows.scatter / 100)
@@ -142,8 +142,38 @@ def test_a_force_that_was_part_of_the_noise_is_judged_by_that_noise(
     )
     was, now = compared_errors(before, after)
     assert bool(np.any(now > 5 * was)) == raised
-    # A fit that trusts other windows more moves a little.
-    assert raised or np.allclose(now, was, rtol=0.2)
+    assert raised or np.allclose(now, was, rtol=0.02)
+
+
+def test_a_fit_to_what_the_noise_hid_is_no_error_of_what_was_mended() -> None:
+    """Where the noise went, the fit follows; beside the noise that was there it need not."""
+    _, etfe, fit = fitted(False, 8.0, MODE)
+    beside_the_mode = np.abs(fit.windows.frequency_hz.mean(axis=1) - 110) < 20
+    fell = np.where(beside_the_mode, 1e-6, 1.0)
+    quiet = replace(fit.windows, scatter=fit.windows.scatter * fell)
+    bent = summarise(fit.model, quiet, polish(fit.model, quiet, fit.theta))
+    mended = State(etfe, bent, (Accepted("held_samples", "some", "measurement", ""),))
+    as_noisy = summarise(fit.model, fit.windows, bent.theta)
+    assert as_noisy.reduced_chi_square > 1.2 * fit.reduced_chi_square
+    was, now = compared_errors(State(etfe, fit), mended)
+    assert np.allclose(now, was, rtol=0.02)
+
+
+def test_forces_come_after_a_linear_effect_that_leaves_noise_at_first_sight(monkeypatch) -> None:
+    _, etfe, fit = fitted(False, 8.0, MODE)
+    state, looked = State(etfe, fit), []
+    monkeypatch.setattr(windows, "nonlinear_trials", lambda *_: looked.append("") or [])
+    tests = tuple(
+        ResidualTest(name, family, 99.0, 5.0, None, "")
+        for name, family in (("bands", "linear"), ("sign(v)", "nonlinear"))
+    )
+    for hopeless, forces in ((False, 0), (True, 1)):
+        looked.clear()
+        if hopeless:  # nothing linear leaves noise
+            monkeypatch.setattr(linear, "MISFIT", 0.0)
+        found = windows.WindowTrials(state).trials(state, tests, Meter(), lambda _: None)
+        assert "second_mode" in {trial.name for trial in found}
+        assert len(looked) == forces
 
 
 @pytest.mark.parametrize(

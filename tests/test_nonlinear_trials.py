@@ -14,15 +14,16 @@ from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
-from bayeshaptic.diagnosis.trials import beside
+from bayeshaptic.diagnosis.trials import beside, force_search
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.beside import beside_tests
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.force_search import _damped, _scan
 from bayeshaptic.diagnosis.trials.force_slopes import Along, Form, linearised, nudges_of, spread
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
+from bayeshaptic.effects.nonlinear.friction import StribeckFriction as StribeckLaw
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
@@ -45,12 +46,12 @@ LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 10.0, 3
 
 
-def state_of(bench: Bench) -> State:
-    """The free model fitted to ten seconds of white noise."""
+def state_of(bench: Bench, model: str = "free") -> State:
+    """The model fitted to ten seconds of white noise."""
     made = simulate(bench, WhiteNoise(4.0, 300.0, 0.3, SECONDS), seed=SEED)
     recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
     etfe = estimate_etfe(recording)
-    return State(etfe, least_squares(build_model("free", "lhifam"), etfe))
+    return State(etfe, least_squares(build_model(model, "lhifam"), etfe))
 
 
 def only(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
@@ -143,6 +144,42 @@ def test_what_goes_with_a_friction_is_where_the_rest_fits_best() -> None:
     # Half of the windows were fitted: half of (64 - 16) / 2; the slopes are good to some percent.
     assert fall(moved=True) == pytest.approx(12.0, rel=0.25)
     assert fall(moved=False) > 3 * fall(moved=True)
+
+
+def test_how_well_a_friction_is_known_does_not_depend_on_what_was_simulated_before() -> None:
+    """The slow motion is read off beside the motion before: in a difference both sides share it."""
+    held = Bench.from_device("lhifam", held=True).with_effect("coulomb_friction", force=0.5)
+    state = state_of(held, "grasped")
+    assert state.etfe.unbroken is not None
+    bench = ForceBench(state, state.etfe.unbroken)
+    found = bench.point((Acting(CoulombFriction(MOTOR), 0.5),), state.fit.theta, rounds=3)
+    known, along = spread(bench, found)
+    bench.remember(0.9 * np.asarray(found.changes[0].motion))
+    again, moved = spread(bench, found)
+    np.testing.assert_allclose(again, known, rtol=0.1)
+    np.testing.assert_allclose(moved, along, atol=0.1 * np.abs(along).max())
+
+
+@pytest.mark.parametrize("law", ["coulomb_friction", "stribeck_friction"])
+def test_a_law_that_contains_the_friction_found_is_fitted_where_it_stands_out(
+    monkeypatch: pytest.MonkeyPatch, law: str
+) -> None:
+    only(monkeypatch, "coulomb_friction", "stribeck_friction", "friction_along_the_way")
+    begun: list[Point] = []
+    own = force_search.fit_force
+    monkeypatch.setattr(force_search, "fit_force", lambda b, p: begun.append(p) or own(b, p))
+    trials = nonlinear_trials(state_of(LHIFAM.with_effect(law)), {"sign(v)"}, Meter())
+    # The way does not change, and takes no fit; Stribeck's law begins where Coulomb's ended.
+    assert [trial.name for trial in trials] == list(dict.fromkeys(["coulomb_friction", law]))
+    assert [point.effect.name for point in begun] == [trial.name for trial in trials]
+    assert begun[-1].gain_fit >= 0.98 * trials[0].gain_fit or law == "coulomb_friction"
+
+
+def test_the_law_on_the_way_from_the_simple_one() -> None:
+    law = StribeckLaw(MOTOR, {"static_excess": 0.8, "stribeck_velocity": 0.02})
+    assert law.departing(0.25).shape == {"static_excess": 0.2, "stribeck_velocity": 0.02}
+    assert law.departing(1.0) == law and law.contains(CoulombFriction(MOTOR))
+    assert not law.contains(law) and not CoulombFriction(MOTOR).contains(CoulombFriction(MOTOR))
 
 
 def test_slopes_over_the_linear_parameters_are_taken_again_only_where_something_has_moved(

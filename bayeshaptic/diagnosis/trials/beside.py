@@ -12,7 +12,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench
-from bayeshaptic.diagnosis.trials.force_slopes import hints
+from bayeshaptic.diagnosis.trials.force_hints import hints
 from bayeshaptic.diagnosis.trials.nonlinear import is_there
 from bayeshaptic.effects.laws import BESIDE
 from bayeshaptic.effects.library import effects

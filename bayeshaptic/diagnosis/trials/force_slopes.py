@@ -6,7 +6,7 @@ linear parameters: its slopes, simulated, enter the likelihood as further inputs
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bayeshaptic.diagnosis.state import share
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
-from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
+from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.numerics.gauss_newton import jacobian
@@ -23,7 +23,6 @@ from bayeshaptic.types import Floats
 
 NUDGE = 0.1  # relative, of strength and shape for the slopes
 _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
-_FAINT = 0.01  # of the faintest strength to begin a search with, for the slope over it
 # Coordinates and logarithms: how far slopes over linear parameters hold.  Fifteen fits of
 # friction on PHANToMs end where they do with new ones a round (log likelihoods -13 to 52 higher).
 _KEPT = 0.1
@@ -82,7 +81,7 @@ def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
         Change of the linear parameters' coordinates (`search_box`) with each logarithm, all else
         fitted anew: friction that is a little more leaves a damper that is far less.
     """
-    _, linear, forces, free = _slopes(bench, found)
+    _, linear, forces, free = slopes_of_all(bench, found)
     size, count = len(free), forces.shape[1]
     along = np.zeros((size, count))
     along[free] = -np.linalg.lstsq(linear, forces, rcond=None)[0]
@@ -90,60 +89,7 @@ def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
     return np.asarray(np.linalg.pinv(left.T @ left, hermitian=True)), along
 
 
-@dataclass(frozen=True)
-class Hint:
-    """What a further force would be, to first order.
-
-    Attributes
-    ----------
-    effect : NonlinearEffect
-    strength : float
-    score : float
-        How far it stands out of the noise; not below zero where it can only be positive.
-    """
-
-    effect: NonlinearEffect
-    strength: float
-    score: float
-
-
-def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
-    """What each further force would be beside those that the bench's state has.
-
-    Everything that is fitted moves along: a score is standard normal where there is no such force
-    (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).  Those that run away are left out.
-
-    Parameters
-    ----------
-    bench : ForceBench
-    effects : sequence of NonlinearEffect
-        Not of actuators.
-    """
-    theta = bench.state.fit.theta
-    own = bench.added_motions(bench.before, theta).sum(axis=0)
-    usual = bench.motions(theta, tuple({effect.place for effect in effects}))
-    tried, moved = [], []
-    for effect in effects:
-        faint = _FAINT * float(effect.first_strengths(bench.model, theta, usual[effect.place])[0])
-        with_it = bench.added_motions((*bench.before, Acting(effect, faint)), theta).sum(axis=0)
-        if np.isfinite(with_it[0]):
-            tried.append(effect)
-            moved.append((with_it - own) / faint)
-    if not tried or not np.isfinite(own[0]):
-        return []
-    residual, linear, forces, _ = _slopes(bench, bench.as_it_is(bench.before, theta), moved)
-    known, further = np.split(forces, [forces.shape[1] - len(moved)], axis=1)
-    base = np.linalg.qr(np.concatenate([linear, known], axis=1))[0]
-    further = further - base @ (base.T @ further)
-    size = np.maximum(np.linalg.norm(further, axis=0), 1e-300)
-    found = []
-    for effect, score, one in zip(tried, -(residual @ further) / size, size, strict=True):
-        score = score if effect.signed else max(score, 0.0)
-        found.append(Hint(effect, float(score / one), abs(float(score))))
-    return found
-
-
-def _slopes(
+def slopes_of_all(
     bench: ForceBench, found: Point, motions: list[Floats] | None = None
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """Residuals of all windows at fitted forces, and their slopes.
@@ -235,7 +181,6 @@ def linearised(
     forces = form.at(logs)
     added = bench.added_motions(forces, theta)
     inner, extra = added.sum(axis=0), bench.driven(forces, theta, added)
-    bench.remember(inner)
     sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
     slopes = [
         (motion(logs + side * unit, theta) - extra) / side
@@ -254,6 +199,7 @@ def linearised(
             for vector, nudge in zip(around, nudges, strict=False)
         ]
         along = Along(moves, at, share_of)
+    bench.remember(inner)  # not before: what is compared has the slow motion in common
     slopes += along.slopes
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
     slopes += further

@@ -14,7 +14,14 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point, with_forces
-from bayeshaptic.diagnosis.trials.force_search import Variants, beside_others, fitted, search
+from bayeshaptic.diagnosis.trials.force_search import (
+    Variants,
+    beside_others,
+    containing,
+    fitted,
+    search,
+    worth_following,
+)
 from bayeshaptic.diagnosis.trials.force_slopes import spread
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.library import effects
@@ -70,7 +77,11 @@ def nonlinear_trials(
         inner = [law for law in firsts if law not in of_commands]
         found += beside_others(bench, inner, meter, tick)
     known = {point.effect.strength[0]: point for point in found}
-    found = fitted(bench, searched(others, known), meter, found)
+    for point in [one for one in known.values() if worth_following(one, known.values())]:
+        laws = [_beside(law, point) for law in others if law[0].contains(point.effect)]
+        found += containing(bench, point, laws, meter, tick)
+    rest = [law for law in others if not any(law[0].contains(p.effect) for p in known.values())]
+    found = fitted(bench, searched(rest, known), meter, found)
     return [_trial(bench, point) for point in found]
 
 

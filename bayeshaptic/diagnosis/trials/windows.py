@@ -83,20 +83,26 @@ class WindowTrials:
         """Trials of every class that a test raises.
 
         Without patience linear effects at first sight, and forces last where no test looks for
-        one: what a hand does besides is noise, too.
+        one: what a hand does besides is noise, too.  Where a linear effect leaves noise at first
+        sight forces come after it in any case: they are dear, and are found beside it as well,
+        which is taken out again where they make it needless.
         """
         raised = {test.name for test in tests if test.flagged}
         families = {test.family for test in tests if test.flagged}
         if state.etfe.through_reference and families != {"linear"}:
             return []  # forces are simulated under a command that answers to them in closed loop
         found: list[Trial] = []
+        explained = False
         if "linear" in families:
-            sight = self._sight if self._sight and self._sight.state is state else None
-            found += linear_trials(state, meter, tick, sight, patient)
+            if self._sight is None or self._sight.state is not state:
+                self._sight = first_sight(state, meter, tick)
+            found += linear_trials(state, meter, tick, self._sight, patient)
+            seen = self._sight is not None and self._sight.explains
+            explained = seen and any(trial.convincing for trial in found)
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
         now = patient or _looks_like_a_force(tests) or "linear" not in families
-        if "nonlinear" in families and now:
+        if "nonlinear" in families and now and not explained:
             found += nonlinear_trials(state, raised, meter, tick)
         return found
 

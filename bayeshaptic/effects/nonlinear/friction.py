@@ -98,6 +98,7 @@ class StribeckFriction(_DryFriction):
     over = (VELOCITY, LOAD_VELOCITY)
     dimensions = {"static_excess": "number", "stribeck_velocity": "velocity"}
     tuned = ("static_excess", "stribeck_velocity")
+    plain = {"static_excess": 0.0}
 
     @classmethod
     def candidates(
@@ -148,6 +149,7 @@ class RisingFriction(_DryFriction):
     dimensions = {"lack_at_rest": "number", "rising_velocity": "velocity"}
     tuned = ("lack_at_rest", "rising_velocity")
     most = {"lack_at_rest": 1.0}
+    plain = {"lack_at_rest": 0.0}
 
     @classmethod
     def candidates(
@@ -176,6 +178,7 @@ class FrictionAlongTheWay(_DryFriction):
     over = (VELOCITY,)
     dimensions = {"friction_ratio": "number", "way_middle": "position", "way_span": "position"}
     tuned = ("friction_ratio",)
+    plain = {"friction_ratio": 1.0}
 
     @classmethod
     def candidates(

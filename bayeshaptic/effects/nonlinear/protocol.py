@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
 
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.shapes import Shape, Usual
@@ -60,6 +60,8 @@ class NonlinearEffect(ABC):
     """The shape's parameters that are fitted from the grid on; all above zero."""
     most: ClassVar[Mapping[str, float]] = {}
     """The largest values of those that have one."""
+    plain: ClassVar[Mapping[str, float]] = {}
+    """The shape's values with which it is the simplest law of its strength, if it contains that."""
     ties: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
     sticks: ClassVar[bool] = False
@@ -85,6 +87,15 @@ class NonlinearEffect(ABC):
     def called_for(self, raised: set[str]) -> bool:
         """Whether one of the raised variables or tests is this effect's."""
         return bool(raised & set(self.over))
+
+    def contains(self, other: NonlinearEffect) -> bool:
+        """Whether another is the simplest law of its strength, and it is that with some shape."""
+        return bool(self.plain) and not other.shape and other.strength == self.strength
+
+    def departing(self, part: float) -> Self:
+        """The law that is this part of the way from the simplest one to this."""
+        between = {name: at + part * (self.shape[name] - at) for name, at in self.plain.items()}
+        return replace(self, shape={**self.shape, **between})
 
     @abstractmethod
     def law(self, strength: float, model: Model, theta: Floats) -> Law:

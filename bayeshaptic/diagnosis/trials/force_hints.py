@@ -1,0 +1,100 @@
+"""What a further force, or a larger law of a known one, would be: to first order, by its score."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.force_slopes import slopes_of_all
+from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
+
+_FAINT = 0.01  # of the faintest strength, or of the way to a law, for the slope over it
+
+
+@dataclass(frozen=True)
+class Hint:
+    """What a further force would be, to first order.
+
+    Attributes
+    ----------
+    effect : NonlinearEffect
+    strength : float
+    score : float
+        How far it stands out of the noise; not below zero where it can only be positive.
+    """
+
+    effect: NonlinearEffect
+    strength: float
+    score: float
+
+
+def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
+    """What each further force would be beside those that the bench's state has.
+
+    Everything that is fitted moves along: a score is standard normal where there is no such force
+    (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).  Those that run away are left out.
+
+    Parameters
+    ----------
+    bench : ForceBench
+    effects : sequence of NonlinearEffect
+        Not of actuators.
+    """
+    theta = bench.state.fit.theta
+    usual = bench.motions(theta, tuple({effect.place for effect in effects}))
+    tried = []
+    for effect in effects:
+        faint = _FAINT * float(effect.first_strengths(bench.model, theta, usual[effect.place])[0])
+        tried.append((effect, faint, (*bench.before, Acting(effect, faint))))
+    return _scored(bench, bench.as_it_is(bench.before, theta), tried)
+
+
+def departures(bench: ForceBench, known: Point, effects: Sequence[NonlinearEffect]) -> list[Hint]:
+    """What laws that contain that of a known force would be in its place, to first order.
+
+    A hint's strength is the part of the way from the simple law to the effect's own shape.
+
+    Parameters
+    ----------
+    bench : ForceBench
+    known : Point
+        Of the simple law, fitted.
+    effects : sequence of NonlinearEffect
+        At its place.
+    """
+    *before, own = known.forces
+    tried = [
+        (effect, _FAINT, (*before, Acting(effect.departing(_FAINT), own.strength)))
+        for effect in effects
+    ]
+    return _scored(bench, known, tried)
+
+
+def _scored(
+    bench: ForceBench,
+    found: Point,
+    tried: Sequence[tuple[NonlinearEffect, float, tuple[Acting, ...]]],
+) -> list[Hint]:
+    """Hints around a point: of each effect, a little of it, and the forces with that little."""
+    own = bench.added_motions(found.forces, found.theta).sum(axis=0)
+    usable, moved = [], []
+    for effect, little, acting in tried:
+        with_it = bench.added_motions(acting, found.theta).sum(axis=0)
+        if np.isfinite(with_it[0]):
+            usable.append(effect)
+            moved.append((with_it - own) / little)
+    if not usable or not np.isfinite(own[0]):
+        return []
+    residual, linear, forces, _ = slopes_of_all(bench, found, moved)
+    known, further = np.split(forces, [forces.shape[1] - len(moved)], axis=1)
+    base = np.linalg.qr(np.concatenate([linear, known], axis=1))[0]
+    further = further - base @ (base.T @ further)
+    size = np.maximum(np.linalg.norm(further, axis=0), 1e-300)
+    hints = []
+    for effect, score, one in zip(usable, -(residual @ further) / size, size, strict=True):
+        score = score if effect.signed else max(score, 0.0)
+        hints.append(Hint(effect, float(score / one), abs(float(score))))
+    return hints
