@@ -20,7 +20,9 @@ from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.force_search import _damped, _scan
 from bayeshaptic.diagnosis.trials.force_slopes import Along, Form, linearised, nudges_of, spread
+from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
+from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.friction import StribeckFriction as StribeckLaw
@@ -173,6 +175,25 @@ def test_a_law_that_contains_the_friction_found_is_fitted_where_it_stands_out(
     assert [trial.name for trial in trials] == list(dict.fromkeys(["coulomb_friction", law]))
     assert [point.effect.name for point in begun] == [trial.name for trial in trials]
     assert begun[-1].gain_fit >= 0.98 * trials[0].gain_fit or law == "coulomb_friction"
+
+
+def test_an_effect_that_a_force_was_taken_for_goes_when_the_force_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Dahl's friction looks like a transmission that relaxes, and beside one there is little."""
+    only(monkeypatch, "dahl_friction")
+    state = state_of(LHIFAM.with_effect("dahl_friction"))
+    taken_for = max(linear_trials(state, Meter()), key=lambda trial: trial.score)
+    assert taken_for.convincing
+    found = nonlinear_trials(taken_for.state, {"stretch^3"}, Meter())[0]
+    assert [one.family for one in found.state.accepted] == ["linear", "nonlinear"]
+    trials = WindowTrials(state)
+    lighter, gone = trials.without_needless(found.state, Meter(), lambda _: None)
+    assert gone == taken_for.name
+    assert [one.name for one in lighter.accepted] == ["dahl_friction"]
+    unspent = Meter(limit=0.0)  # nothing is simulated where nothing is left to spend
+    assert trials.without_needless(found.state, unspent, lambda _: None)[0] is found.state
+    assert unspent.skipped == [found.accepted.title]
 
 
 def test_the_law_on_the_way_from_the_simple_one() -> None:

@@ -52,7 +52,7 @@ class Trials(Protocol):
     def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
         """With another law in the place of an earlier force, or the very same."""
 
-    def without_needless(self, state: State) -> tuple[State, str | None]:
+    def without_needless(self, state: State, meter: Meter, tick: Tick) -> tuple[State, str | None]:
         """Without the earlier effect that a later one made needless, and its name; or as it is."""
 
 
@@ -247,7 +247,7 @@ class Loop:
             return False
         found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
         better = self._kind.reconsidered(found, self.meter, self._tick)
-        lighter, gone = self._kind.without_needless(better)
+        lighter, gone = self._kind.without_needless(better, self.meter, self._tick)
         if lighter is not found:
             found, tests = lighter, self._remaining(lighter)
             self._candidates = [

@@ -136,7 +136,7 @@ class LineTrials:
         """As it is."""
         return state
 
-    def without_needless(self, state: State) -> tuple[State, str | None]:
+    def without_needless(self, state: State, meter: Meter, tick: Tick) -> tuple[State, str | None]:
         """Without the earlier effect that is worth least, if that is next to nothing."""
         assert isinstance(state, BalancedState)
         full = self._log_likelihoods(state.part)[1]

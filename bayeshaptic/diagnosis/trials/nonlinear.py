@@ -28,7 +28,7 @@ from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.inference.fit import Fit, search_box, summarise
-from bayeshaptic.inference.least_squares import polish
+from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import Model
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.numerics.spending import Meter
@@ -99,6 +99,25 @@ def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None 
             if trial.score - found[0].score > most:
                 best, most = trial.state, trial.score - found[0].score
     return best
+
+
+def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
+    """The state with its last force searched for and fitted once more; as it is without one.
+
+    Where it was found beside a linear effect that the state does not have any more it may be at
+    another place, and larger.
+    """
+    *rest, last = state.accepted
+    if last.change is None or last.change.acting is None or not meter.affords(last.title):
+        return state
+    etfe = with_forces(state.etfe, (last.change,))
+    bare = State(etfe, least_squares(state.model, etfe, start=state.fit.theta), tuple(rest))
+    assert etfe.recording
+    bench = ForceBench(bare, etfe.recording)
+    motion = bench.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
+    variants = list(last.change.acting.effect.candidates(bare.model, motion))
+    found = fitted(bench, [search(bench, variants, motion, tick)], meter)
+    return _trial(bench, found[0]).state if found else state
 
 
 def _instead_of(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.acceptance import needless
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.battery import model_tests, residual_tests
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.samples.mend import SampleLook, look_at_samples, repair_measurement
@@ -15,13 +15,12 @@ from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.diagnosis.trials.force_bench import with_forces
 from bayeshaptic.diagnosis.trials.linear import Sight, first_sight, linear_trials
-from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
+from bayeshaptic.diagnosis.trials.nonlinear import found_anew, nonlinear_trials, reconsidered
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.least_squares import least_squares
-from bayeshaptic.models import Model
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings.response.etfe import Etfe, compress
-from bayeshaptic.types import Floats, Tick
+from bayeshaptic.recordings.response.etfe import compress
+from bayeshaptic.types import Tick
 
 
 class WindowTrials:
@@ -114,8 +113,11 @@ class WindowTrials:
         """With another law in the place of an earlier force, or the very same."""
         return reconsidered(state, meter, tick)
 
-    def without_needless(self, state: State) -> tuple[State, str | None]:
+    def without_needless(self, state: State, meter: Meter, tick: Tick) -> tuple[State, str | None]:
         """The state without the earlier effect that is worth least, if that is next to nothing.
+
+        A force that was found beside a linear effect is found anew without it: what the force
+        explains may be what the effect was taken for, which must convince beside it, too.
 
         Returns
         -------
@@ -124,19 +126,23 @@ class WindowTrials:
         name : str or None
             Of the effect that was taken out.
         """
-        full = _held_out(state.model, state.etfe, state.fit.theta)
-        worst, name, least = state, None, np.inf
+        full = _held_out(state)
+        spare, name, without = np.inf, "", state
         for index, effect in enumerate(state.accepted[:-1]):
             if effect.change is None:
                 continue
-            model, etfe, theta = _undone(state, effect.change)
+            other = _undone(state, index, effect.change)
             size = len(effect.parameters) + len(effect.estimates)
-            loss = full - _held_out(model, etfe, theta)
-            if needless(loss, size) and loss < least:
-                left = state.accepted[:index] + state.accepted[index + 1 :]
-                worst = State(etfe, least_squares(model, etfe, start=theta), left)
-                name, least = effect.name, loss
-        return worst, name
+            worth = full - _held_out(other) - thresholds.A_PARAMETER * size
+            if worth < spare:
+                spare, name, without = worth, effect.name, other
+        if spare < 0:
+            return without, name
+        if state.accepted[-1].family == "nonlinear" and without.model is not state.model:
+            other = found_anew(without, meter, tick)
+            if full - _held_out(other) < thresholds.ENOUGH:
+                return other, name
+        return state, None
 
 
 def _raised(tests: tuple[Test, ...], family: str) -> set[str]:
@@ -161,18 +167,21 @@ def _on_other_samples(trial: Trial) -> Trial:
     return replace(trial, state=replace(trial.state, accepted=linear))
 
 
-def _undone(state: State, change: Change) -> tuple[Model, Etfe, Floats]:
-    """Model, measurement and parameters without an effect."""
+def _undone(state: State, index: int, change: Change) -> State:
+    """The state without an effect."""
     model, etfe, theta = state.model, state.etfe, state.fit.theta
     if change.effect is not None:
         gone = {parameter.name for parameter in change.effect.parameters}
-        kept = [name not in gone for name in model.names]
-        return model.without_effect(change.effect), etfe, theta[kept]
-    return model, with_forces(etfe, (change,)), theta
+        theta = theta[[name not in gone for name in model.names]]
+        model = model.without_effect(change.effect)
+    else:
+        etfe = with_forces(etfe, (change,))
+    left = state.accepted[:index] + state.accepted[index + 1 :]
+    return State(etfe, least_squares(model, etfe, start=theta), left)
 
 
-def _held_out(model: Model, etfe: Etfe, theta: Floats) -> float:
+def _held_out(state: State) -> float:
     """Log likelihood of windows to choose by, after a fit to those to fit."""
-    windows = compress(etfe, lambda frequency_hz: model.response(theta, frequency_hz))
-    theta = fit_part(model, windows, theta)
-    return float(log_likelihoods(model, windows, theta)[1])
+    windows = compress(state.etfe, state.fit.response)
+    theta = fit_part(state.model, windows, state.fit.theta)
+    return float(log_likelihoods(state.model, windows, theta)[1])
