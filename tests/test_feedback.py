@@ -58,7 +58,7 @@ def test_the_response_is_not_mended_with_what_the_controller_did(closed: Closed)
 def test_the_report_tells_of_the_force_and_of_the_motion(closed: Closed, tmp_path: Path) -> None:
     page = text_of(bh.write_report(closed, tmp_path / "out"))
     check_page(closed, tmp_path / "out")
-    assert "The motion, simulated in the loop" in page and "feedback biases it" in page
+    assert "The motion, simulated in the same loop" in page and "feedback biases it" in page
     assert "The force, explained by the motion" in page and "What the model lacked" not in page
     assert "With dry (Coulomb) friction beside it" in page
     names = {path.name for path in (tmp_path / "out").glob("loop_*.png")}
@@ -82,7 +82,7 @@ def test_a_servo_without_friction_gets_none() -> None:
     assert "coulomb" not in [term.name for term in force.further.terms]
     mass, sd = force.first["mass"]
     assert abs(mass - 90.0) < max(4 * sd, 0.9)
-    said = force_words.in_short(force, "N") + force_words.found(force, "N")
+    said = force_words.in_short(force, "N") + force_words.found(force, "N", "")
     assert "friction" not in said
 
 

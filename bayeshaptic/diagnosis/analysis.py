@@ -26,6 +26,7 @@ from bayeshaptic.quantities import pure, quantity
 from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness
@@ -68,7 +69,8 @@ class Analysis(Shown):
     hidden : Hidden or None
         What could hide, where the limit allows for it.
     in_loop : InLoop or None
-        The motion that posterior and limit come from, where feedback biases the response.
+        The motion that posterior and limit come from, where feedback biases the response or a
+        force in open loop says too little of it; no limit is stated then.
     sampled : bool
         False where feedback makes the response worthless: `posterior` is then normal draws around
         the fit, for a picture, and no limit is stated.
@@ -127,10 +129,16 @@ class Analysis(Shown):
         state = "converged" if self.posterior.converged else "not converged"
         return (
             f"Analysis of {of} with the model {self.model.name}",
-            repr(self.limit).partition("\n")[0],
+            limit_line(self),
             f"reduced chi-square {quantity(self.fit.reduced_chi_square, '')}, sampler {state}, "
             f"{sum(n.level == 'warning' for n in self.notices)} warnings",
         )
+
+
+def limit_line(analysis: Analysis) -> str:
+    """The limit in a line, or why there is none."""
+    told = told_too_little(analysis.notices)
+    return repr(analysis.limit).partition("\n")[0] if told is None else f"No limit: {told.reason}"
 
 
 @single_threaded

@@ -29,7 +29,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.differences import with_differences
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
-from bayeshaptic.recordings.sufficiency import refuse_too_little
+from bayeshaptic.recordings.sufficiency import refuse_where_told, told_too_little, too_little
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded
 
@@ -114,13 +114,17 @@ class Clock:
 
 @dataclass(frozen=True)
 class Opened:
-    """A measurement that was checked, with its response; attributes are those of `Analysis`."""
+    """A measurement that was checked, with its response; attributes are those of `Analysis`.
+
+    `one_mass` says that the device was declared to be one.
+    """
 
     etfe: Etfe
     device: Device | None
     notices: tuple[Notice, ...]
     seconds: dict[str, float]
     lever_m: float | None
+    one_mass: bool
 
 
 @dataclass(frozen=True)
@@ -139,9 +143,10 @@ def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -
 @single_threaded
 def opened(measurement: Recording | Etfe, model: str | Model, options: Options) -> Opened:
     """Check the measurement, and estimate its response."""
-    model = base_model(model, options)
+    asked = base_model(model, options)
+    one_mass = (asked.name if isinstance(asked, Model) else asked) == "rigid"
     clock = Clock()
-    device = device_of(options, model)
+    device = device_of(options, asked)
     if isinstance(measurement, Recording):
         measurement = with_differences(measurement)
     measurement, notices = with_delay_of_the_loop(measurement, device, options)
@@ -150,9 +155,14 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             options.report(0.0, "checking the recording")
             whole = unbroken(measurement)
             notices += told(measurement.feedback, check_recording(whole, device))
-            measurement, notices = _opened(measurement, notices, model)
+            if one_mass:  # followed in time instead
+                measurement = replace(measurement, reference=None)
+            else:
+                measurement, notices = through_reference(measurement, notices)
             if not any(notice.topic == "feedback" for notice in notices):
-                refuse_too_little(whole)
+                notices += too_little(whole)
+                if not one_mass:
+                    refuse_where_told(whole, notices)
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
             etfe, notices = _response(measurement, options.band_hz, notices)
@@ -162,12 +172,13 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     lever_m = options.lever_m
     if lever_m is None and device is not None:
         lever_m = device.lever_m
-    return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m)
+    return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m, one_mass)
 
 
 @single_threaded
 def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
-    """Fit the base model to what was opened."""
+    """Fit the base model to what was opened, where the response says enough."""
+    refuse_where_told(found.etfe.recording, found.notices)
     clock = Clock(dict(found.seconds))
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
@@ -210,18 +221,9 @@ def with_delay_of_the_loop(
     return measurement.later(delay_s), ()
 
 
-def _opened(
-    recording: Recording, notices: tuple[Notice, ...], model: str | Model
-) -> tuple[Recording, tuple[Notice, ...]]:
-    """Read through its reference where one is known; one mass is followed in time instead."""
-    if (model.name if isinstance(model, Model) else model) == "rigid":
-        return replace(recording, reference=None), notices
-    return through_reference(recording, notices)
-
-
 def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
     """What no test looks for in pieces: the motion of one says nothing of how the next began."""
-    if not recording.joints or has_feedback(notices):
+    if not recording.joints or has_feedback(notices) or told_too_little(notices):
         return ()
     text = (
         "In several pieces taken as one neither drift nor faults of samples are looked for, and "
@@ -234,17 +236,17 @@ def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[
 def _response(
     recording: Recording, band_hz: tuple[float, float] | None, notices: tuple[Notice, ...]
 ) -> tuple[Etfe, tuple[Notice, ...]]:
-    """The response; one that feedback biases is for comparison only, and any band will do."""
+    """The response; one that nothing is read from is for comparison only, in any band."""
     try:
         return estimate_etfe(recording, band_hz), notices
     except InputError as error:
         if recording.reference is not None:
             notices = too_weak(notices, str(error))
-        elif not has_feedback(notices) or band_hz is not None:
+        elif not (has_feedback(notices) or told_too_little(notices)) or band_hz is not None:
             raise
     longest = max(piece.duration_s for piece in recording.pieces)
     widest = (1 / longest, _WIDEST / recording.period_s)
-    return estimate_etfe(replace(recording, reference=None), widest), notices
+    return estimate_etfe(replace(recording, reference=None), widest, fewest_tones=1), notices
 
 
 def _fit(

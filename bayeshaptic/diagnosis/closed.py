@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.analysis import Analysis, finish, without_sampling
+from bayeshaptic.diagnosis.analysis import Analysis, finish, limit_line, without_sampling
 from bayeshaptic.diagnosis.base_model import traced_as_of_the_loop
-from bayeshaptic.diagnosis.begun import Begun, Opened, base_model, fitted, measurement_of, opened
+from bayeshaptic.diagnosis.begun import Begun, Opened, fitted, measurement_of, opened
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
@@ -35,6 +35,7 @@ from bayeshaptic.models import Model
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.shown import Shown
 from bayeshaptic.threads import single_threaded
 
@@ -53,7 +54,7 @@ class Closed(Shown):
     before, after : mapping
         Errors in the form of ``summary.json``.
     force : ForceExplained or None
-        The force as the motion explains it, where feedback biases the response.
+        The force as the motion explains it, where nothing is read from the response.
     """
 
     base: Analysis
@@ -105,7 +106,7 @@ class Closed(Shown):
         return (
             f"Closed loop on {of}: {self.verdict}",
             f"added to the model {self.base.model.name}: {found}",
-            repr(self.analysis.limit).partition("\n")[0],
+            limit_line(self.analysis),
         )
 
 
@@ -139,8 +140,9 @@ def close_loop(
     chosen = options_from(options, changes)
     prior = HiddenPrior.from_table(chosen.effects)
     found = opened(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
-    force = explain_force(found.etfe.recording) if has_feedback(found.notices) else None
-    if force is not None and (followed := _in_loop(found, force, model, chosen)) is not None:
+    in_time = has_feedback(found.notices) or told_too_little(found.notices)
+    force = explain_force(found.etfe.recording) if in_time else None
+    if force is not None and (followed := _in_loop(found, force, chosen)) is not None:
         return followed
     begun = fitted(found, model, chosen.within(0.0, 0.5))
     if force is not None or is_certain(begun.notices):
@@ -184,13 +186,9 @@ def close_loop(
     return with_average(closed, prior, chosen) if chosen.hidden else closed
 
 
-def _in_loop(
-    found: Opened, force: ForceExplained, model: str | Model, options: Options
-) -> Closed | None:
+def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:
     """By the motion in its loop; None where it cannot be followed."""
-    asked = base_model(model, options)
-    one_mass = (asked.name if isinstance(asked, Model) else asked) == "rigid"
-    analysis = analyse_in_loop(found, one_mass, options.within(0.3, 0.95))
+    analysis = analyse_in_loop(found, options.within(0.3, 0.95))
     if analysis is None:
         return None
     traced = in_the_loop(trace_force(analysis.etfe, analysis.fit, force), analysis)
@@ -210,7 +208,7 @@ def _one_mass_instead(
         return None
     found = opened(measurement_of(measurement, model, options), "rigid", options)
     force = explain_force(found.etfe.recording)
-    closed = None if force is None else _in_loop(found, force, model, options)
+    closed = None if force is None else _in_loop(found, force, options)
     return None if closed is None or closed.verdict == UNEXPLAINED else closed
 
 

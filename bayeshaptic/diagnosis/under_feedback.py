@@ -1,4 +1,4 @@
-"""The analysis of a recording with feedback: posterior and limit from the motion in its loop."""
+"""The analysis by the motion, followed in time: posterior, and in closed loop the limit."""
 
 from __future__ import annotations
 
@@ -7,18 +7,26 @@ from dataclasses import replace
 
 from bayeshaptic.diagnosis.analysis import NO_WITNESS, Analysis
 from bayeshaptic.diagnosis.begun import Opened
-from bayeshaptic.diagnosis.feedback.in_loop import contradictions, follow_in_loop, open_questions
+from bayeshaptic.diagnosis.feedback.in_loop import (
+    UNSEEN,
+    contradictions,
+    follow_in_loop,
+    open_questions,
+)
 from bayeshaptic.diagnosis.feedback.lacking import Lacking
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
+from bayeshaptic.errors import Notice
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.fit import NAMES
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import percent
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.sufficiency import TOO_LITTLE, few_tones, told_too_little
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 _SEEN = 2.9  # Student's t of eight degrees of freedom: 1 in 100
@@ -27,22 +35,37 @@ _BIASED = (
     "for comparison only. The parameters and the limit are not read from it: they come from the "
     "motion of one mass with friction, simulated in the same loop beside the measured one."
 )
+_OPEN = (
+    "The recording was made in open loop. The parameters are not read from the response, but come "
+    "from the motion of one mass with friction, simulated under the same command beside the "
+    "measured one. They are those of this motion: at other frequencies, and under other forces, "
+    "the device may be another, so that no stiffness follows from them."
+)
+_TONES = (
+    "What is like one mass at a tone's frequency, such as a base that gives, a tone cannot tell "
+    f"from one: {percent(UNSEEN)} of the force is allowed for that in mass and damping (sd)."
+)
 
 
-def analyse_in_loop(begun: Opened, one_mass: bool, options: Options) -> Analysis | None:
-    """The analysis by the motion in the loop; None where no such motion can be found.
+def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
+    """The analysis by the motion in the loop, or in open loop where that says too little.
+
+    None where no such motion can be found; and in open loop, which is refused then, where anything
+    speaks against it.
 
     Parameters
     ----------
     begun : Opened
-    one_mass : bool
-        Whether the device was declared to be one: otherwise no limit is recommended.
+        Where the device was not declared to be one mass no limit is recommended.
     options : Options
     """
     began = time.perf_counter()
     recording = begun.etfe.recording
     found = None if recording is None else follow_in_loop(recording)
     if recording is None or found is None:
+        return None
+    open_loop = told_too_little(begun.notices) is not None
+    if open_loop and found.doubts:
         return None
     delay = options.delay_s, options.delay_sd_s
     model = rigid_with_friction(recording, found.motion, begun.device, *delay, options.prior)
@@ -61,7 +84,9 @@ def analyse_in_loop(begun: Opened, one_mass: bool, options: Options) -> Analysis
     posterior = replace(posterior, windows=None, etfe=None)
     limit = watch.limit_of(posterior)
     doubts = found.doubts + contradictions(found.motion, posterior)
-    questions = open_questions(found, posterior, limit, one_mass)
+    if open_loop and doubts:
+        return None
+    questions = open_questions(found, posterior, limit, begun.one_mass)
     told = tuple(replace(n, text=_BIASED) if n.topic == "feedback" else n for n in begun.notices)
     return Analysis(
         recording=recording,
@@ -73,11 +98,17 @@ def analyse_in_loop(begun: Opened, one_mass: bool, options: Options) -> Analysis
         posterior=posterior,
         limit=limit,
         etfe_limit=EtfeCriticalStiffness(None, None, None, None, limit.unit, NO_WITNESS),
-        notices=told + limit.notices,
+        notices=told + (_open_loop(recording) if open_loop else limit.notices),
         seconds={**begun.seconds, "motion in the loop": time.perf_counter() - began},
         lever_m=begun.lever_m,
         in_loop=replace(found, doubts=doubts, questions=questions),
     )
+
+
+def _open_loop(recording: Recording) -> tuple[Notice, ...]:
+    """What the parameters of a motion in open loop are worth."""
+    text = _OPEN if few_tones(recording) is None else f"{_OPEN} {_TONES}"
+    return (Notice("note", TOO_LITTLE, text),)
 
 
 def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:

@@ -1,16 +1,18 @@
 """Recordings that say too little of a device for a stiffness to follow from them.
 
 Refused before anything is fitted, each with the reason and what to do: a posterior of such a
-recording is its prior, or worse, a confident answer to another question.
+recording is its prior, or worse, a confident answer to another question.  The motion of one mass
+may be followed in time all the same, and a warning then says why no stiffness comes of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
@@ -38,6 +40,7 @@ _IDLE_S = 0.1
 _USUAL_COUNTS = 30.0
 _FEWEST = 20
 
+TOO_LITTLE = "too little"  # the topic of a warning
 _USUAL = (
     "record some 30 s of white noise or of a multisine (bayeshaptic simulate phantom -o noise.csv "
     "shows such a recording)"
@@ -57,11 +60,45 @@ def refuse_too_little(recording: Recording) -> None:
     InputError
         With the reason, and what to do.
     """
-    for look in _LOOKS:
-        reason = look(recording)
-        if reason is not None:
-            where = recording.source or recording.name
-            raise InputError(f"{where}: too little to find a stiffness from: {reason}")
+    refuse_where_told(recording, too_little(recording))
+
+
+def too_little(recording: Recording) -> tuple[Notice, ...]:
+    """The warning that a recording in open loop says too little, and what to do; or none."""
+    reasons = (look(recording) for look in _LOOKS)
+    reason = next((reason for reason in reasons if reason is not None), None)
+    if reason is None:
+        return ()
+    return (Notice("warning", TOO_LITTLE, f"Too little to find a stiffness from: {reason}."),)
+
+
+class TooLittle(NamedTuple):
+    """Why a recording says too little, and what to do."""
+
+    reason: str
+    cure: str
+
+
+def told_too_little(notices: Iterable[Notice]) -> TooLittle | None:
+    """What a warning says of a recording that says too little; None without one."""
+    for notice in notices:
+        if (notice.level, notice.topic) == ("warning", TOO_LITTLE):
+            reason, _, cure = notice.text.rstrip(".").partition("; ")
+            return TooLittle(reason[0].lower() + reason[1:], cure)
+    return None
+
+
+def refuse_where_told(recording: Recording | None, notices: Iterable[Notice]) -> None:
+    """Refuse a recording of which `notices` say that it says too little.
+
+    Raises
+    ------
+    InputError
+    """
+    told = told_too_little(notices)
+    if told is not None and recording is not None:
+        where = recording.source or recording.name
+        raise InputError(f"{where}: {told.reason}; {told.cure}")
 
 
 def _short(recording: Recording) -> str | None:
@@ -86,7 +123,8 @@ def _few_steps(recording: Recording) -> str | None:
     )
 
 
-def _few_tones(recording: Recording) -> str | None:
+def few_tones(recording: Recording) -> str | None:
+    """Why so few tones as the force has say too little; None where there are enough."""
     force = recording.force - recording.force.mean()
     power = np.abs(np.fft.rfft(force * np.hanning(len(force)))) ** 2
     faint = 1e-4  # of the strongest line's power
@@ -158,10 +196,11 @@ def _unanswered(recording: Recording) -> str | None:
     )
 
 
+# Each says what is too little and, behind a semicolon, what to do.
 _LOOKS: tuple[Callable[[Recording], str | None], ...] = (
     _short,
     _few_steps,
-    _few_tones,
+    few_tones,
     _no_force,
     _standstill,
     _unanswered,

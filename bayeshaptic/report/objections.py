@@ -12,6 +12,7 @@ from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
     misfit_factor,
@@ -33,6 +34,8 @@ _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 def why_none(result: Result) -> tuple[str, ...]:
     """Why no stiffness can be recommended; empty where one can."""
     analysis, closed = result.analysis, result.closed
+    if told_too_little(analysis.notices) and (reason := unstated(analysis)) is not None:
+        return (reason,)
     found = _of_the_analysis(analysis, closed.diagnosis if closed else None)
     if closed and _rubs_otherwise(closed):
         found.append(

@@ -20,6 +20,7 @@ from bayeshaptic.quantities import (
     spread_of,
 )
 from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
@@ -189,6 +190,8 @@ def _excitation(analysis: Analysis) -> str:
         return "computed from the motion"
     if analysis.etfe.through_reference:
         return "of a controller, read through what it followed"
+    if told_too_little(analysis.notices):
+        return "too little of a response"
     lines = analysis.etfe.period_lines
     return "random" if lines is None else f"periodic, {lines} excited lines"
 

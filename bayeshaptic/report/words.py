@@ -11,6 +11,7 @@ from scipy.stats import binom
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.quantities import estimate, interval, percent, pure, quantity
+from bayeshaptic.report.loop.followed import followed
 from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
 from bayeshaptic.report.numbers.octaves import EXPECTED, third_octaves
@@ -33,8 +34,8 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
     """How the residual compares with the noise, and where it is worst."""
     if analysis.in_loop is not None:
         return (
-            "Feedback biases the measured response, and the model was not fitted to it but to the "
-            "motion: where the two differ here, the response is wrong, or more than one mass moves."
+            f"{followed(analysis).response} The model was not fitted to it but to the motion: "
+            "where the two differ here, the response is wrong, or more than one mass moves."
         )
     if not analysis.sampled:
         return (

@@ -21,6 +21,7 @@ from bayeshaptic.models import prior_from_table
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study, StudyEntry
+from bayeshaptic.recordings.sufficiency import refuse_where_told
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit
 from bayeshaptic.study.analysed import Analysed
@@ -216,7 +217,10 @@ def analyse_entry(task: Task, progress: Progress | None = None) -> Result:
     modes = None if held else task.options.modes  # of the device by itself
     options = replace(task.options, held=held, modes=modes, progress=progress)
     run = close_loop if task.close_loop else analyse
-    return run(task.study.read(task.entry), task.model, options)
+    result = run(task.study.read(task.entry), task.model, options)
+    # The limits of a study leave out what has none.
+    refuse_where_told(result.analysis.recording, result.analysis.notices)
+    return result
 
 
 def _analysed(

@@ -77,6 +77,9 @@ def _of(closed: Closed, case: Case) -> dict[str, Any]:
         },
         "stiffness": None if told.stiffness is None else float(told.stiffness / case.truth),
         "parameters": _intervals(closed, case),
+        "left open": [
+            name for name, left in closed.analysis.stated.prior_dominated.items() if left
+        ],
     }
 
 
@@ -86,7 +89,7 @@ def _intervals(closed: Closed, case: Case) -> dict[str, list[float]]:
         return {}
     stated = closed.analysis.stated
     ends = dict(zip(stated.names, stated.quantile(np.array([0.05, 0.95])).T, strict=True))
-    return {name: (ends[name] / value).tolist() for name, value in case.parameters.items()}
+    return {n: (ends[n] / value).tolist() for n, value in case.parameters.items() if n in ends}
 
 
 def line(row: dict[str, Any]) -> str:
@@ -140,6 +143,11 @@ def summary(rows: list[dict[str, Any]]) -> None:
             f"{verdict}: 90 % intervals hold {inside} of {len(some)} limits and "
             f"{sum(low <= 1 <= high for low, high in known)} of {len(known)} parameters"
         )
+    for name in dict.fromkeys(name for row in rows for name in row.get("parameters", ())):
+        told = [row for row in rows if name in row.get("parameters", ())]
+        known = [row["parameters"][name] for row in told if name not in row["left open"]]
+        inside = sum(low <= 1 <= high for low, high in known)
+        print(f"{name}: 90 % intervals hold {inside} of {len(known)}, {len(told)} with those open")
     defects = [row["seed"] for row in rows if row["outcome"] == "DEFECT"]
     print(f"defects: {defects or 'none'}; warnings: {[r['seed'] for r in rows if r['warned']]}")
 

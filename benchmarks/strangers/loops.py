@@ -1,6 +1,6 @@
 """Recordings of strangers that were not made with noise in open loop: what becomes of each?
 
-    python -m benchmarks.strangers.loops [COUNT] [FIRST] [FILE] [--one-mass]
+    python -m benchmarks.strangers.loops [COUNT] [FIRST] [FILE] [--one-mass | --open-loop]
 
 Devices and undeclared effects of `draw`, half of the free ones of one mass.  Two in three are in a
 loop of a P, PD, PI, PID or filtered controller that reads the counts, now and then cut off at its
@@ -10,6 +10,9 @@ column, a declared controller.  FILE keeps what is done, a line a recording.
 
 With --one-mass those that are free, of one mass, in a loop and 2.5 s long at least, and said to be
 one mass and free: there a stiffness can be had without a reference.
+
+With --open-loop those under steps, pulses or a tone in open loop, free, of one mass and said to be
+so: which parameters are told, and how often their 90 % intervals hold the truth.
 """
 
 from __future__ import annotations
@@ -48,6 +51,7 @@ from benchmarks.strangers.motion import Forces, Law
 CONTROLLERS = ("P", "PD", "PD", "PI", "PID", "PD filtered", "PID filtered")
 REFERENCES = ("steps", "ramps", "way", "noise")
 OPEN = ("force steps", "pulses", "tone")
+_LAGS = {"amplifier 1", "amplifier 2", "sensor"}  # which the loop's delay has to stand for
 
 
 def make(seed: int) -> Case | None:
@@ -77,7 +81,8 @@ def make(seed: int) -> Case | None:
     made = _simulated(draw, sizes, device, wanted, law, period_s, delay_s)
     if made is None:
         return None
-    force, position, count = as_logged(draw, effects, *made, period_s)
+    force, position, friction = made
+    force, position, count = as_logged(draw, effects, force, position, period_s)
     if law is not None and "coarse" not in effects:
         count = law.count
     position = count * np.round(position / count)
@@ -99,7 +104,14 @@ def make(seed: int) -> Case | None:
     known = ", ".join([*told, *also]) or "nothing"
     masses = len(draw.values["m"])
     what = f"{draw.kind} {masses}, {name}, {kind}, {seconds:.1f} s, told {known}"
-    return Case(recording, told, what, effects, truth, *base_of(draw.values))
+    base, parameters = base_of(draw.values)
+    if base == "rigid" and not set(effects) & _LAGS:
+        parameters["delay_s"] = delay_s
+    if base == "rigid" and set(effects) & {"warming up", "eddy"}:
+        del parameters["b"]  # it is not one number
+    if base == "rigid" and "coulomb" in effects:
+        parameters["coulomb"] = friction
+    return Case(recording, told, what, effects, truth, base, parameters)
 
 
 def _law(draw: Draw, truth: float, period_s: float) -> tuple[Law, str]:
@@ -160,8 +172,8 @@ def _simulated(
     law: Law | None,
     period_s: float,
     delay_s: float,
-) -> tuple[Array, Array] | None:
-    """Command and motion; first without forces, for the scale of these."""
+) -> tuple[Array, Array, float] | None:
+    """Command, motion and dry friction; first without forces, for the scale of these."""
     motion = motion_of(draw, sizes, device, len(wanted), period_s, delay_s)
     quiet, command = np.zeros(len(wanted)), wanted.copy()
     linear = motion.under(command, quiet, Forces(), law)
@@ -174,7 +186,7 @@ def _simulated(
     far = 20.0
     if made is None or np.abs(made).max() > far * np.abs(linear).max() or not made.std() > 0:
         return None
-    return command, made
+    return command, made, forces.friction
 
 
 def one(seed: int) -> Row:
@@ -198,15 +210,26 @@ def one_mass(seed: int) -> Row:
     return {"seed": seed} | analysed(replace(case, told=told))
 
 
+def open_loop(seed: int) -> Row:
+    """The same in open loop, of any length; delay and friction are parameters, too."""
+    case = make(seed)
+    if case is None or case.base != "rigid" or "open loop" not in case.what:
+        return {"seed": seed} | analysed(None)
+    told = {"model": "rigid", "held": False}
+    return {"seed": seed} | analysed(replace(case, told=told))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=40)
     parser.add_argument("first", nargs="?", type=int, default=0)
     parser.add_argument("file", nargs="?", type=Path)
-    parser.add_argument("--one-mass", action="store_true")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--one-mass", dest="one", action="store_const", const=one_mass, default=one)
+    which.add_argument("--open-loop", dest="one", action="store_const", const=open_loop)
     asked = parser.parse_args()
     seeds = range(asked.first, asked.first + asked.count)
-    kept(seeds, asked.file, one_mass if asked.one_mass else one)
+    kept(seeds, asked.file, asked.one)
 
 
 if __name__ == "__main__":

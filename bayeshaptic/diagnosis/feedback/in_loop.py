@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import pure, quantity
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.sufficiency import few_tones
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.types import Floats
 
@@ -26,6 +27,9 @@ WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
 # Standard deviations (Student's t, eight degrees of freedom: 1 in 200) from which on the motion
 # contradicts what was given.
 _CONTRADICTED = 3.83
+# Share of the force (one standard deviation) that may be anything but one mass where its few tones
+# cannot tell: a base that gives, eddy currents, a gain that ripples.
+UNSEEN = 0.01
 _CENTRAL = 1.6449  # standard deviations that hold 90 %
 _DIMENSIONS = {"m": "mass", "b": "damping", "delay_s": "time"}
 _WORDS = {"m": "mass", "b": "viscous damping", "delay_s": "delay"}
@@ -67,6 +71,22 @@ class InLoop:
 
 def follow_in_loop(recording: Recording) -> InLoop | None:
     """Fit the motion of one mass; None where none can be found beside the measured one."""
+    found = _with_halves(recording)
+    if found is None or few_tones(recording) is None:
+        return found
+    return replace(found, motion=_like_one_mass(found.motion, recording))
+
+
+def _like_one_mass(motion: MotionFit, recording: Recording) -> MotionFit:
+    """With what a tone cannot tell from mass and damping in the widths of these."""
+    velocity = np.gradient(motion.simulated, recording.period_s)
+    spread, size = motion.covariance.copy(), UNSEEN * float(np.std(recording.force))
+    for name, moves in (("m", np.gradient(velocity, recording.period_s)), ("b", velocity)):
+        spread[NAMES.index(name), NAMES.index(name)] += (size / float(np.std(moves))) ** 2
+    return replace(motion, covariance=spread)
+
+
+def _with_halves(recording: Recording) -> InLoop | None:
     follower = _declared(recording)
     parts = _halves(recording)
     try:
@@ -169,11 +189,13 @@ def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
 
 
 def _halves(recording: Recording) -> tuple[Recording, Recording]:
-    """Its first and its second half; of pieces every other one."""
+    """The first and the second half of its way; of pieces every other one."""
     pieces = recording.pieces
     if len(pieces) > 3:
         return join_recordings(pieces[::2]), join_recordings(pieces[1::2])
-    middle = recording.samples // 2
+    way = np.cumsum(np.abs(np.diff(recording.position)))
+    shortest = recording.samples // 4
+    middle = int(np.clip(np.searchsorted(way, 0.5 * way[-1]), shortest, 3 * shortest))
     return recording.part(0, middle), recording.part(middle, recording.samples)
 
 

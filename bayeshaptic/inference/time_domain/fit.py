@@ -22,13 +22,16 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.acting import COULOMB, Acting
 from bayeshaptic.inference.time_domain.days import between_pieces
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
-from bayeshaptic.inference.time_domain.loop import Loop
+from bayeshaptic.inference.time_domain.loop import FORCES, Loop
+from bayeshaptic.inference.time_domain.one_way import one_way
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, Way, ridge
 from bayeshaptic.inference.time_domain.widths import covariance, mean_of_uneven
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
 NAMES = ("m", "b", "coulomb", "offset", "delay_s")
+_STUCK = 0.5  # of the error's power, that a settled fit does not promise to take away
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,7 @@ def fit_motion(
     apart = second.values - first.values
     whole = first.covariance + np.outer(apart, apart)
     spread = whole[: len(NAMES), : len(NAMES)].copy()
-    for index in (NAMES.index("coulomb"), NAMES.index("offset")):
+    for index in FORCES:
         spread[index, index] += 0.5 * mean_of_uneven(first.found)
     assert loop.follower is not None
     return MotionFit(
@@ -196,12 +199,19 @@ def _fit(loop: Loop, start: Floats, name: str) -> _Found:
                 break
     error, columns, solved = _linearised(loop, values, uneven, True, name)
     left = error + columns[:, plain:] @ uneven - columns @ solved.solution
+    promised = error + columns[:, plain:] @ uneven - columns @ _within(loop, values, solved)
+    # Where no step is any better, but a line promises much, it is stuck.
+    converged = converged and bool(promised @ promised > (1 - _STUCK) * (error @ error))
     spread = covariance(columns, left, solved, loop.independent)
     friction = np.array([NAMES.index("b"), NAMES.index("coulomb")])
     own = loop.pieces, friction, loop.beginnings
     spread = (spread + between_pieces(columns, left, solved, *own, loop.independent))[
         :plain, :plain
     ]
+    # A fit that leaves less than rounding does, as where the mass rests for long, follows that.
+    rounded = (increment_unit(loop.position) or 0.0) ** 2 / 12
+    spread *= max(1.0, rounded * len(left) / float(left @ left))
+    spread += one_way(loop, values, uneven, columns, solved, spread)
     best = values + solved.solution[:plain]
     return _Found(best, values, uneven, spread, error, solved, converged)
 
@@ -219,7 +229,7 @@ def _linearised(
         columns[:, plain:] = 0.0
     size = float(np.std(loop.force))
     target = error + columns[:, plain:] @ uneven
-    return error, columns, ridge(columns, target, plain, size, loop.independent)
+    return error, columns, ridge(columns, target, plain, size, loop.independent, loop.reach)
 
 
 def _step(
@@ -229,17 +239,34 @@ def _step(
     plain, lowest, highest = loop.plain, loop.lowest, loop.highest
     penalty = solved.share[plain:]
     before = float(error @ error + penalty @ uneven**2)
-    share = 1.0
+    share, step = 1.0, _within(loop, values, solved)
     for _ in range(6):
-        trial = np.clip(values + share * solved.solution[:plain], lowest, highest)
+        trial = np.clip(values + share * step[:plain], lowest, highest)
         trial[0] = np.clip(trial[0], 0.5 * values[0], 2 * values[0])
-        more = uneven + share * (solved.solution[plain:] - uneven)
+        more = uneven + share * (step[plain:] - uneven)
         left = loop.error(trial, more)
         after = float(left @ left + penalty @ more**2)
         if after < before:
             return trial, more, 1 - after / before
         share *= 0.4
     return None
+
+
+def _within(loop: Loop, values: Floats, solved: Ridge) -> Floats:
+    """The solution where no value leaves what is possible: the others make up for those held."""
+    plain = loop.plain
+    low, high = loop.lowest - values, loop.highest - values
+    step, held = solved.solution, np.zeros(plain, dtype=bool)
+    for _ in range(plain):
+        out = ~held & ((step[:plain] < low) | (step[:plain] > high))
+        if not np.any(out):
+            break
+        held |= out
+        (at,) = np.nonzero(held)
+        beyond = solved.solution[at] - np.clip(solved.solution[at], low[at], high[at])
+        own = solved.inverse[np.ix_(at, at)]
+        step = solved.solution - solved.inverse[:, at] @ np.linalg.solve(own, beyond)
+    return step
 
 
 def _inverse_dynamics(recording: Recording) -> Floats:
@@ -255,8 +282,12 @@ def _inverse_dynamics(recording: Recording) -> Floats:
     columns, target = [], []
     for piece, v in zip(recording.pieces, speeds, strict=True):
         sign = sosfiltfilt(low, np.tanh(v / (0.02 * usual)))
-        columns.append(np.stack([np.gradient(v, period_s), v, sign, np.ones_like(v)], 1))
-        target.append(sosfiltfilt(low, piece.force))
+        # At its ends the filter takes a motion that goes on for one that stops.
+        edge = min(round(2 / band), len(v) // 8)
+        inside = slice(edge, len(v) - edge)
+        design = np.stack([np.gradient(v, period_s), v, sign, np.ones_like(v)], 1)
+        columns.append(design[inside])
+        target.append(sosfiltfilt(low, piece.force)[inside])
     design = np.concatenate(columns)
     mass, damping, dry, offset = np.linalg.lstsq(design, np.concatenate(target), rcond=None)[0]
     if not mass > 0:

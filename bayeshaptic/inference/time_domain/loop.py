@@ -14,6 +14,8 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats, Ints
 
 SHARED = 5  # mass, damping, dry friction, constant force, delay: the same in all pieces
+FORCES = [2, 3]  # of these dry friction and constant force
+_LARGEST = 10.0  # of the command's rms: no friction, and no constant force, is larger
 _LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
 
 
@@ -80,6 +82,18 @@ class Loop:
         """Above which no value may go, shape (plain,)."""
         most = self.forces.most
         return np.append(np.full(self.plain - len(most), np.inf), most)
+
+    @property
+    def reach(self) -> Floats:
+        """How far from here any value may be where nothing says more, shape (plain,).
+
+        What a mass that friction holds is begun with is lost within a sample, and slopes say that
+        it could have any velocity.
+        """
+        found = np.full(self.plain, np.inf)
+        found[FORCES] = _LARGEST * np.std(self.force)
+        found[[own[1] for own in self.beginnings]] = np.std(np.diff(self.position)) / self.period_s
+        return found
 
     @property
     def pieces(self) -> list[slice]:

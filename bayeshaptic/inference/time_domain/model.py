@@ -9,8 +9,17 @@ import numpy as np
 
 from bayeshaptic.devices import Device
 from bayeshaptic.inference.time_domain.fit import MotionFit
-from bayeshaptic.models import HalfNormal, LogNormal, Model, Normal, Parameter, Prior, build_model
+from bayeshaptic.models import (
+    LogNormal,
+    MaybeZero,
+    Model,
+    Normal,
+    Parameter,
+    Prior,
+    build_model,
+)
 from bayeshaptic.models.build import delay_prior
+from bayeshaptic.models.prior_of_zero import SPIKE_OF_MOTOR
 from bayeshaptic.recordings.recording import Recording
 
 
@@ -47,14 +56,14 @@ def rigid_with_friction(
     mass_log_sd = 1.0
     weak: dict[str, Prior] = {
         "m": LogNormal(mass, mass_log_sd),
-        "b": HalfNormal(2 * np.pi * motion.bandwidth_hz * mass),
+        "b": MaybeZero(2 * np.pi * motion.bandwidth_hz * mass, weight=SPIKE_OF_MOTOR),
     }
     free = delay_prior(None, None, period_s)
     assert free is not None
     weak["delay_s"] = free
     known = [replace(p, prior=p.prior or weak[p.name]) for p in base.parameters]
     friction = [
-        Parameter("coulomb", "force", "dry (Coulomb) friction", HalfNormal(size)),
+        Parameter("coulomb", "force", "dry (Coulomb) friction", MaybeZero(size)),
         Parameter("offset", "force", "constant force against the command", Normal(0.0, size)),
     ]
     late = [p for p in known if p.name == "delay_s"]

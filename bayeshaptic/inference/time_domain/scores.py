@@ -53,7 +53,7 @@ def scores(motion: MotionFit, recording: Recording, forces: Sequence[Floats]) ->
     columns = loop.columns(values, uneven, error)
     target = error + columns[:, plain:] @ uneven
     size = float(np.std(loop.force))
-    found = ridge(columns, target, plain, size, loop.independent)
+    found = ridge(columns, target, plain, size, loop.independent, loop.reach)
     left = target - columns @ found.solution
     scored: list[Score | None] = []
     for force in forces:

@@ -59,7 +59,14 @@ class Ridge:
     used: float
 
 
-def ridge(columns: Floats, target: Floats, plain: int, size: float, effective: float) -> Ridge:
+def ridge(
+    columns: Floats,
+    target: Floats,
+    plain: int,
+    size: float,
+    effective: float,
+    reach: Floats | None = None,
+) -> Ridge:
     """Fit `target`, with prior variances by the largest marginal likelihood.
 
     Parameters
@@ -72,6 +79,8 @@ def ridge(columns: Floats, target: Floats, plain: int, size: float, effective: f
         Of the command, which the priors are scaled by.
     effective : float
         Number of independent samples that the N are worth.
+    reach : ndarray, shape (plain,), optional
+        How far the first may go (prior standard deviations) where nothing holds them.
     """
     gram, along = columns.T @ columns, columns.T @ target
     scale = np.sqrt(np.diag(gram))
@@ -90,6 +99,8 @@ def ridge(columns: Floats, target: Floats, plain: int, size: float, effective: f
                 best, prior, noise = evidence, variances, at_best
     # What a recording leaves open (friction beside a constant force, where nothing turns) is open.
     weight = _OPEN * scale**2
+    if reach is not None:
+        weight[:plain] = np.maximum(weight[:plain], found.thin * noise / reach**2)
     variances = np.append(found.thin * noise / weight[:plain], prior)
     weight[plain:] += found.thin * noise / prior
     inverse = np.linalg.inv(gram + np.diag(weight / scale**2))

@@ -110,3 +110,23 @@ def responds_until(excess: NDArray[Any], reach: int = 4) -> int | None:
     count = np.convolve(np.ones_like(excess), kernel, mode="same")
     found = np.flatnonzero(total / np.sqrt(count) > 4)
     return int(found[-1]) if len(found) else None
+
+
+def refuse_band(band_hz: tuple[float, float] | None, period_s: float) -> None:
+    """Refuse a band that makes no sense; None is any.
+
+    Raises
+    ------
+    InputError
+    """
+    if band_hz is None:
+        return
+    low, high = band_hz
+    nyquist = 0.5 / period_s
+    if not 0 < low < high:
+        raise InputError(f"band {low:g} to {high:g} Hz: it must be 0 < low < high")
+    if not high <= nyquist * (1 + 1e-9):
+        raise InputError(
+            f"band {low:g} to {high:g} Hz: it ends above the Nyquist frequency, {nyquist:g} Hz "
+            f"at a period of {period_s:g} s"
+        )

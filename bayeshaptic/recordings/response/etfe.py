@@ -14,6 +14,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.quantities import interval, pretty_unit, pure
 from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.band import refuse_band
 from bayeshaptic.recordings.response.periodic_excitation import estimate_periodic
 from bayeshaptic.recordings.response.random_excitation import estimate_random
 from bayeshaptic.recordings.response.spectra import (
@@ -24,6 +25,7 @@ from bayeshaptic.recordings.response.spectra import (
     TableSpectra,
 )
 from bayeshaptic.recordings.response.windows import Reference, Windows
+from bayeshaptic.recordings.signals.excitation import FEWEST_LINES
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.threads import single_threaded
 
@@ -161,6 +163,7 @@ def estimate_etfe(
     band_hz: tuple[float, float] | None = None,
     *,
     minimum_lines: int | None = None,
+    fewest_tones: int = FEWEST_LINES,
 ) -> Etfe:
     """Estimate the response from commanded force to position, with its variance.
 
@@ -174,6 +177,8 @@ def estimate_etfe(
     minimum_lines : int, optional
         DFT lines in the narrowest window of a random excitation, at least 10. By default 24, and 12
         where the recording is shorter than 10 s.
+    fewest_tones : int
+        Excited lines that a periodic excitation must have; fewer than 5 are for looking at alone.
 
     Returns
     -------
@@ -191,7 +196,9 @@ def estimate_etfe(
     _check(recording, band_hz)
     if minimum_lines is not None and minimum_lines < 10:
         raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
-    found = None if recording.reference is not None else estimate_periodic(recording, band_hz)
+    found = None
+    if recording.reference is None:
+        found = estimate_periodic(recording, band_hz, fewest_tones)
     spectra: PeriodicSpectra | RandomSpectra
     spectra, points, notices = found or estimate_random(recording, band_hz, minimum_lines)
     return Etfe(
@@ -277,17 +284,7 @@ def _check(recording: Recording, band_hz: tuple[float, float] | None) -> None:
                 f"{recording.name}: the {name} is {values[0]:g} in all {len(values)} samples; "
                 "a frequency response needs a force that varies and a position that answers"
             )
-    if band_hz is None:
-        return
-    low, high = band_hz
-    nyquist = 0.5 / recording.period_s
-    if not 0 < low < high:
-        raise InputError(f"band {low:g} to {high:g} Hz: it must be 0 < low < high")
-    if not high <= nyquist * (1 + 1e-9):
-        raise InputError(
-            f"band {low:g} to {high:g} Hz: it ends above the Nyquist frequency, {nyquist:g} Hz "
-            f"at a period of {recording.period_s:g} s"
-        )
+    refuse_band(band_hz, recording.period_s)
 
 
 def compress(

@@ -33,7 +33,7 @@ FEWEST_BETWEEN, MOST_BETWEEN = 20, 60
 
 
 def estimate_periodic(
-    recording: Recording, band_hz: tuple[float, float] | None
+    recording: Recording, band_hz: tuple[float, float] | None, fewest: int = FEWEST_LINES
 ) -> tuple[PeriodicSpectra, Points, tuple[Notice, ...]] | None:
     """Spectra, and what a person sees, of a recording with periodic excitation.
 
@@ -42,6 +42,8 @@ def estimate_periodic(
     recording : Recording
     band_hz : (low, high) or None
         All excited lines where the response stands out when None.
+    fewest : int
+        Excited lines that are asked for.
 
     Returns
     -------
@@ -51,7 +53,7 @@ def estimate_periodic(
     Raises
     ------
     InputError
-        When fewer than `FEWEST_LINES` excited lines are in the band.
+        When fewer than `fewest` excited lines are in the band.
     """
     repetition = find_repetition(recording.force)
     if repetition is None:
@@ -64,7 +66,8 @@ def estimate_periodic(
     if band_hz is not None:
         inside = (frequency >= band_hz[0] * (1 - 1e-9)) & (frequency <= band_hz[1] * (1 + 1e-9))
         harmonics = harmonics[inside]
-    _check_count(recording, harmonics, band_hz)
+    if len(harmonics) < fewest:
+        _refuse_few(recording, len(harmonics), band_hz)
     transient = transient_periods(position, harmonics)
     kept = position[transient:]
     spectra = _spectra(recording, force[transient:], kept, harmonics)
@@ -131,15 +134,11 @@ def _periods(recording: Recording, repetition: Repetition) -> tuple[NDArray[Any]
     return force, recording.position[first:stop].reshape(count, period)
 
 
-def _check_count(
-    recording: Recording, harmonics: NDArray[np.int64], band_hz: tuple[float, float] | None
-) -> None:
-    if len(harmonics) >= FEWEST_LINES:
-        return
+def _refuse_few(recording: Recording, lines: int, band_hz: tuple[float, float] | None) -> None:
     where = "" if band_hz is None else f" in the band {band_hz[0]:g} to {band_hz[1]:g} Hz"
     cure = "excite more frequencies" if band_hz is None else "widen the band"
     raise InputError(
-        f"{recording.name}: the periodic force excites {len(harmonics)} lines{where}, a model "
+        f"{recording.name}: the periodic force excites {lines} lines{where}, a model "
         f"needs {FEWEST_LINES}; {cure}"
     )
 

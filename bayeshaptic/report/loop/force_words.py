@@ -8,24 +8,25 @@ import numpy as np
 
 from bayeshaptic.inference.time_domain.fit import NAMES
 from bayeshaptic.quantities import pure, quantity, scale
+from bayeshaptic.report.loop.followed import followed
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.feedback.explain import ForceExplained
-    from bayeshaptic.diagnosis.feedback.in_loop import InLoop
     from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics
-    from bayeshaptic.recordings.recording import Recording
     from bayeshaptic.report.numbers.rows import Rows
 
 _DASH = "\N{EN DASH}"
 
 
-def found(force: ForceExplained, unit: str) -> str:
-    """One paragraph: what the motion explains of the force, and with which terms."""
+def found(force: ForceExplained, unit: str, response: str) -> str:
+    """One paragraph: what the motion explains of the force, and with which terms.
+
+    `response` says why nothing is read from that.
+    """
     linear, *added = force.further.steps
     why = (
-        "The force was computed from the motion, so the measured response is biased, and so is all "
-        "that is read from it. The equation of motion holds in spite of the feedback: below "
+        f"{response} The equation of motion holds in spite of that: below "
         f"{quantity(force.further.cutoff_hz, 'Hz')}, a mass with a damper and a constant force "
         f"leaves {quantity(linear.held_out_rms, unit)} rms of the force unexplained"
     )
@@ -83,12 +84,12 @@ def coefficients(force: ForceExplained) -> Rows:
     )
 
 
-def remains(force: ForceExplained, in_loop: InLoop | None) -> str:
+def remains(force: ForceExplained, analysis: Analysis) -> str:
     """What is left of the force, all of it fitted."""
     limit = (
         "No limit follows from this: for a critical stiffness, record with an external excitation."
-        if in_loop is None
-        else "The limit does not rest on these numbers, but on the motion."
+        if analysis.in_loop is None
+        else f"{followed(analysis).told} do not rest on these numbers, but on the motion."
     )
     first, further = (pure(100 * f.relative_error, 3) for f in (force.first, force.further))
     return (
@@ -98,14 +99,17 @@ def remains(force: ForceExplained, in_loop: InLoop | None) -> str:
     )
 
 
-def motion(found: InLoop, recording: Recording) -> str:
+def motion(analysis: Analysis) -> str:
     """How near the simulated motion is to the measured one, and what was fitted with it."""
+    found, recording = analysis.in_loop, analysis.recording
+    assert found is not None
+    assert recording is not None
     unit, force = recording.position_unit, recording.force_unit
     way = quantity(float(np.ptp(recording.position)), unit)
     text = (
-        "One mass with viscous and dry friction, a constant force and a delay, simulated in the "
-        f"same loop, stays within {quantity(found.motion.error_rms, unit)} rms of the measured "
-        f"motion over {way}."
+        "One mass with viscous and dry friction, a constant force and a delay, simulated "
+        f"{followed(analysis).beside}, stays within {quantity(found.motion.error_rms, unit)} rms "
+        f"of the measured motion over {way}."
     )
     for law in found.laws:
         text += (
@@ -136,9 +140,10 @@ def _times(ratio: float) -> str:
     return f"{pure(ratio, 3)} times that with its own"
 
 
-def halves(found: InLoop, analysis: Analysis) -> Rows:
+def halves(analysis: Analysis) -> Rows:
     """A row a parameter: (what it is, whole recording, first half, second half)."""
-    rows = []
+    rows, found = [], analysis.in_loop
+    assert found is not None
     for index, name in enumerate(NAMES):
         if name not in analysis.model.names:
             continue

@@ -16,7 +16,9 @@ from bayeshaptic.quantities import (
     scale,
 )
 from bayeshaptic.recordings.feedback import is_certain
+from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.loop.followed import determined
 from bayeshaptic.report.loop.unexplained import remainder, worst
 from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
@@ -87,6 +89,8 @@ def lacked(closed: Closed) -> str:
 
 def in_short(closed: Closed) -> str:
     """One sentence for the top of the page."""
+    if told_too_little(closed.analysis.notices):
+        return determined(closed.analysis)
     if closed.force is not None:
         return force_words.in_short(closed.force, closed.base.etfe.force_unit)
     if is_certain(closed.analysis.notices) and not closed.effects:

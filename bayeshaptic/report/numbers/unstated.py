@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bayeshaptic.recordings.sufficiency import told_too_little
+
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
@@ -24,6 +26,8 @@ def unstated(analysis: Analysis) -> str | None:
     """
     if not analysis.sampled:
         return "feedback biases the response that it would be read from"
+    if (too_little := told_too_little(analysis.notices)) is not None:
+        return f"the recording says {too_little.reason}"
     limit = analysis.limit.quantile(0.5)
     size = np.abs(analysis.etfe.value)
     stiffness = 1 / size[size > 0]

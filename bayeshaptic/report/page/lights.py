@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.recordings.sufficiency import TOO_LITTLE
 from bayeshaptic.report.numbers.misfit import (
     misfit_factor,
     misfit_is_clear,
@@ -26,7 +27,7 @@ _SEEN = {
 }
 # Warnings of these topics are of the fit, the loop or the sampler, and shown by their lights.
 _ELSEWHERE = {"misfit", "unexplained", "residual", "critical stiffness"}
-_SPOILING = {"feedback"}
+_SPOILING = {"feedback", TOO_LITTLE}
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,8 @@ def lights(result: Result) -> tuple[Light, ...]:
 
 def _recording(analysis: Analysis) -> Light:
     found = {n.topic for n in analysis.notices if n.level == "warning"} - _ELSEWHERE
-    if found & _SPOILING:
-        return Light("Recording", BAD, "feedback", "notices")
+    for topic in found & _SPOILING:
+        return Light("Recording", BAD, topic, "notices")
     if found:
         return Light("Recording", DOUBT, ", ".join(sorted(found)), "notices")
     return Light("Recording", GOOD, "no objection", "measured")

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import interval, quantity
+from bayeshaptic.recordings.sufficiency import told_too_little
+from bayeshaptic.report.loop.followed import followed
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.version import __version__
 
@@ -57,11 +59,17 @@ def methods(result: Result) -> str:
     """What was done, in one paragraph with the keys of its references in square brackets."""
     analysis = result.analysis
     if analysis.in_loop is not None:
-        return " ".join((_in_loop(analysis), _sampled(analysis), _limit()))
+        return " ".join((_in_loop(analysis), _sampled(analysis), _limit(analysis)))
     if not analysis.sampled:
         return " ".join((*_measured(analysis.etfe), _sampled(analysis)))
     return " ".join(
-        (*_measured(analysis.etfe), _model(analysis), _sampled(analysis), *_loop(result), _limit())
+        (
+            *_measured(analysis.etfe),
+            _model(analysis),
+            _sampled(analysis),
+            *_loop(result),
+            _limit(analysis),
+        )
     )
 
 
@@ -94,12 +102,12 @@ def _in_loop(analysis: Analysis) -> str:
     recording = analysis.recording
     assert recording is not None
     length = quantity(recording.duration_s, "s")
+    words = followed(analysis)
     return (
         f"Force and position were recorded for {length} at "
-        f"{quantity(1 / recording.period_s, 'Hz')} in closed loop: the force was computed from the "
-        "motion, so that a frequency response would be biased. One mass with viscous "
-        "and dry friction, a constant force and a delay, simulated in the same loop, was fitted to "
-        f"the motion (closed-loop output error [janot2014]){_laws(analysis)}."
+        f"{quantity(1 / recording.period_s, 'Hz')} {words.where}. {words.response} One mass with "
+        f"viscous and dry friction, a constant force and a delay, simulated {words.beside}, was "
+        f"fitted to the motion ({words.fitted}){_laws(analysis)}."
     )
 
 
@@ -147,9 +155,11 @@ def _loop(result: Result) -> tuple[str, ...]:
     return (text,)
 
 
-def _limit() -> str:
-    return (
+def _limit(analysis: Analysis) -> str:
+    found = (
         "The critical stiffness is the smallest stiffness at which the sampled loop loses "
-        "stability [diaz2010], found for every draw over all crossings of the response. The "
-        f"analysis was made with bayeshaptic {__version__}."
+        "stability [diaz2010], found for every draw over all crossings of the response."
     )
+    if told_too_little(analysis.notices):
+        found = "No critical stiffness follows from it."
+    return f"{found} The analysis was made with bayeshaptic {__version__}."

@@ -9,7 +9,7 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.trials.drift import PARTS
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.recordings.sufficiency import SHORTEST_S
+from bayeshaptic.recordings.sufficiency import SHORTEST_S, told_too_little
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
 from bayeshaptic.report.objections import changes, is_open
 
@@ -40,6 +40,9 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
     analysis, command = result.analysis, _command(result)
     if has_feedback(analysis.notices):
         return _after_feedback(result, command)
+    if (too_little := told_too_little(analysis.notices)) is not None:
+        cure = too_little.cure[0].upper() + too_little.cure[1:]
+        return (Step(f"{cure}. Then:", f"bayeshaptic report NEW.csv{_device(result)}"),)
     if analysis.etfe.through_reference:
         return _after_reference(result, command)
     if not analysis.posterior.converged:
