@@ -163,17 +163,19 @@ def test_forces_come_after_a_linear_effect_that_leaves_noise_at_first_sight(monk
     _, etfe, fit = fitted(False, 8.0, MODE)
     state, looked = State(etfe, fit), []
     monkeypatch.setattr(windows, "nonlinear_trials", lambda *_: looked.append("") or [])
-    tests = tuple(
-        ResidualTest(name, family, 99.0, 5.0, None, "")
-        for name, family in (("bands", "linear"), ("sign(v)", "nonlinear"))
-    )
-    for hopeless, forces in ((False, 0), (True, 1)):
+    force = ResidualTest("sign(v)", "nonlinear", 99.0, 5.0, None, "")
+
+    def forces(linear: float) -> int:
         looked.clear()
-        if hopeless:  # nothing linear leaves noise
-            monkeypatch.setattr(linear, "MISFIT", 0.0)
+        tests = (ResidualTest("bands", "linear", linear, 5.0, None, ""), force)
         found = windows.WindowTrials(state).trials(state, tests, Meter(), lambda _: None)
         assert "second_mode" in {trial.name for trial in found}
-        assert len(looked) == forces
+        return len(looked)
+
+    assert forces(99.0) == 0
+    assert forces(10.0) == 1  # a force bends the response by as much
+    monkeypatch.setattr(linear, "MISFIT", 0.0)  # nothing linear leaves noise
+    assert forces(99.0) == 1
 
 
 @pytest.mark.parametrize(
