@@ -12,7 +12,7 @@ from fake_analysis import _tests, fake_closed
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.traced import Traced
-from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, drift_trials
+from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, _further, drift_trials
 from bayeshaptic.diagnosis.widening.discrepancy import share_left, with_discrepancy
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
@@ -54,6 +54,24 @@ def test_a_steady_ramp_lies_within_the_fall() -> None:
     low, high = np.quantile(ratio, [0.05, 0.95])
     assert ratio.min() >= -0.125 and ratio.max() <= 0
     assert low < -0.1 < high, "the ramp itself must be inside the 90 % interval"
+
+
+def test_a_device_that_was_still_changing_has_settled_or_goes_on() -> None:
+    """The device of a stranger warmed up for 14 s: its limit was 1.16 times what it would be."""
+    closed = fake_closed("explained", "time-varying")
+    traced = with_effects(closed.traced, limit_log_further=0.2)
+    ratio = log_ratios(closed, traced)
+    assert np.mean(ratio == 0) == pytest.approx(0.5, abs=4 * 0.5 / len(ratio) ** 0.5)
+    goes_on = ratio[ratio != 0]
+    assert -0.2 <= goes_on.min() < -0.19 and -0.01 < goes_on.max() < 0
+    assert [notice.topic for notice in traced.notices] == ["drift"]
+    assert not closed.traced.notices
+
+
+def test_only_a_limit_that_is_lowest_at_the_end_may_fall_further() -> None:
+    assert _further(np.array([3.0, 2.0, 1.5])) == pytest.approx(np.log(2.0))
+    assert _further(np.array([1.5, 2.0, 3.0])) == _further(np.array([3.0, 1.0, 2.0])) == 0
+    assert _further(np.array([3.0, 2.0, 0.0])) == 0, "unstable at the end however soft"
 
 
 def test_the_fall_is_that_of_a_ramp_from_the_middle_of_a_part_to_its_end() -> None:

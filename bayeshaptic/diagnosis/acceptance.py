@@ -127,7 +127,7 @@ def wanted(tests: Sequence[Test], accepted: Sequence[Accepted]) -> tuple[Test, .
     """
     if any(test.flagged for test in tests):
         return tuple(tests)
-    if not any(one.change and one.change.acting for one in accepted):
+    if not any(one.acts for one in accepted):
         return ()
     noticed = [test for test in tests if test.family == "nonlinear" and test.noticed]
     return tuple(replace(test, threshold=test.usual or test.threshold) for test in noticed)

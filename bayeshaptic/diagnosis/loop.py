@@ -162,7 +162,7 @@ class Loop:
                 self._begin()
             if wanted := self._wanted:
                 self._number += 1
-                if self._round(wanted, patient):
+                if self._round(wanted, patient) or self._round(self._unseen_forces(), patient):
                     self._mend()
                 else:
                     self.done = True
@@ -224,6 +224,8 @@ class Loop:
 
     def _round(self, wanted: tuple[Test, ...], patient: bool) -> bool:
         """Go on to one more effect, and what is left; False where nothing convinces."""
+        if not wanted:
+            return False
         trials = self._kind.trials(self.state, wanted, self.meter, self._tick, patient)
         left: dict[int, tuple[Test, ...]] = {}
 
@@ -257,8 +259,20 @@ class Loop:
         self._accept(found, tests)
         return True
 
+    def _unseen_forces(self) -> tuple[Test, ...]:
+        """Tests for a force in what tests of the residual take for linear, where they see one.
+
+        Under a sweep each frequency comes at one speed, and drag looks like another response.
+        """
+        if any(one.acts for one in self.state.accepted):
+            return ()
+        found = tuple(test for test in self._kind.beside(self.state) if test.flagged)
+        self._before, self._seen = (*self._before, *found), (*self._seen, *found)
+        return found
+
     def _accept(self, state: State, tests: tuple[Test, ...]) -> None:
-        if not any(test.flagged for test in tests):
+        acts = any(one.acts for one in state.accepted)
+        if acts and not any(test.flagged for test in tests):
             beside = self._kind.beside(state)
             tests = (*tests, *acceptance.remaining(beside, state.accepted, self._seen))
         self._seen = (*self._seen, *tests)

@@ -87,6 +87,8 @@ class Accepted:
         What the uncertainty of the effect adds to log K_CR, as a standard deviation.
     limit_log_fall : float
         How much lower still log K_CR is if a drift goes on as it does between the parts.
+    limit_log_further : float
+        How much lower it may go after the recording, where the device was still changing.
     change : Change or None
         None where it cannot be taken out by itself.
     """
@@ -102,7 +104,13 @@ class Accepted:
     told_apart_by: str = ""
     limit_log_sd: float = 0.0
     limit_log_fall: float = 0.0
+    limit_log_further: float = 0.0
     change: Change | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def acts(self) -> bool:
+        """Is it a force, whose motion is simulated?"""
+        return self.change is not None and self.change.acting is not None
 
 
 @dataclass(frozen=True)

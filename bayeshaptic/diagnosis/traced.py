@@ -101,6 +101,13 @@ class Traced:
                 "stiffness is widened by what remains; treat its upper half with suspicion."
             )
             found.append(Notice("warning", "unexplained", text))
+        if any(effect.limit_log_further > 0 for effect in self.state.accepted):
+            text = (
+                "The device was still changing when the recording ended, and may go on: for half "
+                "of the draws the limit falls as far again as it did in the recording. Record it "
+                "once more when it has settled."
+            )
+            found.append(Notice("warning", "drift", text))
         if self.skipped:
             text = (
                 "Not tried, because the budget of the search for effects was spent: "

@@ -140,6 +140,13 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
             "The limit is that of the worst part of the recording, and up to "
             f"{pure(100 * fall, 2)} % lower at one of its ends if the drift is steady."
         )
+    further = sum(effect.limit_log_further for effect in closed.effects)
+    if further > 0:
+        found.append(
+            "The device was still changing when the recording ended. For half of the draws it "
+            "goes on to change, so that the limit is up to "
+            f"{pure(-100 * math.expm1(-further), 2)} % lower: as far again as in the recording."
+        )
     if closed.verdict == "unexplained":
         found.append(
             "The limit is widened by what is left unexplained. Where the rest is linear, the "

@@ -27,6 +27,7 @@ from bayeshaptic.inference.coordinates import coordinates, reach
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.extrapolation import Approach
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
 from bayeshaptic.recordings.response.windows import Windows
 
@@ -127,9 +128,9 @@ def balance(
     own = slice(None) if fitted is None else np.flatnonzero(fitted)
     strength = np.zeros(len(forces)) if strength is None else np.asarray(strength, float)
     applied = no_force(period, places_of(model.system(theta)))
-    following = Following()
+    following, approach = Following(), Approach(len(forces))
     converged = not forces
-    rounds = 30
+    rounds = 45
     settled = 0.02  # of a standard deviation of the coefficients, the noise as what is left
     for _ in range(rounds):
         motions, applied = _settle(
@@ -144,6 +145,7 @@ def balance(
         if not forces or (change < settled and following.arrived):
             converged = True
             break
+        theta, strength = joint.ahead(approach, theta, strength)
     # Of the parameters found: without forces those of the start were the only ones so far.
     motions, _ = _settle(model.system(theta), period, forces, strength, applied, following)
     return Balanced(
@@ -272,6 +274,15 @@ class _Joint:
         )
         size = self.model.size
         return self.here.natural(phi[:, :size])[0], phi[0, size:] * unit
+
+    def ahead(self, approach: Approach, theta: Floats, strength: Floats) -> tuple[Floats, Floats]:
+        """Where parameters and strengths are going; a strength stays on its side of zero."""
+        here = np.concatenate([strength, self.here.coordinate(theta)])
+        there, phi = np.split(approach.ahead(here), [len(strength)])
+        if np.all(there == strength) or np.any(there * strength < 0):
+            return theta, strength
+        low, high = (self.here.coordinate(bound) for bound in reach(self.model, 6.0))
+        return self.here.natural(np.clip(phi, low, high)[None])[0], there
 
     def linearised(self, theta: Floats, strength: Floats) -> tuple[Floats, Floats]:
         """Residuals of the lines to fit, (N,), and their slope, (N, P + J)."""

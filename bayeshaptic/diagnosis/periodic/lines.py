@@ -80,8 +80,11 @@ class LineTrials:
         self.etfe = etfe
         self.windows, self.period = compress(with_floor(etfe, floor)), one_period(etfe)
         self.fitted = share(self.windows, FIT)
-        part = balance(fit.model, self.windows, self.period, (), fit.theta, fitted=self.fitted)
-        whole = balance(fit.model, self.windows, self.period, (), fit.theta)
+        # What lacks a force may have been fitted in another valley than the lines to fit call for.
+        starts = starting_bases(fit.model, fit.theta, fit.elsewhere)
+        parts = [self._balance(fit.model, (), start, np.zeros(0)) for start in starts]
+        part = min(parts, key=lambda part: part.rms(self.fitted))
+        whole = balance(fit.model, self.windows, self.period, (), part.theta)
         self.first = BalancedState(etfe, fit, part=part, whole=whole)
 
     def tests(self, state: State) -> tuple[Test, ...]:
@@ -143,7 +146,10 @@ class LineTrials:
         worst: tuple[State, str | None] = (state, None)
         least = np.inf
         for index, effect in enumerate(state.accepted[:-1]):
-            tried = self._without(state.part, effect)
+            try:
+                tried = self._without(state.part, effect)
+            except np.linalg.LinAlgError:  # without it the motion runs away: it is needed
+                continue
             loss = full - self._log_likelihoods(tried)[1]
             if needless(loss, len(effect.parameters) or 1) and loss < least:
                 left = state.accepted[:index] + state.accepted[index + 1 :]

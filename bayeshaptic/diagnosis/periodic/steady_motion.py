@@ -36,6 +36,7 @@ class Period:
     Attributes
     ----------
     force, position : ndarray, shape (N,)
+        Without mean, and without the way that the device goes on from period to period.
     harmonics : ndarray of int, shape (H,)
         Those the motion is made of, from 1.
     excited : ndarray of int, shape (L,)
@@ -44,6 +45,8 @@ class Period:
         From the DFT of one period to the scale of the spectra.
     period_s : float
         Of sampling.
+    creep : float
+        Mean velocity: a constant force, or one that a law makes, drives a free device on.
     """
 
     force: Floats = field(repr=False)
@@ -52,6 +55,7 @@ class Period:
     excited: NDArray[np.int64] = field(repr=False)
     scale: Floats = field(repr=False)
     period_s: float
+    creep: float
 
     @property
     def samples(self) -> int:
@@ -103,18 +107,22 @@ def one_period(etfe: Etfe, witness: Floats | None = None) -> Period:
     samples = repetition.period
     stop = min(repetition.stop + 1, recording.samples)
     first = stop - spectra.periods * samples
-    position = recording.position if witness is None else witness
+    position = (recording.position if witness is None else witness)[first:stop]
+    centres = position.reshape(-1, samples).mean(axis=1)
+    creep = float(centres[-1] - centres[0]) / max((len(centres) - 1) * samples, 1)  # a sample
+    position = position - creep * np.arange(len(position))
     force = repetition.periods_of(recording.force, first, spectra.periods).mean(axis=0)
     excited = np.rint(spectra.frequency_hz * samples * recording.period_s).astype(int)
     overtones = 2.0  # harmonics of the motion up to so many times the highest excited one
     last = min(int(overtones * excited[-1]), (samples - 1) // 2)
     return Period(
         force=force - force.mean(),
-        position=position[first:stop].reshape(-1, samples).mean(axis=0),
+        position=position.reshape(-1, samples).mean(axis=0),
         harmonics=np.arange(1, last + 1),
         excited=excited,
         scale=np.abs(spectra.force) / np.abs(np.fft.rfft(force)[excited]),
         period_s=recording.period_s,
+        creep=creep / recording.period_s,
     )
 
 
@@ -178,7 +186,8 @@ def apply(
     """
     proportional, rest = [], []
     for place, force in forces.items():
-        motion = np.stack([motions[place].position, motions[place].velocity], axis=1)
+        velocity = motions[place].velocity
+        motion = np.stack([motions[place].position, velocity - velocity.mean()], axis=1)
         size = np.sqrt(np.mean(motion**2, axis=0))
         if not (np.all(np.isfinite(size)) and np.all(np.isfinite(force))):
             raise np.linalg.LinAlgError("the motion runs away")
@@ -262,7 +271,11 @@ def steady_motion(system: LinearSystem, period: Period, applied: Applied) -> dic
     lines = np.linalg.solve(np.moveaxis(matrix, 2, 0), free.T[:, :, None])[:, :, 0].T
     lines = np.where(period.free, driven / own * period.transform(period.position), lines)
     return {
-        place: Motion(period.signal(row), period.signal(period.s * row), period.force)
+        place: Motion(
+            period.signal(row),
+            period.signal(period.s * row) + (period.creep if place.second is None else 0.0),
+            period.force,
+        )
         for place, row in zip(applied.places, lines, strict=True)
     }
 

@@ -1,7 +1,8 @@
-"""Is there another force beside those that were found?
+"""Is there another force beside those that were found, or one where nothing linear convinces?
 
 The tests of the residual compare each window with what no smooth response explains, in the motion
-without forces: they see little of a drag under friction.  Here the motion is that with the forces,
+without forces: they see little of a drag under friction, or of one that is as smooth over the
+frequency as a sweep makes it.  Here the motion is that with the forces,
 and everything that was fitted moves along.  Of fourteen free devices with one force none was given
 another; two held ones with a gap, of which part stays unexplained, both were given a friction.
 """
@@ -30,12 +31,12 @@ _OVER = {  # by the first of a law's variables, and its place
 
 
 def beside_tests(state: State) -> tuple[Test, ...]:
-    """One test for each variable that another force may be a function of; none without forces.
+    """One test for each variable that another force may be a function of.
 
     Of the laws that tests look for, at all their places; not of what is there already.
     """
     recording = state.etfe.unbroken
-    if recording is None or not any(one.change and one.change.acting for one in state.accepted):
+    if recording is None or state.etfe.through_reference:
         return ()
     bench = ForceBench(state, recording)
     motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))

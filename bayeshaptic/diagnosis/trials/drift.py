@@ -1,7 +1,7 @@
 """Trying drift: the recording in parts, some of the parameters free to differ between them.
 
 The critical stiffness is then that of the worst part, and lower by what a drift that goes on does
-between the middle of that part and its end.
+between the middle of that part and its end, and after it.
 """
 
 from __future__ import annotations
@@ -98,6 +98,7 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
     limits = critical_stiffness(narrow, course).samples
     ends = critical_stiffness(narrow, _ends(course)).samples
     worst = int(np.argmin(limits))
+    further = _further(limits) if kind is _DEVICE else 0.0
     size = len(varying) * (PARTS - 1)
     estimates = _estimates(narrow, found) | {"worst_part": Estimate(worst + 1.0, 0.0, "")}
     accepted = Accepted(
@@ -109,6 +110,7 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         f"part {worst + 1}",
         estimates,
         limit_log_fall=0.0 if kind is _GAIN else _fall(limits, ends),
+        limit_log_further=further,
     )
     changed, good = state, thresholds.convincing(gains[0], gains[1], size)
     if good and kind is _GAIN:
@@ -140,6 +142,16 @@ def _fall(limits: Floats, ends: Floats) -> float:
         beside = limits[1] if worst == 0 else limits[-2]
         falls.append(0.5 * float(np.log(beside / limits[worst])))
     return max([0.0, *falls])
+
+
+def _further(limits: Floats) -> float:
+    """How much log K_CR may fall after the recording: as much again as in it, if to its end.
+
+    What settles as exp(-t / tau) goes less far than that after a recording longer than tau.
+    """
+    if limits[-1] > 0 and np.argmin(limits) == len(limits) - 1:
+        return float(np.log(limits[0] / limits[-1]))
+    return 0.0
 
 
 def _ends(found: Floats) -> Floats:

@@ -234,7 +234,7 @@ class ForceBench:
     def _simulated(self, forces: tuple[Acting, ...], theta: Floats) -> _Simulated | None:
         """What forces do, the measurement without it and its windows; None where it runs away."""
         added = self.added_motions(forces, theta)
-        if np.isnan(added[0, 0]):
+        if np.isnan(added).any():
             return None
         self._extra = added.sum(axis=0)
         changes = self.changes(forces, added)

@@ -49,6 +49,10 @@ def with_discrepancy(
         beyond = 1.25  # times a steady ramp
         factor = np.exp(-fall * rng.uniform(0.0, beyond, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
+    further = sum(effect.limit_log_further for effect in traced.state.accepted)
+    if further > 0:  # it has settled, or goes on: nobody knows
+        share = rng.integers(2, size=len(limit.samples)) * rng.random(len(limit.samples))
+        limit = replace(limit, samples=limit.samples * np.exp(-further * share))
     found = {effect.family for effect in traced.state.accepted}
     flagged = {test.family for test in traced.after if test.flagged}
     left = flagged if traced.verdict == UNEXPLAINED else set()
