@@ -274,7 +274,9 @@ def test_a_drag_under_sweeps_is_no_other_linear_device() -> None:
     traced = trace(etfe, least_squares(build_model("free", "phantom"), etfe))
     assert not any(t.flagged for t in traced.before if t.family == "nonlinear" and _of_shapes(t))
     found = next(effect for effect in traced.state.accepted if effect.name == "drag")
-    assert found.estimates["drag_coefficient"].mean == pytest.approx(0.001, rel=0.1)
+    # To two standard deviations of 3 %.
+    assert found.estimates["drag_coefficient"].mean == pytest.approx(0.001, rel=0.06)
+    assert [c.name for c in traced.candidates if c.taken_out][0] == "second_mode"
     limit = critical_stiffness(traced.state.model, traced.state.fit.theta).value
     assert limit == pytest.approx(bench.true_critical_stiffness(), rel=0.05)
 

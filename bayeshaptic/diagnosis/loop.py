@@ -52,8 +52,8 @@ class Trials(Protocol):
     def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
         """With another law in the place of an earlier force, or the very same."""
 
-    def without_needless(self, state: State, meter: Meter, tick: Tick) -> tuple[State, str | None]:
-        """Without the earlier effect that a later one made needless, and its name; or as it is."""
+    def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
+        """Without the earlier effect that a later one made needless, or the very same."""
 
 
 def trials_for(etfe: Etfe, fit: Fit, like: Trials | None = None) -> Trials:
@@ -249,13 +249,13 @@ class Loop:
             return False
         found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
         better = self._kind.reconsidered(found, self.meter, self._tick)
-        lighter, gone = self._kind.without_needless(better, self.meter, self._tick)
+        lighter = self._kind.without_needless(better, self.meter, self._tick)
         if lighter is not found:
             found, tests = lighter, self._remaining(lighter)
-            self._candidates = [
-                replace(c, taken_out=c.taken_out or (c.accepted and c.name == gone))
-                for c in self._candidates
-            ]
+        there = {effect.name for effect in found.accepted}
+        self._candidates = [
+            replace(c, taken_out=c.accepted and c.name not in there) for c in self._candidates
+        ]
         self._accept(found, tests)
         return True
 

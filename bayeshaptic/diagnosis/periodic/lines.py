@@ -139,11 +139,11 @@ class LineTrials:
         """As it is."""
         return state
 
-    def without_needless(self, state: State, meter: Meter, tick: Tick) -> tuple[State, str | None]:
+    def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
         """Without the earlier effect that is worth least, if that is next to nothing."""
         assert isinstance(state, BalancedState)
         full = self._log_likelihoods(state.part)[1]
-        worst: tuple[State, str | None] = (state, None)
+        worst: State = state
         least = np.inf
         for index, effect in enumerate(state.accepted[:-1]):
             try:
@@ -153,7 +153,7 @@ class LineTrials:
             loss = full - self._log_likelihoods(tried)[1]
             if needless(loss, len(effect.parameters) or 1) and loss < least:
                 left = state.accepted[:index] + state.accepted[index + 1 :]
-                worst, least = (self._state(tried, left), effect.name), loss
+                worst, least = self._state(tried, left), loss
         return worst
 
     @staticmethod

@@ -105,7 +105,7 @@ def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = 
     """The state with its last force searched for and fitted once more; as it is without one.
 
     Where it was found beside a linear effect that the state does not have any more it may be at
-    another place, and larger.
+    another place, and larger, or have another law.
     """
     *rest, last = state.accepted
     if last.change is None or last.change.acting is None or not meter.affords(last.title):
@@ -115,9 +115,13 @@ def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = 
     assert etfe.recording
     bench = ForceBench(bare, etfe.recording)
     motion = bench.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
-    variants = list(last.change.acting.effect.candidates(bare.model, motion))
-    found = fitted(bench, [search(bench, variants, motion, tick)], meter)
-    return _trial(bench, found[0]).state if found else state
+    present = last.change.acting.effect
+    own = search(bench, list(present.candidates(bare.model, motion)), motion, tick)
+    laws, _ = _called_for(bare, set(present.over), motion)
+    others = [law for law in laws if law[0].name != present.name]
+    found = [*fitted(bench, [own], meter), *beside_others(bench, others, meter, tick)]
+    trials = [_trial(bench, point) for point in found]
+    return max(trials, key=lambda trial: trial.score).state if trials else state
 
 
 def _instead_of(

@@ -117,21 +117,15 @@ class WindowTrials:
         """With another law in the place of an earlier force, or the very same."""
         return reconsidered(state, meter, tick)
 
-    def without_needless(self, state: State, meter: Meter, tick: Tick) -> tuple[State, str | None]:
+    def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
         """The state without the earlier effect that is worth least, if that is next to nothing.
 
         A force that was found beside a linear effect is found anew without it: what the force
-        explains may be what the effect was taken for, which must convince beside it, too.
-
-        Returns
-        -------
-        state : State
-            The very same where every effect is still needed.
-        name : str or None
-            Of the effect that was taken out.
+        explains may be what the effect was taken for, which must convince beside it, too.  The
+        very same state where every effect is still needed.
         """
         full = _held_out(state)
-        spare, name, without = np.inf, "", state
+        spare, without = np.inf, state
         for index, effect in enumerate(state.accepted[:-1]):
             if effect.change is None:
                 continue
@@ -139,14 +133,12 @@ class WindowTrials:
             size = len(effect.parameters) + len(effect.estimates)
             worth = full - _held_out(other) - thresholds.A_PARAMETER * size
             if worth < spare:
-                spare, name, without = worth, effect.name, other
-        if spare < 0:
-            return without, name
+                spare, without = worth, other
         if state.accepted[-1].family == "nonlinear" and without.model is not state.model:
-            other = found_anew(without, meter, tick)
-            if full - _held_out(other) < thresholds.ENOUGH:
-                return other, name
-        return state, None
+            anew = found_anew(without, meter, tick)
+            if _held_out(anew) > max(full - thresholds.ENOUGH, _held_out(without)):
+                return anew
+        return without if spare < 0 else state
 
 
 def _raised(tests: tuple[Test, ...], family: str) -> set[str]:
