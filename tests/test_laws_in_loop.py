@@ -10,14 +10,18 @@ import pytest
 from test_time_domain import GAINS, TRUTH, declared, in_loop, stepped
 
 from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.inference.time_domain.loop import Hum
 from bayeshaptic.inference.time_domain.scores import scores
 from bayeshaptic.recordings.feedback import Feedback
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.loop import force_words
 from bayeshaptic.rig import Bench
 
 _REACH = 4.5  # standard deviations: 1 in 500 with eight degrees of freedom
@@ -168,3 +172,61 @@ def test_what_speaks_against_a_limit_stands_where_half_is_not_enough(
     against, short = found.doubts
     assert "the damping is another at other frequencies" in against
     assert short == "half of the recording is not enough"
+
+
+def humming(bench: Bench, **tone: Any) -> Recording:
+    rubs = bench.with_effect("coulomb_friction", force=TRUTH["coulomb"])
+    return stepped(rubs.with_effect("mains_tone", **tone), 4.0)
+
+
+@pytest.mark.parametrize(
+    "tone",
+    [
+        {"on": "force", "amplitude": 0.5, "frequency_hz": 50.03},
+        {"on": "force", "amplitude": 2.0, "frequency_hz": 33.0},
+        {"on": "position", "amplitude": 3e-6, "frequency_hz": 60.0},
+    ],
+    ids=["mains", "something that turns", "hum of the sensor"],
+)
+def test_a_tone_is_fitted_with_the_motion(bench: Bench, tone: dict[str, Any]) -> None:
+    found = follow_in_loop(humming(bench, **tone))
+    assert found is not None
+    assert (found.doubts, found.laws) == ((), ())  # such as damping that fades with the frequency
+    (hum,) = found.motion.hums
+    assert abs(hum.frequency_hz - tone["frequency_hz"]) < 0.01
+    truth = np.array([TRUTH["m"], TRUTH["b"], TRUTH["coulomb"], 0.0, TRUTH["delay_s"]])
+    assert np.all(np.abs(found.motion.values - truth) < _REACH * found.motion.sd)
+    (told,) = tones_of(found.motion)
+    assert told.of_the_mains == (tone["frequency_hz"] != 33.0)
+    if tone["on"] == "force":
+        assert abs(abs(told.amplitude) - tone["amplitude"]) < 0.02 * tone["amplitude"]
+
+
+def test_the_limit_stands_with_a_mains_tone(bench: Bench) -> None:
+    closed = close_loop(declared(humming(bench, on="force", amplitude=0.5)), "rigid", ess=600)
+    assert closed.verdict == "explained"
+    assert closed.effect_names == ("coulomb_friction", "mains_tone")
+    assert "50.00 Hz (0.5 N, mains)" in force_words.motion(closed.analysis)
+    assert headline(closed).stiffness is not None
+    quiet = bench.with_effect("coulomb_friction", force=TRUTH["coulomb"])
+    alone = close_loop(declared(stepped(quiet, 4.0)), "rigid", ess=600)
+    there, here = (one.analysis.limit.quantile(0.5) for one in (alone, closed))
+    assert here == pytest.approx(there, rel=0.01)
+
+
+def test_a_clean_loop_does_not_hum(bench: Bench) -> None:
+    for recording in (in_loop(4.0, TRUTH["coulomb"], 2e-6), in_loop(4.0, 0.0, 2e-5)):
+        found = follow_in_loop(recording)
+        assert found is not None
+        assert found.motion.hums == ()
+
+
+def test_a_hum_goes_on() -> None:
+    hum = Hum(50.0, 1.0 - 2.0j)
+    time_s = np.array([0.0, 1.3e-3])
+    later = hum.later(0.0123)
+    wave = [
+        np.real(h.amplitude * np.exp(2j * np.pi * 50.0 * t))
+        for h, t in ((hum, time_s + 0.0123), (later, time_s))
+    ]
+    assert wave[0] == pytest.approx(wave[1])

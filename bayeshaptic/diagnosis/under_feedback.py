@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from bayeshaptic.diagnosis.analysis import NO_WITNESS, Analysis
 from bayeshaptic.diagnosis.begun import Opened
+from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import (
     UNSEEN,
     contradictions,
@@ -16,8 +17,10 @@ from bayeshaptic.diagnosis.feedback.in_loop import (
 from bayeshaptic.diagnosis.feedback.lacking import Lacking
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.samples.tones import in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
+from bayeshaptic.effects.measurement import MainsTone
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.fit import NAMES
@@ -36,9 +39,10 @@ _BIASED = (
     "motion of one mass with friction, simulated in the same loop beside the measured one."
 )
 _OPEN = (
-    "The recording was made in open loop. The parameters are not read from the response, but come "
-    "from the motion of one mass with friction, simulated under the same command beside the "
-    "measured one. They are those of this motion: at other frequencies, and under other forces, "
+    "The recording was made in open loop: no feedback is seen in it (if there was some, what "
+    "follows holds all the same). The parameters are not read from the response, but come from the "
+    "motion of one mass with friction, simulated under the same command beside the measured one. "
+    "They are those of this motion: at other frequencies, and under other forces, "
     "the device may be another, so that no stiffness follows from them."
 )
 _TONES = (
@@ -126,11 +130,32 @@ def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:
     named = any(law.effect.sticks for law in analysis.in_loop.laws)
     dry = traced.state.accepted if rubs and not named else ()
     accepted = (*(replace(effect, estimates={}, parameters=names) for effect in dry), *laws)
+    accepted += _humming(analysis)
     verdict, left = (EXPLAINED, accepted[0].family) if accepted else (CONSISTENT, None)
     if analysis.in_loop.doubts:
         verdict, left = UNEXPLAINED, traced.residual_class
     state = replace(traced.state, accepted=accepted)
     return replace(traced, verdict=verdict, residual_class=left, state=state)
+
+
+def _humming(analysis: Analysis) -> tuple[Accepted, ...]:
+    """The tones that were fitted with the motion, as one effect."""
+    assert analysis.in_loop is not None
+    tones = tones_of(analysis.in_loop.motion)
+    if not tones:
+        return ()
+    estimates = {}
+    for number, tone in enumerate(tones, 1):
+        estimates[f"frequency_{number}_hz"] = Estimate(
+            tone.frequency_hz, tone.frequency_sd_hz, "Hz"
+        )
+        size = abs(tone.amplitude), tone.amplitude_sd, analysis.model.force_unit
+        estimates[f"amplitude_{number}"] = Estimate(*size)
+    evidence = (
+        f"far above the lines beside it in what the motion leaves: "
+        f"{in_words(tones, analysis.model.force_unit)}; fitted with it, as a force on the mass"
+    )
+    return (Accepted(MainsTone.name, "tone in the motion", MainsTone.family, evidence, estimates),)
 
 
 def _accepted(law: Lacking, analysis: Analysis) -> Accepted:

@@ -89,18 +89,23 @@ def _like_one_mass(motion: MotionFit, recording: Recording) -> MotionFit:
 def _with_halves(recording: Recording) -> InLoop | None:
     follower = _declared(recording)
     parts = _halves(recording)
+    late_s = 0.0 if len(recording.pieces) > 3 else parts[0].duration_s
     try:
         motion, laws, doubts = with_laws(recording, follower)
     except (InputError, np.linalg.LinAlgError):
         return None
     try:
         forces = motion.forces.at(motion.numbers)
-        halves = tuple(fit_motion(part, follower, forces, motion.inside) for part in parts)
+        halves = tuple(
+            fit_motion(part, follower, forces, motion.inside, motion.loop(part, later_s).hums)
+            for part, later_s in zip(parts, (0.0, late_s), strict=True)
+        )
     except (InputError, np.linalg.LinAlgError):
         doubts += ("half of the recording is not enough",)
         return InLoop(motion, (), np.inf, np.inf, 0.0, doubts, laws=laws)
     own = [half.error_on(part) for half, part in zip(halves, parts, strict=True)]
-    other = [half.error_on(part) for half, part in zip(halves[::-1], parts, strict=True)]
+    apart = (*halves[::-1],), parts, (-late_s, late_s)
+    other = [half.error_on(part, later_s) for half, part, later_s in zip(*apart, strict=True)]
     bands = [_CENTRAL * np.sqrt(np.mean(error**2)) for error in own]
     covered = [np.mean(np.abs(e) < b) for e, b in zip(other, bands[::-1], strict=True)]
     doubts += _differences(*halves)
@@ -128,7 +133,7 @@ def _by_chance(halves: tuple[MotionFit, ...], parts: tuple[Recording, ...]) -> f
         loop = half.loop(part)
         values = loop.with_beginnings(loop.begun(half.inside, half.numbers), half.uneven)
         columns = loop.columns(values, half.uneven, loop.error(values, half.uneven))
-        # Where the pieces begin is fitted to each.
+        # Where the pieces begin, and hums, are fitted to each.
         begins = columns[:, len(NAMES) : loop.plain - len(half.numbers)]
         own = columns[:, : len(NAMES)]
         own = own - begins @ np.linalg.lstsq(begins, own, rcond=None)[0]

@@ -1,6 +1,7 @@
 """What the motion of one mass in its loop lacks: laws that join it, and what speaks against it.
 
-After the fit, every force of a table is asked for by the score of its strength in what is left.
+Tones that stand out of what the fit leaves are fitted with it: they hide, and feign, the rest.
+Then every force of a table is asked for by the score of its strength in what is left.
 Forces over the velocity are laws of one mass, and join it.  Damping that fades with the frequency
 (a base that gives, a connection that relaxes, eddy currents) and whatever changes with time are
 not: they say that a limit from one mass is another device's.
@@ -14,6 +15,7 @@ from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
+from bayeshaptic.diagnosis.feedback.humming import with_tones
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.feedback.terms import SmoothMotion, smooth_motion
 from bayeshaptic.effects.laws import corrections
@@ -31,6 +33,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.acting import COULOMB, Acting
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.inference.time_domain.loop import Hum
 from bayeshaptic.inference.time_domain.scores import Score, scores
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
@@ -105,6 +108,11 @@ def with_laws(
     path = _path(recording)
     usual = Usual.of(path.velocity, path.position, recording.position_unit)
     motion = fit_motion(recording, follower)
+
+    def humming(hums: tuple[Hum, ...]) -> MotionFit | None:
+        return _again(recording, follower, motion.forces, motion.inside, hums)
+
+    motion = with_tones(motion, recording, _WORTH, humming)
     seen: dict[str, Score] = {}
     further = _with_drag(recording, follower, motion)
     for _ in range(_ROUNDS):
@@ -139,7 +147,8 @@ def _with_drag(
     mass, damping, offset, dry = (found[n][0] for n in ("mass", "damping", "offset", "coulomb"))
     start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[_DELAY]])
     start[_DELAY] = min(start[_DELAY], recording.period_s)
-    more = _again(recording, follower, Acting(others=(Drag(MOTOR),), strengths=(strength,)), start)
+    dragged = Acting(others=(Drag(MOTOR),), strengths=(strength,))
+    more = _again(recording, follower, dragged, start, alone.hums)
     if more is None:
         return []
     left = (more.error_rms / alone.error_rms) ** 2
@@ -156,7 +165,7 @@ def _with(
     """Fitted again with a law; None where that does not do what its score promised."""
     acting, dry = motion.forces.at(motion.numbers), float(motion.inside[_COULOMB])
     forces = candidate.joined(acting, dry, score.strength)
-    more = _again(recording, follower, forces, motion.inside)
+    more = _again(recording, follower, forces, motion.inside, motion.hums)
     if more is None or (more.error_rms / motion.error_rms) ** 2 > 1 - _WORTH:
         return None
     rubs = more.inside[_COULOMB] > np.sqrt(more.covariance[_COULOMB, _COULOMB])
@@ -164,11 +173,15 @@ def _with(
 
 
 def _again(
-    recording: Recording, follower: Follower | None, forces: Acting, start: Floats
+    recording: Recording,
+    follower: Follower | None,
+    forces: Acting,
+    start: Floats,
+    hums: tuple[Hum, ...],
 ) -> MotionFit | None:
     """Fitted with other forces; None where no motion stays near the measured one."""
     try:
-        return fit_motion(recording, follower, forces, start)
+        return fit_motion(recording, follower, forces, start, hums)
     except (InputError, np.linalg.LinAlgError):
         return None
 

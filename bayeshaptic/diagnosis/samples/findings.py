@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.samples.faults import Faults
 from bayeshaptic.diagnosis.samples.jitter import Jitter
 from bayeshaptic.diagnosis.samples.prediction import Bools
 from bayeshaptic.diagnosis.samples.resolution import Resolution
-from bayeshaptic.diagnosis.samples.tones import Tones
+from bayeshaptic.diagnosis.samples.tones import Tones, in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.effects.measurement import (
     DroppedSamples,
@@ -165,12 +165,8 @@ def of_tones(found: Tones, unit: str) -> Finding:
     text = "no line of the spectrum is far above its neighbours"
     estimates, tones = {}, found.apart()
     if tones:
-        words = [
-            f"{tone.frequency_hz:.2f} Hz ({abs(tone.amplitude):.2g} {unit}"
-            f"{', mains' if tone.of_the_mains else ''})"
-            for tone in tones
-        ]
-        text = f"far above the lines beside them: {', '.join(words)}; they were subtracted"
+        words = in_words(tones, unit)
+        text = f"far above the lines beside them: {words}; they were subtracted"
     for number, tone in enumerate(tones, 1):
         estimates[f"frequency_{number}_hz"] = Estimate(
             tone.frequency_hz, tone.frequency_sd_hz, "Hz"

@@ -6,6 +6,7 @@ leakage explains.  Periodic excitation: what does not repeat with it.  Either wa
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -58,6 +59,15 @@ class Tone:
     def at(self, time_s: NDArray[Any]) -> NDArray[Any]:
         """The tone at instants from the first sample on."""
         return (self.amplitude * np.exp(2j * np.pi * self.frequency_hz * time_s)).real
+
+
+def in_words(tones: Sequence[Tone], unit: str) -> str:
+    """Where they are, and how large."""
+    return ", ".join(
+        f"{tone.frequency_hz:.2f} Hz ({abs(tone.amplitude):.2g} {unit}"
+        f"{', mains' if tone.of_the_mains else ''})"
+        for tone in tones
+    )
 
 
 @dataclass(frozen=True)

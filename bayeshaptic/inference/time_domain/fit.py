@@ -22,7 +22,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.acting import COULOMB, Acting
 from bayeshaptic.inference.time_domain.days import between_pieces
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
-from bayeshaptic.inference.time_domain.loop import FORCES, Loop
+from bayeshaptic.inference.time_domain.loop import FORCES, Hum, Loop
 from bayeshaptic.inference.time_domain.one_way import one_way
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, Way, ridge
 from bayeshaptic.inference.time_domain.widths import covariance, mean_of_uneven
@@ -64,8 +64,10 @@ class MotionFit:
         All values of the `Loop`: `inside`, where pieces begin, numbers of the laws.
     forces : Acting
         Dry friction's law, and further ones.
-    number_sd : ndarray
-        Of the laws' numbers.
+    whole_sd : ndarray
+        Of all values.
+    hums : tuple of Hum
+        In the first piece.
     """
 
     values: Floats
@@ -81,28 +83,35 @@ class MotionFit:
     follower: Follower
     whole: Floats = field(repr=False)
     forces: Acting
-    number_sd: Floats
+    whole_sd: Floats
+    hums: tuple[Hum, ...] = ()
 
     @property
     def numbers(self) -> Floats:
         """Of the laws, one for each of `forces.names`."""
-        return self.whole[len(self.whole) - len(self.number_sd) :]
+        return self.whole[len(self.whole) - len(self.forces.names) :]
 
-    def loop(self, recording: Recording) -> Loop:
-        """The loop that was followed, or that of another recording."""
-        loop = Loop.of(recording, self.bandwidth_hz, self.way, self.forces)
+    @property
+    def number_sd(self) -> Floats:
+        """Of `numbers`."""
+        return self.whole_sd[len(self.whole) - len(self.forces.names) :]
+
+    def loop(self, recording: Recording, later_s: float = 0.0) -> Loop:
+        """The loop that was followed, or that of another recording, begun so much later."""
+        hums = tuple(hum.later(later_s) for hum in self.hums)
+        loop = Loop.of(recording, self.bandwidth_hz, self.way, self.forces, hums)
         return replace(loop, follower=self.follower)
 
     @property
     def sd(self) -> Floats:
         return np.sqrt(np.diag(self.covariance))
 
-    def error_on(self, recording: Recording) -> Floats:
+    def error_on(self, recording: Recording, later_s: float = 0.0) -> Floats:
         """Measured less simulated position of another recording, with these values; (N,).
 
-        Where its pieces begin is fitted to it.
+        Where its pieces begin, and hums, are fitted to it.  It begins `later_s` after the fitted.
         """
-        loop = self.loop(recording)
+        loop = self.loop(recording, later_s)
         begun = loop.begun(self.inside, self.numbers)
         return loop.error(loop.with_beginnings(begun, self.uneven), self.uneven)
 
@@ -112,6 +121,7 @@ def fit_motion(
     feedback: Follower | None = None,
     forces: Acting = COULOMB,
     start: Floats | None = None,
+    hums: tuple[Hum, ...] = (),
 ) -> MotionFit:
     """Fit one mass with friction to a recording made in closed loop.
 
@@ -125,6 +135,8 @@ def fit_motion(
         Laws of forces on the mass, whose numbers are inferred; Coulomb's friction by default.
     start : ndarray, shape (5,), optional
         Values to begin with; by default those of the inverse dynamics.
+    hums : tuple of Hum
+        Forces on the mass whose size and phase are inferred.
 
     Returns
     -------
@@ -137,7 +149,7 @@ def fit_motion(
     """
     width = bandwidth_hz(recording.force, recording.period_s)
     way = Way.of(recording.position)
-    loop = Loop.of(recording, width, way, forces)
+    loop = Loop.of(recording, width, way, forces, hums)
     begun = loop.begun(_inverse_dynamics(recording) if start is None else start)
     loop = loop.led(feedback, begun)
     first = _fit(loop, begun, recording.name)
@@ -163,7 +175,8 @@ def fit_motion(
         loop.follower,
         first.inside,
         forces,
-        np.sqrt(np.diag(whole)[loop.plain - len(forces.names) :]),
+        np.sqrt(np.diag(whole)),
+        loop.hums_at(first.inside),
     )
 
 

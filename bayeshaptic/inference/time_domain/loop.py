@@ -20,11 +20,27 @@ _LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
 
 
 @dataclass(frozen=True)
+class Hum:
+    """A force Re(amplitude e^(2 pi i frequency_hz t)) on the mass, from a piece's first sample on.
+
+    Its amplitude is where the fit begins.
+    """
+
+    frequency_hz: float
+    amplitude: complex
+
+    def later(self, seconds: float) -> Hum:
+        """The same, from so many seconds later on."""
+        turned = np.exp(2j * np.pi * self.frequency_hz * seconds)
+        return replace(self, amplitude=complex(self.amplitude * turned))
+
+
+@dataclass(frozen=True)
 class Loop:
     """A recording with a follower, and the motion of one mass beside it.
 
-    Values are the `SHARED` ones, then position and velocity at the beginning of every piece, then
-    the numbers of the laws of force.
+    Values are the `SHARED` ones, then those of every piece: position and velocity at its
+    beginning, cosine and sine of every hum; then the numbers of the laws of force.
 
     Attributes
     ----------
@@ -38,6 +54,7 @@ class Loop:
         Dry friction's law, and further ones.
     joints : tuple of int
         Where further pieces begin.
+    hums : tuple of Hum
     """
 
     force: Floats = field(repr=False)
@@ -48,10 +65,16 @@ class Loop:
     follower: Follower | None = None
     forces: Acting = COULOMB
     joints: tuple[int, ...] = ()
+    hums: tuple[Hum, ...] = ()
 
     @classmethod
     def of(
-        cls, recording: Recording, bandwidth_hz: float, way: Way, forces: Acting = COULOMB
+        cls,
+        recording: Recording,
+        bandwidth_hz: float,
+        way: Way,
+        forces: Acting = COULOMB,
+        hums: tuple[Hum, ...] = (),
     ) -> Loop:
         """Of a recording, with the waves of a way."""
         force, position = np.array(recording.force), np.array(recording.position)
@@ -63,12 +86,18 @@ class Loop:
             waves(position, way),
             forces=forces,
             joints=recording.joints,
+            hums=hums,
         )
 
     @property
     def plain(self) -> int:
         """How many values there are."""
-        return SHARED + 2 * (len(self.joints) + 1) + len(self.forces.names)
+        return SHARED + self._own * (len(self.joints) + 1) + len(self.forces.names)
+
+    @property
+    def _own(self) -> int:
+        """How many values a piece has for itself."""
+        return 2 + 2 * len(self.hums)
 
     @property
     def lowest(self) -> Floats:
@@ -103,16 +132,25 @@ class Loop:
 
     @property
     def beginnings(self) -> list[Ints]:
-        """Which values are position and velocity at a piece's beginning."""
-        firsts = range(SHARED, self.plain - len(self.forces.names), 2)
-        return [np.array([first, first + 1]) for first in firsts]
+        """Which values are a piece's own: its beginning, and its hums."""
+        firsts = range(SHARED, self.plain - len(self.forces.names), self._own)
+        return [np.arange(first, first + self._own) for first in firsts]
 
     def begun(self, shared: Floats, numbers: Floats | None = None) -> Floats:
         """Values with the pieces' beginnings as measured, at rest; shape (plain,)."""
         first = self.position[[piece.start for piece in self.pieces]]
-        at_rest = np.stack([first, np.zeros_like(first)], axis=1).ravel()
+        at_rest = np.zeros((len(first), self._own))
+        at_rest[:, 0] = first
+        begun = np.array([hum.amplitude for hum in self.hums])
+        at_rest[:, 2:] = np.append(begun.real, -begun.imag)
         own = self.forces.start if numbers is None else numbers
-        return np.concatenate([shared, at_rest, own])
+        return np.concatenate([shared, at_rest.ravel(), own])
+
+    def hums_at(self, values: Floats) -> tuple[Hum, ...]:
+        """The hums with the cosines and sines of the first piece."""
+        cosine, sine = values[self.beginnings[0][2:]].reshape(2, -1)
+        found = zip(self.hums, cosine - 1j * sine, strict=True)
+        return tuple(replace(hum, amplitude=complex(amplitude)) for hum, amplitude in found)
 
     @property
     def independent(self) -> float:
@@ -144,14 +182,14 @@ class Loop:
         forward, backward = uneven.reshape(2, WAVES) @ self.shapes + more
         above, below = self.follower.above, self.follower.below
         simulated = np.empty_like(self.position)
-        for number, piece in enumerate(self.pieces):
-            first = SHARED + 2 * number
+        for piece, own in zip(self.pieces, self.beginnings, strict=True):
+            hum = values[own[2:]] @ self._waves(piece.stop - piece.start)
             with np.errstate(all="ignore"):
                 simulated[piece] = followed(
-                    np.array([mass, damping, offset, delay_s, *values[first : first + 2]]),
+                    np.array([mass, damping, offset, delay_s, *values[own[:2]]]),
                     laws,
-                    forward[piece],
-                    backward[piece],
+                    forward[piece] + hum,
+                    backward[piece] + hum,
                     self.force[piece],
                     self.position[piece],
                     above,
@@ -159,6 +197,12 @@ class Loop:
                     self.period_s,
                 )
         return self.position - simulated
+
+    def _waves(self, samples: int) -> Floats:
+        """Cosine and sine of every hum from a piece's first sample on, shape (2 H, samples)."""
+        frequency_hz = [hum.frequency_hz for hum in self.hums]
+        turns = 2 * np.pi * np.outer(frequency_hz, np.arange(samples) * self.period_s)
+        return np.concatenate([np.cos(turns), np.sin(turns)])
 
     def columns(self, values: Floats, uneven: Floats, error: Floats) -> Floats:
         """How the simulated position moves with every value and wave, shape (N, C)."""
@@ -187,14 +231,15 @@ class Loop:
         return out
 
     def _begins(self, values: Floats, uneven: Floats) -> Iterator[tuple[slice, Ints, Floats]]:
-        """Every piece, which values are its beginning, and how it moves with them, shape (n, 2)."""
+        """Every piece, which values are its own, and how it moves with them, shape (n, own)."""
         far = 1e-6 * float(np.ptp(self.position))
         fast = 1e-4 * float(np.std(np.diff(self.position))) / self.period_s
-        # Where the pieces begin moves in all of them at once: each answers to its own.
+        hums = [1e-3 * float(np.std(self.force))] * (self._own - 2)
+        # What the pieces have of their own moves in all of them at once: each answers to its own.
         slopes = np.stack(
             [
                 self._slope(values, uneven, [own[i] for own in self.beginnings], step)
-                for i, step in enumerate((far, fast))
+                for i, step in enumerate((far, fast, *hums))
             ],
             axis=1,
         )
@@ -202,7 +247,7 @@ class Loop:
             yield piece, own, slopes[piece]
 
     def with_beginnings(self, values: Floats, uneven: Floats) -> Floats:
-        """`values`, with position and velocity at the pieces' beginnings as they fit best."""
+        """`values`, with what the pieces have of their own as it fits best."""
         best, error = values, self.error(values, uneven)
         steps = 5  # of Gauss-Newton; a motion without friction takes one
         for _ in range(steps):

@@ -69,7 +69,8 @@ def determined(analysis: Analysis) -> str:
         if not leaves[name]
     ]
     text = (
-        f"It was recorded {followed(analysis).where}, and followed in time as one mass: "
+        f"It was recorded {followed(analysis).where}, as far as it shows, and followed in time as "
+        "one mass: "
         f"{', '.join(known)} (90 %)."
     )
     left = [stated.model.parameter(name).title for name in stated.names if leaves[name]]

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayeshaptic.diagnosis.feedback.humming import tones_of
+from bayeshaptic.diagnosis.samples.tones import in_words
 from bayeshaptic.inference.time_domain.fit import NAMES
 from bayeshaptic.quantities import pure, quantity, scale
 from bayeshaptic.report.loop.followed import followed
@@ -116,6 +118,8 @@ def motion(analysis: Analysis) -> str:
             f" The motion called for {law.effect.title} (t = {pure(law.score.t, 3)}), which joined "
             f"it and leaves {pure(100 * law.score.left, 2)} % of the error's power that was there."
         )
+    if tones := tones_of(found.motion):
+        text += f" Tones were fitted with it, as forces on the mass: {in_words(tones, force)}."
     rms = float(np.sqrt(np.mean(np.square(recording.force))))
     worth_naming = 1e-4  # of the force
     if found.motion.uneven_rms > worth_naming * rms:

@@ -114,6 +114,8 @@ def _in_loop(analysis: Analysis) -> str:
 def _laws(analysis: Analysis) -> str:
     assert analysis.in_loop is not None
     titles = [law.effect.title for law in analysis.in_loop.laws]
+    if analysis.in_loop.motion.hums:
+        titles.append("tones")
     return f", with {' and '.join(titles)}, which its error called for" if titles else ""
 
 
