@@ -24,6 +24,7 @@ from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.effects.library import effects
+from bayeshaptic.effects.linear.attached_mass import SecondMode
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.friction import StribeckFriction as StribeckLaw
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
@@ -500,3 +501,24 @@ def test_an_earlier_force_gets_the_law_that_it_has_beside_the_later_one(
     found = reconsidered(wrong, Meter())
     assert [one.name for one in found.accepted] == ["coulomb_friction", "drag"]
     assert reconsidered(found, Meter()) is found
+
+
+def test_a_rigid_device_with_a_mode_has_no_transmission(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second mass is the mode's: a spring that hardens in the connection had no stiffness."""
+    only(monkeypatch, "coulomb_friction", "hardening_spring", "backlash", "drag")
+    etfe = state_of(LHIFAM).etfe
+    rigid = build_model("rigid", "lhifam", period_s=LHIFAM.period_s)
+    model = rigid.with_effect(SecondMode.candidates(rigid, etfe)[0])
+    state = State(etfe, least_squares(model, etfe))
+    names = {test.name.removesuffix(" beside") for test in beside_tests(state)}
+    assert names == {"velocity", "position"}
+
+
+def test_where_no_response_is_a_number_no_force_is_worth_anything() -> None:
+    """A damper at zero behind a spring far too stiff: the report ended in a traceback."""
+    state = state_of(LHIFAM)
+    assert state.etfe.recording is not None
+    bench = ForceBench(state, state.etfe.recording)
+    theta = state.fit.theta * np.nan
+    point = bench.as_it_is((Acting(CoulombFriction(MOTOR), 0.1),), theta)
+    assert point.gain_fit == point.gain_choose == -np.inf

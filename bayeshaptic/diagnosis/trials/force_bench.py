@@ -104,6 +104,7 @@ class ForceBench:
         self.force = self.recording.force - self.recording.force.mean()
         self._transform = line_transform(state.etfe, recording)
         self._extra: Floats = np.zeros(recording.samples) + sum(c.motion for c in there)
+        self._somewhere = state.fit.windows.frequency_hz.mean(axis=1)
         self._measured = _between(self.recording.position)
         self._base = self._likelihoods(state.fit.theta, state.fit.windows)
 
@@ -114,8 +115,8 @@ class ForceBench:
         command = self.force if command is None else command
         system, period = self.model.system(theta), self.recording.period_s
         masses = tuple(range(min(len(system.mechanism.masses), 2)))
-        if set(places) == {MOTOR}:
-            masses = masses[:1]
+        if set(places) == {MOTOR} or "kc" not in self.model.names:
+            masses = masses[:1]  # the second of a rigid device is that of a vibration mode
         (x, v), *others = linear_motions(system, command, period, masses, SUBSTEPS)
         found = {}
         along: Floats | float = 0.0
@@ -232,7 +233,13 @@ class ForceBench:
         return compress(etfe, partial(self.model.response, theta), inputs)
 
     def _simulated(self, forces: tuple[Acting, ...], theta: Floats) -> _Simulated | None:
-        """What forces do, the measurement without it and its windows; None where it runs away."""
+        """What forces do, the measurement without it and its windows.
+
+        None where it runs away, or where the linear parameters are such that no response is a
+        number (a damper at zero behind a spring a thousand times too stiff).
+        """
+        if not np.all(np.isfinite(self.model.response(theta, self._somewhere))):
+            return None
         added = self.added_motions(forces, theta)
         if np.isnan(added).any():
             return None
