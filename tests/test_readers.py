@@ -553,6 +553,49 @@ def test_a_recording_or_a_frequency_response(tmp_path: Path) -> None:
         read_frf(tmp_path / "c.csv", 1e-3, "force=u")
 
 
+@pytest.mark.parametrize(
+    ("time", "force", "position", "factors", "units"),
+    [
+        ("t_ms", "cmd_mNm", "theta_deg", (1e-3, 1e-3, np.pi / 180), ("Nm", "rad")),
+        ("t", "u", "Angle_Deg", (1, 1, np.pi / 180), ("Nm", "rad")),
+        ("t_s", "force_n", "x_um", (1, 1, 1e-6), ("N", "m")),
+        ("t", "iq_A", "pos mm", (1, 1, 1e-3), ("A", "m")),
+        ("t_us*1e-6", "iq_A*2", "x_mm*0.001", (1e-6, 2, 1e-3), ("N", "m")),
+        ("t", "tau_m", "theta_m", (1, 1, 1), ("Nm", "rad")),  # of the motor
+        ("t", "u_a", "Channel A", (1, 1, 1), ("N", "m")),
+        ("t", "u", "theta_deg[mrad]", (1, 1, 1e-3), ("Nm", "rad")),
+    ],
+)
+def test_a_name_that_ends_in_a_unit_is_read_in_it(
+    tmp_path: Path,
+    time: str,
+    force: str,
+    position: str,
+    factors: tuple[float, ...],
+    units: tuple[str, str],
+) -> None:
+    path = tmp_path / "a.csv"
+    names = [name.split("*")[0].split("[")[0] for name in (time, force, position)]
+    columns = np.column_stack([SIGNALS["t"] / factors[0], FORCE, POSITION])
+    np.savetxt(path, columns, header=",".join(names), comments="", delimiter=",")
+    recording = read_recording(path, f"time={time},force={force},position={position}")
+    assert recording.period_s == pytest.approx(SIGNALS["t"][1] - SIGNALS["t"][0])
+    np.testing.assert_allclose(recording.force, factors[1] * FORCE)
+    np.testing.assert_allclose(recording.position, factors[2] * POSITION)
+    assert (recording.force_unit, recording.position_unit) == units
+
+
+def test_the_note_says_that_a_unit_is_by_the_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_csv(path, "t,u,theta_deg")
+    (note,) = read_recording(path, "time=t,force=u,position=theta_deg").notices
+    assert "the position 'theta_deg' in deg" in note.text
+    assert "the force, which is taken to be in Nm" in note.text
+    assert not read_recording(path, "time=t,force=u[Nm],position=theta_deg[deg]").notices
+    with pytest.raises(InputError, match=r"multiplied by 2; .* position=...\*2\[deg\]"):
+        read_recording(path, "time=t,force=u,position=theta_deg*2")
+
+
 def test_units_in_headers(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     np.savetxt(

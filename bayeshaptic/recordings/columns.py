@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bayeshaptic.devices.table import nearest
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.readers import Arrays
-from bayeshaptic.recordings.units import base_unit, is_unit
+from bayeshaptic.recordings.units import base_unit, is_unit, unit_in_name
 
 # What may stand for the force and for the position (`signals.other_outputs`), where it is named.
 FORCES, POSITIONS = ("force", "measured_force"), ("position", "velocity", "acceleration")
@@ -164,14 +164,20 @@ def _find(arrays: Arrays, name: str) -> str | None:
 
 
 def _unit_times(key: str, factor: float, role: str, path: Path) -> str | None:
-    """The unit that a header says, of values times a factor."""
+    """The unit that a header says, in brackets or as its end, of values times a factor."""
     unit = name_and_unit(key)[1]
+    ending = unit_in_name(role, key) if unit is None else None
+    unit = unit or ending
     if unit is None or abs(factor) == 1.0 or role not in RECORDING_ROLES:
         return unit
     try:
-        _, multiple = base_unit(role, unit)
+        base, multiple = base_unit(role, unit)
     except InputError:  # volts times a force constant
         return None
+    if ending is not None and base == "A":  # amperes, too
+        return None
+    if ending is not None and np.isclose(abs(factor), multiple, rtol=1e-3):  # t_us*1e-6
+        return base
     if multiple != 1.0:
         raise InputError(
             f"{path}: '{key}' is multiplied by {factor:g}; write which unit that gives, as in "

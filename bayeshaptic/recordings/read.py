@@ -27,7 +27,13 @@ from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
 from bayeshaptic.recordings.signals.timing import sampling_period
-from bayeshaptic.recordings.units import base_unit, choose_units, kind_by_names, says_volts
+from bayeshaptic.recordings.units import (
+    base_unit,
+    choose_units,
+    kind_by_names,
+    said_by_names,
+    says_volts,
+)
 
 Columns = str | Mapping[str, str] | None
 Span = tuple[float | None, float | None]
@@ -227,12 +233,14 @@ def recorded(
     """The recording in the arrays of a file; see `read_recording`."""
     signals: dict[str, NDArray[np.float64]] = {}
     units: dict[str, str | None] = {}
+    written: dict[str, str | None] = {}
     force, position = played_by(FORCES, mapping, path), played_by(POSITIONS, mapping, path)
     for role in (force, position, "time"):
         found = pick(arrays, role, mapping, path, required=role != "time" or period_s is None)
         if found is None:
             continue
         values, unit = found
+        written[role] = unit
         units[role], factor = (None, 1.0) if unit is None else base_unit(role, unit)
         signals[role] = values * factor if factor != 1.0 else values
     signals["force"] = signals.pop(force)
@@ -256,6 +264,9 @@ def recorded(
         reference=signals.get(REFERENCE),
     )
     recording = as_command_and_position(recording, force, position)
+    bare = {role: mapping[role].names[-1] for role in mapping if mapping[role].unit is None}
+    by_names = said_by_names(bare, written, recording.force_unit)
+    recording = replace(recording, notices=recording.notices + by_names)
     if units[force] is None and force in mapping and _in_volts(mapping[force]):
         text = (
             f"The name of the force, '{mapping[force].text}', says volts, and it is taken to be "

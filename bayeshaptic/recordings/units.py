@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import FORCE_UNITS, POSITION_UNITS
 
 # unit -> (base unit, factor)
@@ -108,6 +109,43 @@ def unit_by_name(role: str, name: str) -> str | None:
         if re.search(words, re.split(r"[/.]", name)[-1], re.I):
             return unit
     return None
+
+
+def unit_in_name(role: str, name: str) -> str | None:
+    """The unit of a role that a name ends in: ``theta_deg``, ``speed_rad_s``; None without one.
+
+    One letter may be an index (``theta_m`` of a motor) and small letters a word: they hold where
+    the name speaks of that unit, and one letter where it speaks of none.
+    """
+    known = _BY_ROLE.get(role, {})
+    spelled = {unit.lower(): unit for unit in known}
+    words = re.split(r"_|\s+(?=\S\S)", name)
+    for count in (2, 1):  # m_s is m/s
+        end, stem = "/".join(words[-count:]), "_".join(words[:-count])
+        written = _plain(end)
+        unit = written if written in known else spelled.get(written.lower())
+        if unit is None or not stem:
+            continue
+        quantity = {"measured_force": "force", "velocity": "position"}.get(role, role)
+        spoken = unit_by_name(quantity, stem) if quantity in _BY_NAME else None
+        exact = written in known and (len(written) > 1 or spoken is None)
+        if exact or spoken == known[unit][0] or len(written) > 2:
+            return unit
+    return None
+
+
+def said_by_names(
+    names: Mapping[str, str], units: Mapping[str, str | None], force_unit: str
+) -> tuple[Notice, ...]:
+    """A note of which `units` the ends of `names` say, by their roles, and of a force's if none."""
+    said = [role for role in names if units.get(role) == (unit_in_name(role, names[role]) or ...)]
+    if not said:
+        return ()
+    text = ", ".join(f"the {role} '{names[role]}' in {units[role]}" for role in said)
+    if any("force" in role and unit is None for role, unit in units.items()):
+        text += f"; nothing says that of the force, which is taken to be in {force_unit}"
+    text = f"By its name is {text}. Say otherwise with --columns, as in {said[0]}=NAME[UNIT]."
+    return (Notice("note", "units", text),)
 
 
 def kind_by_names(force: str, position: str) -> str | None:
