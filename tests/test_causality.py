@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import chirp
+from scipy.signal import chirp, lfilter
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.errors import InputError
@@ -283,3 +283,21 @@ def test_the_measured_bench_is_open_loop() -> None:
     assert found.answer.value > 0.3
     swapped = "time=time*1e-6,force=theta_mx[N],position=iq_refx[m]"
     assert measured(name, swapped).swapped
+
+
+def a_motor(noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Torque and speed of a mass with a damper under binary noise, 50 times a second."""
+    rng = np.random.default_rng(4)
+    force = np.repeat(rng.choice([-1.0, 1.0], 300), 5)
+    left = np.exp(-0.02 / 0.036)  # of the speed after a sample
+    speed = lfilter([0.0, 0.0, 1 - left], [1.0, -left], force)
+    return force, speed + noise * rng.normal(size=len(speed))
+
+
+def test_a_speed_is_no_position() -> None:
+    """A stiffness was recommended of it, of two masses 34,000 times apart, in green."""
+    force, speed = a_motor(0.01)
+    with pytest.raises(InputError, match=r"looks like a velocity.*velocity=NAME\[rad/s\]"):
+        check_recording(recording_from_arrays(force, speed, period_s=0.02, position_unit="rad"))
+    position = np.cumsum(speed) * 0.02
+    check_recording(recording_from_arrays(force, position, period_s=0.02, position_unit="rad"))

@@ -287,6 +287,14 @@ def _causality(recording: Recording, where: str) -> list[Notice]:
             "depend on the motion, and longer."
         )
         return [Notice("warning", "feedback", text)]
+    own = recording.sensed is None or recording.sensed.derivatives == 0
+    if own and rough_response(recording).is_velocity(recording.period_s):
+        raise InputError(
+            f"{where}: what should be the position looks like a velocity: a mass with a damper "
+            "explains it as its velocity, and not as its position; say so with --columns, as in "
+            "velocity=NAME[rad/s], or give the position",
+            topic="swapped",
+        )
     if found.early_position:
         text = (
             "The position answers to the force within the same sample: it seems to be recorded "

