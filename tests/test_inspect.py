@@ -78,6 +78,42 @@ def test_degrees_gaps_and_rows_that_are_there_twice(tmp_path: Path) -> None:
         read_recording(path, found.mapping)
 
 
+@pytest.mark.parametrize(
+    ("header", "size", "line", "words"),
+    [
+        ("t,u,theta_deg", 1.3, "force=u,position=theta_deg[deg],time=t[ms]", "in deg by its name"),
+        ("t_us,cmd_mNm,x_mm", 1.3, "force=cmd_mNm[mNm],position=x_mm[mm],time=t_us[us]", "in mm"),
+        ("t,u,y", 1.3, "force=u,position=y[UNIT],time=t[ms]", "large for metres or radians"),
+        ("t,u,y", 1.0, "force=u,position=y,time=t[ms]", "whole numbers: encoder counts?"),
+    ],
+)
+def test_the_line_has_the_unit_or_asks_for_it(
+    tmp_path: Path, header: str, size: float, line: str, words: str
+) -> None:
+    """What the numbers cannot be is not suggested: metres and radians of thousands."""
+    path, study = tmp_path / "a.csv", tmp_path / "study.toml"
+    columns = np.column_stack([np.arange(N), FORCE, size * np.round(POSITION / 3e-6)])
+    np.savetxt(path, columns, header=header, comments="", delimiter=",")
+    found = overview(path)
+    assert found.mapping == line
+    assert words in "\n".join(lines(found))
+    assert cli.main(["inspect", str(path), "--write", str(study)]) == 0
+    if "UNIT" in line:
+        with pytest.raises(InputError, match="'UNIT' is no unit of position: use m, mm"):
+            read_recording(path, line)
+
+
+def test_two_levels_are_no_counts_and_no_time_asks_for_the_period(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    for low, high, whole in ((1.837, 3.081, False), (-2.0, 3.0, True)):
+        force = np.where(FORCE > 0, high, low)
+        columns = np.column_stack([force, POSITION])
+        np.savetxt(path, columns, header="u,y", comments="", delimiter=",")
+        shown = lines(overview(path))
+        assert ("converter counts?" in "\n".join(shown)) == whole
+        assert shown[-1] == '--columns "force=u,position=y" --period-s SECONDS'
+
+
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "a.csv", "t,u,y,v\x1b[31m")
     study, picture = tmp_path / "study.toml", tmp_path / "a.png"

@@ -86,7 +86,8 @@ def lines(found: Overview) -> list[str]:
     if found.mapping is None:
         table.append("no force and position were recognised; name them with --columns")
     else:
-        table.append(f"--columns {_quoted(printable(found.mapping))}")
+        period = "" if "time" in found.roles else " --period-s SECONDS"
+        table.append(f"--columns {_quoted(printable(found.mapping))}{period}")
     return table
 
 
@@ -133,10 +134,11 @@ def _answer(question: str) -> str:
 
 def study_text(found: Overview, path: Path, mapping: str | None) -> str:
     """A study with this one recording, its columns as in `mapping`."""
-    from bayeshaptic.recordings.overview import unit_of
+    from bayeshaptic.recordings.overview import UNIT_TO_SAY, unit_of
 
     terms = dict(part.split("=", 1) for part in (mapping or "").split(",") if part)
-    units = {unit_of(found, role, term) for role, term in terms.items() if role != "time"}
+    said = {role: term for role, term in terms.items() if not term.endswith(UNIT_TO_SAY)}
+    units = {unit_of(found, role, term) for role, term in said.items() if role != "time"}
     kind, other = "translational", "rotational"
     if units & {"Nm", "rad"}:
         kind, other = other, kind

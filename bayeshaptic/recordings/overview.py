@@ -19,8 +19,14 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.columns import DEFAULT_HEADERS, name_and_unit, parse_columns, pick
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.units import base_unit, is_of_another_role, says_volts, unit_by_name
-from bayeshaptic.recordings.units_in_doubt import steps_of_a_turn
+from bayeshaptic.recordings.units import (
+    base_unit,
+    is_of_another_role,
+    says_volts,
+    unit_by_name,
+    unit_in_name,
+)
+from bayeshaptic.recordings.units_in_doubt import is_whole, steps_of_a_turn
 
 # Words that names of such signals have, in the order in which they are believed.
 _WORDS = {
@@ -33,6 +39,8 @@ _FACTORS = {
     "force": "multiply by the force of one, as in *0.01[N]",
     "position": "multiply by the size of one, as in *3.1e-6[m]",
 }
+# In the line for ``--columns``, where a person must say it: it is refused.
+UNIT_TO_SAY = "[UNIT]"
 # Behind these a signal is not what was commanded, or not a position.
 _OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$|(^|[/._ ])d(x|y|q|phi|theta)\b"
 
@@ -57,6 +65,8 @@ class ColumnFacts:
         From the header.
     missing : int
         How many are no number.
+    whole : bool
+        Whether all are whole numbers.
     """
 
     name: str
@@ -68,6 +78,7 @@ class ColumnFacts:
     roughness: float
     unit: str | None
     missing: int = 0
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -135,6 +146,7 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
         float(np.sqrt(np.mean(steps**2))) / spread if spread > 0 else np.nan,
         unit,
         missing,
+        is_whole(signal),
     )
 
 
@@ -180,15 +192,31 @@ def _says(name: str, role: str) -> bool:
 
 
 def _scale(role: str, column: ColumnFacts) -> str:
-    """The unit to write after a name, where the header has none and the numbers speak for one."""
-    if column.unit is not None or role == "force":
+    """The unit to write after a name, where the header has none in brackets.
+
+    By the name, or by what the numbers speak for; where they speak against m and rad it is left to
+    be said.
+    """
+    if column.unit is not None or column.name in DEFAULT_HEADERS[role]:
         return ""
+    if (unit := unit_in_name(role, column.name)) is not None:
+        return f"[{unit}]"
+    if role == "position" and _is_large(column):
+        return UNIT_TO_SAY
     if role == "time" and column.period is not None:
         # Loops run at 100 Hz to 20 kHz.
         for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
             if 4e-5 <= column.period * factor <= 1.1e-2:
                 return "" if unit == "s" else f"[{unit}]"
     return ""
+
+
+def _is_large(column: ColumnFacts) -> bool:
+    """Whether these are no metres or radians: neither counts, nor degrees by their steps."""
+    if column.whole or max(abs(column.low), abs(column.high)) <= 10:
+        return False
+    turns = unit_by_name("position", column.name) == "rad"
+    return not (turns and steps_of_a_turn(column.resolution))
 
 
 def doubts(column: ColumnFacts, role: str) -> str:
@@ -199,15 +227,16 @@ def doubts(column: ColumnFacts, role: str) -> str:
         return f"{column.missing} rows without a number: fill them in, or read a part without them"
     if column.unit is not None:
         return _factor_for(column.unit, role)
-    whole = column.resolution is not None and column.resolution >= 1
-    if role == "position" and whole:
+    if (unit := unit_in_name(role, column.name)) is not None:
+        return f"in {unit} by its name: say so if it is not"
+    if role == "position" and column.whole:
         return f"whole numbers: encoder counts? {_FACTORS[role]}"
     guess = unit_by_name(role, column.name)
     if guess == "rad" and (turn := steps_of_a_turn(column.resolution)):
         return f"{turn:,} steps to 360: degrees? Write [deg] after the name"
-    if role == "position" and max(abs(column.low), abs(column.high)) > 10:
+    if role == "position" and _is_large(column):
         return "large for metres or radians: write the unit, as in [mm] or [deg]"
-    if role == "force" and whole:
+    if role == "force" and column.whole:
         return f"whole numbers: converter counts? {_FACTORS[role]}"
     if role == "force" and says_volts(column.name):
         return f"volts? {_FACTORS[role]}"

@@ -38,14 +38,14 @@ def whole_numbers(recording: Recording) -> list[Notice]:
     """
     notices = []
     levels = 20  # of a force, which may be whole newtons
-    if _is_whole(recording.force) and len(np.unique(recording.force)) > levels:
+    if is_whole(recording.force) and len(np.unique(recording.force)) > levels:
         text = (
             f"The forces are whole numbers, from {recording.force.min():g} to "
             f"{recording.force.max():g} {recording.force_unit}: are they counts of a converter? "
             f"Write force=NAME*C[{recording.force_unit}] with the force C of one count."
         )
         notices.append(Notice("warning", "units", text))
-    if not _is_whole(recording.position):
+    if not is_whole(recording.position):
         return notices
     unit = recording.position_unit
     text = (
@@ -56,7 +56,8 @@ def whole_numbers(recording: Recording) -> list[Notice]:
     return [*notices, Notice("warning", "units", text)]
 
 
-def _is_whole(signal: Floats) -> bool:
+def is_whole(signal: Floats) -> bool:
+    """Whether these are whole numbers, all of them."""
     return np.array_equal(signal, np.round(signal))
 
 
