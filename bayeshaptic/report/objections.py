@@ -96,7 +96,7 @@ def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
             "damping of what moves slowly, mostly) only the prior fills"
         )
     never = float((analysis.limit.samples <= 0).mean())
-    if never > min(HEADLINE_RISKS):
+    if never > min(HEADLINE_RISKS) and not is_certain(analysis.notices):  # biased, too
         found.append(
             f"with probability {percent(never)} the loop is unstable however soft the wall is"
         )

@@ -212,8 +212,8 @@ def _too_short(
     if lines and high < 0.5 / recording.period_s:
         return (
             f"{where} are too few: {what} {low:.4g} to {high:.4g} Hz, {lines} lines of the "
-            f"spectrum, and {needed} are needed; record {needed / (high - low):.3g} s, or use "
-            f"{needed / recording.duration_s:.3g} Hz"
+            f"spectrum, and {needed} are needed; record {needed / (high - low):.3g} s, or use a "
+            f"band that is {needed / recording.duration_s:.3g} Hz wide"
         )
     seconds = max((FEWEST_WINDOWS + LOW_END_WINDOWS) * minimum / high, SHORTEST_S)
     return f"{where} are too few for a frequency response; record at least {seconds:.2g} s"
