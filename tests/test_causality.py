@@ -19,8 +19,10 @@ from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality import NOTABLE_SHARE, Causality, causality
 from bayeshaptic.recordings.signals.rough_response import rough_response
+from bayeshaptic.recordings.signals.switching import is_switched
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 
 MEASURED = Path(
@@ -190,6 +192,41 @@ def test_a_relay_is_feedback_and_a_binary_sequence_is_not() -> None:
     found = judge(force[0], position[0])
     assert found.relay
     assert found.has_feedback
+
+
+def about(bench: Bench, reach: float, hysteresis: float, seconds: float = 8.0) -> Recording:
+    """A relay about one set point and, half-way, about that on the other side."""
+    half, force = round(seconds / bench.period_s) // 2, 3 * bench.force_rms
+
+    def relay(k: int, position: float) -> float:
+        nonlocal force
+        off = position - (reach if k < half else -reach)
+        if abs(off) > hysteresis:
+            force = -np.sign(off) * abs(force)
+        return float(force)
+
+    return recording_from_arrays(**run_loop(bench, relay, seconds, seed=5).signals)
+
+
+@pytest.mark.parametrize("hysteresis", [0.0, 0.01])
+def test_a_relay_about_a_set_point_that_changes_is_refused(hysteresis: float) -> None:
+    recording = about(Bench.from_device("phantom"), 0.3, hysteresis)
+    with pytest.raises(InputError, match="bayeshaptic relay"):
+        check_recording(recording)
+
+
+@pytest.mark.parametrize("device", ["lhifam", "phantom"])
+def test_no_binary_force_in_open_loop_is_a_relay(device: str) -> None:
+    rng = np.random.default_rng(12)
+    time = np.arange(6000) * PERIOD
+    binary = [np.repeat(rng.choice([-1.0, 1.0], 6000 // hold), hold) for hold in range(1, 9)]
+    binary += [np.where((time * hz) % 1 < 0.5, 1.0, -1.0) for hz in (3.3, 17.0, 71.3)]
+    binary += [np.sign(chirp(time, 5.0, 6.0, 40.0) + 1e-9)]
+    for held in (False, True):
+        bench = Bench.from_device(device, held=held)
+        for seed, force in enumerate(binary):
+            made = simulate(bench, 2 * bench.force_rms * force, seed=seed)
+            assert not is_switched(made.signals["force"], made.signals["position"])
 
 
 def test_a_force_that_repeats_exactly_is_no_feedback() -> None:

@@ -262,8 +262,8 @@ def _causality(recording: Recording, where: str) -> list[Notice]:
     if found.relay:
         raise InputError(
             f"{where}: a relay recording (the force switches between {recording.force.min():.3g} "
-            f"and {recording.force.max():.3g} {recording.force_unit} with the sign of the "
-            "position), of which no frequency response can be estimated; its gain margin is read "
+            f"and {recording.force.max():.3g} {recording.force_unit} where the position passes a "
+            "set point), of which no frequency response can be estimated; its gain margin is read "
             f"by: bayeshaptic relay {where}",
             topic="relay",
         )

@@ -18,6 +18,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import Repetition, find_repetition, is_sweep
 from bayeshaptic.recordings.signals.news import News, news
 from bayeshaptic.recordings.signals.prediction import Share, predict
+from bayeshaptic.recordings.signals.switching import is_switched
 from bayeshaptic.types import Bools, Floats
 
 # Share of the force's error that the position's past must remove, its z, and the floor: errors
@@ -72,7 +73,8 @@ class Causality:
         The force repeats exactly, period by period: it cannot have been computed from a noisy
         position.
     relay : bool
-        The force has two levels, and the sign of the position decides which.
+        The force has two levels, and the sign of the position decides which, or it switches where
+        the position passes the same places.
     smooth_position : bool
         The position is smoother than the force, as that of every mass is.
     """
@@ -230,6 +232,8 @@ def _causality(force: Floats, position: Floats, stretches: int) -> Causality:
     force, position = (signal[start : start + most_samples] for signal in (force, position))
     at_limits = _at_limits(force)
     saturates = float(np.mean(at_limits))
+    repeats = find_repetition(force, _SAME, noise=0.0) is not None
+    relay = _is_relay(force, position) or (not repeats and is_switched(force, position))
     left_out = at_limits if 0 < saturates < _MOST_AT_LIMIT else None
     of_force = predict(force, position, left_out, stretches)
     of_position = predict(position, force, stretches=stretches)
@@ -241,8 +245,8 @@ def _causality(force: Floats, position: Floats, stretches: int) -> Causality:
         next_sample=of_force.next_instant(),
         answers=of_force.answers(),
         at_limits=saturates,
-        repeats=find_repetition(force, _SAME, noise=0.0) is not None,
-        relay=_is_relay(force, position),
+        repeats=repeats,
+        relay=relay,
         smooth_position=_roughness(position) < _roughness(force),
     )
 

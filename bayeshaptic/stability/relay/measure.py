@@ -16,7 +16,7 @@ measurement says so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.switching import stretches
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.relay.estimate import estimate, jackknife, oscillation_share
 from bayeshaptic.stability.relay.spectra import (
@@ -73,6 +74,9 @@ class RelayMeasurement(Shown):
         Begin and end of the steady part that was used.
     share : float
         The oscillation's share of the motion's variance, above half its frequency.
+    set_point : float
+        Middle of the oscillation: half-way between the places at which the relay switches up and
+        down.
     notices : tuple of Notice
     """
 
@@ -88,6 +92,7 @@ class RelayMeasurement(Shown):
     unit: str
     steady_s: tuple[float, float]
     share: float
+    set_point: float
     notices: tuple[Notice, ...] = ()
 
     def _lines(self) -> tuple[str, ...]:
@@ -127,7 +132,7 @@ class RelayMeasurement(Shown):
         return _relative_db(self.critical_stiffness_sd / self.critical_stiffness)
 
 
-def _refuse_no_relay(force: Floats, position: Floats, name: str) -> None:
+def _refuse_no_relay(force: Floats, position: Floats, middle: float, name: str) -> None:
     """Refuse a force of many levels, and one that does not switch with the position."""
     level = np.median(np.abs(force))
     at_level = np.mean(np.abs(np.abs(force) - level) <= _NEAR_LEVEL * level)
@@ -136,7 +141,7 @@ def _refuse_no_relay(force: Floats, position: Floats, name: str) -> None:
             f"{name}: not a relay recording: {100 * at_level:.0f} % of the force is at the levels "
             "±h of a relay; use 'bayeshaptic report'"
         )
-    signs = np.sign(force), np.sign(position - np.median(position))
+    signs = np.sign(force), np.sign(position - middle)
     latest = 64
     together = max(
         abs(float(np.mean(signs[0][: len(force) - lag] * signs[1][lag:])))
@@ -176,7 +181,13 @@ def measure_relay(recording: Recording | str | Path) -> RelayMeasurement:
             f"{recording.name}: {'force' if np.ptp(force) == 0 else 'position'} never changes; "
             "a relay experiment has a force that switches and a position that oscillates"
         )
-    _refuse_no_relay(force, position, recording.name)
+    about = stretches(force, position)
+    began, middle = 0, float(np.median(position))
+    if len(about) > 1:
+        most = max(about, key=lambda part: part.at_places)
+        began, middle = most.first, most.middle
+        force, position = (signal[began : most.stop] for signal in (force, position))
+    _refuse_no_relay(force, position, middle, recording.name)
     segment = min(SEGMENT, 2 * len(force) // (LEAST_SEGMENTS + 1) // 2 * 2)
     if segment < 64:
         raise InputError(
@@ -188,7 +199,7 @@ def measure_relay(recording: Recording | str | Path) -> RelayMeasurement:
     linear, quadratic = (estimate(spectra, order) for order in (1, 2))
     sd = jackknife(spectra, quadratic)
     unit = unit_of("stiffness", recording.force_unit, recording.position_unit)
-    end = len(force) * recording.period_s
+    end = (began + len(force)) * recording.period_s
     share = oscillation_share(spectra, quadratic.frequency_hz)
     bound = 180 * quadratic.frequency_hz * recording.period_s
     # A curved response: half of what the curvature brought is an error of the next order.
@@ -208,15 +219,28 @@ def measure_relay(recording: Recording | str | Path) -> RelayMeasurement:
         quadratic.critical * log_sd if known else None,
         quadratic.crossing_hz if known else None,
         unit,
-        (first * recording.period_s, end),
+        ((began + first) * recording.period_s, end),
         share,
+        middle,
     )
-    found = tuple(_notices(measured, recording, force[first:], position[first:], segment))
-    return RelayMeasurement(**{**vars(measured), "notices": (*recording.notices, *found)})
+    found = _notices(measured, recording, force[first:], position[first:], segment)
+    if len(about) > 1:
+        found.insert(0, _one_of_several(measured, recording.position_unit))
+    return replace(measured, notices=(*recording.notices, *found))
 
 
 def _relative_db(relative: float) -> float:
     return float(20 / np.log(10) * relative)
+
+
+def _one_of_several(measured: RelayMeasurement, unit: str) -> Notice:
+    begin, end = measured.steady_s
+    return Notice(
+        "note",
+        "set point",
+        "The set point changes: what is told is of the stretch about one with the most switches, "
+        f"{quantity(measured.set_point, unit)}, {begin:.3g} to {end:.3g} s.",
+    )
 
 
 def _notices(

@@ -1,0 +1,124 @@
+"""Where a force of two levels switches: a relay's does where the position passes the same places.
+
+Upwards at one place and downwards at another, about one set point or a few, a few samples later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.types import Floats
+
+# Error rates of these numbers are in docs/door.md.
+FEWEST_SWITCHES = 16
+OF_SWITCHES = 0.8  # share of all that come where the position passes a place
+_AT_LEVEL = 0.99  # share of the samples at the two levels: a recording may begin at zero
+_LATEST = 4  # samples from the passage to the switch
+_LATE = 0.1  # of the time between two switches, by which one may be earlier or later
+_LATE_SAMPLES = 2
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Switches about one set point.
+
+    Attributes
+    ----------
+    first, stop : int
+        Samples from the first switch to the last.
+    middle : float
+        The place between those of the switches up and down: the set point.
+    switches : int
+    at_places : int
+        How many of them come where the position first passes their place.
+    """
+
+    first: int
+    stop: int
+    middle: float
+    switches: int
+    at_places: int
+
+
+def switches_of(force: Floats) -> NDArray[np.int_]:
+    """The first sample after each switch of a force between two levels."""
+    up = force > (force.min() + force.max()) / 2
+    return np.flatnonzero(np.diff(up.astype(int))) + 1
+
+
+def stretches(force: Floats, position: Floats) -> tuple[Stretch, ...]:
+    """Switches of a force of two levels, parted where the middle of the oscillation jumps."""
+    at = switches_of(force)
+    if len(at) < FEWEST_SWITCHES:
+        return ()
+    up = force[at] > (force.min() + force.max()) / 2
+    holds = np.maximum.reduceat(position, at), np.minimum.reduceat(position, at)
+    top, bottom = (np.asarray(side[:-1]) for side in holds)
+    # Over a whole oscillation, a hold up and one down.
+    high, low = np.maximum(top[1:], top[:-1]), np.minimum(bottom[1:], bottom[:-1])
+    swing, middle = float(np.median(high - low)), (high + low) / 2
+    order = np.sort(middle)
+    borders = order[:-1][np.diff(order) > swing] + swing / 2
+    about = np.searchsorted(borders, middle)
+    parts = np.split(np.arange(len(about)), np.flatnonzero(np.diff(about)) + 1)
+    found = []
+    for part in parts:
+        # The holds of an oscillation lie after its switches; the last of them ends it.
+        chosen = np.arange(part[0], part[-1] + 3)
+        found.append(_stretch(position, at[chosen], up[chosen]))
+    return tuple(found)
+
+
+def _stretch(position: Floats, at: NDArray[np.int_], up: NDArray[np.bool_]) -> Stretch:
+    best, middle = -1, 0.0
+    for lag in range(_LATEST + 1):
+        after, before = (np.maximum(at - lag - k, 0) for k in (0, 1))
+        passed = (position[after] + position[before]) / 2
+        places = [float(np.median(passed[side])) for side in (up, ~up)]
+        count = _at_places(position, at, up, lag, places)
+        if count > best:
+            best, middle = count, (places[0] + places[1]) / 2
+    return Stretch(int(at[0]), int(at[-1]), middle, len(at) - 1, best)
+
+
+def _at_places(
+    position: Floats, at: NDArray[np.int_], up: NDArray[np.bool_], lag: int, places: list[float]
+) -> int:
+    """Switches that come `lag` samples after the position is first beyond their place."""
+    count = 0
+    for begin, end, turns_up in zip(at[:-1], at[1:], up[1:], strict=True):
+        late = min(int(_LATE * (end - begin)), _LATE_SAMPLES)
+        first = max(begin - lag, 0)
+        seen = position[first : max(first, end - lag + late + 1)]
+        beyond = seen <= places[0] if turns_up else seen >= places[1]
+        if beyond.any():
+            passage = first + int(np.argmax(beyond))
+            count += abs(end - lag - passage) <= late
+    return count
+
+
+def is_switched(force: Floats, position: Floats) -> bool:
+    """A force of two levels that switches where the position passes the same places.
+
+    Under a square wave of a clock the motion is as regular as that: nothing is said of a force
+    whose switches come in equal times but for a sample.
+    """
+    low, high = force.min(), force.max()
+    near = 1e-6 * (high - low)
+    if np.mean((force - low <= near) | (high - force <= near)) < _AT_LEVEL:
+        return False
+    at = switches_of(force)
+    if len(at) < FEWEST_SWITCHES or _clocked(at):
+        return False
+    found = stretches(force, position)
+    return sum(part.at_places for part in found) >= OF_SWITCHES * len(at)
+
+
+def _clocked(at: NDArray[np.int_]) -> bool:
+    """Times between switches, each direction's, are the same but for one sample."""
+    times = np.diff(at)
+    sides = (times[::2], times[1::2])
+    return all(np.ptp(np.quantile(side, [0.05, 0.95])) <= 1 for side in sides)
