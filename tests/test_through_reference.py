@@ -25,6 +25,8 @@ from bayeshaptic.recordings.followed import through_reference
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
 from bayeshaptic.recordings.signals.controller import followed
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.page.next_step import next_steps
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
@@ -174,6 +176,32 @@ def test_one_mass_that_rubs_is_followed_in_time_although_its_reference_was_writt
     found = closed.analysis.posterior.summary()
     for name, truth in (("m", mass), ("b", bench.values["b"]), ("coulomb", 0.3 * force)):
         assert abs(found[name]["mean"] - truth) < 4 * found[name]["sd"], name
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"model": "free"}, "Set aside: the base model free"),
+        ({"modes": 1}, "Set aside: the base model free"),
+        ({"model": "rigid"}, "The reference is not used: one mass is followed in time"),
+        ({}, "The reference is not used: "),
+    ],
+)
+def test_what_one_mass_that_is_followed_sets_aside_is_said(given: dict, words: str) -> None:
+    """A reference that was given, though of no use, is not advised to be written down."""
+    bench = Bench.from_device("lhifam", False, "rigid")
+    law = Feedback(bench.values["m"] * 20.0**2, 0.5 * bench.values["m"] * 20.0)
+    made = following(bench, law, wanted("steps", bench, 2 * bench.force_rms / law.proportional))
+    if given != {"model": "rigid"}:  # it answers to the motion
+        made = replace(made, reference=made.force)
+    closed = close_loop(made, hidden=False, ess=50, **given)
+    assert closed.analysis.in_loop is not None
+    told = [n.text for n in closed.analysis.notices if n.level == "warning"]
+    assert any(words in text for text in told)
+    doubted = replace(closed.analysis.in_loop, doubts=("in doubt",))
+    result = replace(closed, analysis=replace(closed.analysis, in_loop=doubted))
+    steps = next_steps(headline(result), result)
+    assert steps and not any("reference" in step.text for step in steps)
 
 
 def test_a_mode_among_few_windows_is_doubted_where_one_above_them_explains_as_much() -> None:

@@ -22,7 +22,7 @@ from bayeshaptic.models.structures import chain
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
-from bayeshaptic.recordings.followed import through_reference, too_weak
+from bayeshaptic.recordings.followed import through_reference, too_weak, unusable
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
@@ -116,7 +116,7 @@ class Clock:
 class Opened:
     """A measurement that was checked, with its response; attributes are those of `Analysis`.
 
-    `one_mass` says that the device was declared to be one.
+    `asked` is the name of the base model that was asked for.
     """
 
     etfe: Etfe
@@ -124,7 +124,12 @@ class Opened:
     notices: tuple[Notice, ...]
     seconds: dict[str, float]
     lever_m: float | None
-    one_mass: bool
+    asked: str
+
+    @property
+    def one_mass(self) -> bool:
+        """Whether the device was declared to be one."""
+        return self.asked == "rigid"
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,8 @@ def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -
 def opened(measurement: Recording | Etfe, model: str | Model, options: Options) -> Opened:
     """Check the measurement, and estimate its response."""
     asked = base_model(model, options)
-    one_mass = (asked.name if isinstance(asked, Model) else asked) == "rigid"
+    name = asked.name if isinstance(asked, Model) else asked
+    one_mass = name == "rigid"
     clock = Clock()
     device = device_of(options, asked)
     if isinstance(measurement, Recording):
@@ -156,6 +162,8 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             whole = unbroken(measurement)
             notices += told(measurement.feedback, check_recording(whole, device))
             if one_mass:  # followed in time instead
+                if measurement.reference is not None and has_feedback(notices):
+                    notices += (unusable("one mass is followed in time, which needs none"),)
                 measurement = replace(measurement, reference=None)
             else:
                 measurement, notices = through_reference(measurement, notices)
@@ -172,7 +180,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     lever_m = options.lever_m
     if lever_m is None and device is not None:
         lever_m = device.lever_m
-    return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m, one_mass)
+    return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m, name)
 
 
 @single_threaded

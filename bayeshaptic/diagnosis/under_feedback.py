@@ -102,11 +102,28 @@ def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
         posterior=posterior,
         limit=limit,
         etfe_limit=EtfeCriticalStiffness(None, None, None, None, limit.unit, NO_WITNESS),
-        notices=told + (_open_loop(recording) if open_loop else limit.notices),
+        notices=told
+        + _set_aside(begun, options)
+        + (_open_loop(recording) if open_loop else limit.notices),
         seconds={**begun.seconds, "motion in the loop": time.perf_counter() - began},
         lever_m=begun.lever_m,
         in_loop=replace(found, doubts=doubts, questions=questions),
     )
+
+
+def _set_aside(begun: Opened, options: Options) -> tuple[Notice, ...]:
+    """What was said of the device and has no effect on one mass that nobody holds."""
+    if begun.asked not in ("auto", "rigid"):
+        what = f"the base model {begun.asked} that was asked for"
+    elif options.held:
+        what = "that somebody held the device"
+    else:
+        return ()
+    text = (
+        f"Set aside: {what}. The measured response is biased, so that no model can be fitted to "
+        "it, and the motion is followed as that of one mass that nobody holds, whatever is asked."
+    )
+    return (Notice("warning", "feedback", text),)
 
 
 def _open_loop(recording: Recording) -> tuple[Notice, ...]:

@@ -53,12 +53,12 @@ def through_reference(
     else:
         return alone, notices
     if np.ptp(found) == 0:
-        return alone, (*notices, _unusable(f"{what} never moves the command"))
+        return alone, (*notices, unusable(f"{what} never moves the command"))
     tried = replace(recording, reference=found)
     judged = causality(replace(unbroken(tried), force=found))
     if what != _READ_OFF and judged.has_feedback:
         why = f"{what} answers to the motion itself ({judged.evidence})"
-        return alone, (*notices, _unusable(f"{why}: check its gains, its filter and its sign"))
+        return alone, (*notices, unusable(f"{why}: check its gains, its filter and its sign"))
     text = (
         f"The force was computed from the motion; {what} tells what of it was not, and the "
         "response is read through that alone, so that feedback does not bias it."
@@ -72,13 +72,14 @@ def too_weak(notices: tuple[Notice, ...], why: str) -> tuple[Notice, ...]:
     """`notices` of a recording whose reference says too little, with the warnings of feedback."""
     text = (
         "The force was computed from the motion: the recording was made in closed loop, so the "
-        f"ETFE, the fit and K_CR are biased, and its reference does not help: {why}."
+        "ETFE, the fit and K_CR are biased."
     )
     kept = tuple(n for n in notices if (n.level, n.topic) != ("note", "feedback"))
-    return (*kept, Notice("warning", "feedback", text))
+    return (*kept, Notice("warning", "feedback", text), unusable(f"it does not help: {why}"))
 
 
-def _unusable(why: str) -> Notice:
+def unusable(why: str) -> Notice:
+    """That a reference is known, and set aside."""
     return Notice("warning", "reference", f"The reference is not used: {why}.")
 
 

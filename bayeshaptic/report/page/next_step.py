@@ -101,7 +101,8 @@ def _after_feedback(result: Result, command: str) -> tuple[Step, ...]:
         f"bayeshaptic report NEW.csv{_device(result)}",
     )
     if analysis.in_loop is None or analysis.in_loop.doubts:
-        return (again, _through(result)) if is_certain(analysis.notices) else (again,)
+        given = any(notice.topic == "reference" for notice in analysis.notices)
+        return (again, _through(result)) if is_certain(analysis.notices) and not given else (again,)
     rigid = "Or, where the device is known to be one rigid mass, say so. This recording will do:"
     return again, Step(rigid, f"{command} --model rigid")
 
