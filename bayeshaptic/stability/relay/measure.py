@@ -75,8 +75,8 @@ class RelayMeasurement(Shown):
     share : float
         The oscillation's share of the motion's variance, above half its frequency.
     set_point : float
-        Middle of the oscillation: half-way between the places at which the relay switches up and
-        down.
+        Middle of the oscillation: the median of the position; where the set point changes, half-way
+        between the places of the switches up and down.
     notices : tuple of Notice
     """
 
