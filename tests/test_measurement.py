@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import butter, lfilter
+from linear_bench import LHIFAM_HELD, Device
+from scipy.signal import butter, chirp, lfilter
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.clipped import clipped
@@ -206,3 +207,24 @@ def test_rounding_is_no_tone(excitation: str) -> None:
     model = build_model("free", "lhifam")
     fit = least_squares(model, etfe, start=model.values)
     assert find_tones(recording, etfe.band_hz, fit.response).tones == ()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sweeps_that_nearly_repeat_are_no_tones(seed: int) -> None:
+    """Where the force has tones itself, a response that is not quite the device's leaves some."""
+    held = Device({**LHIFAM_HELD, "ground": [(0.1, 0.0), (4.0, 0.0), (18.0, 1500.0)]})
+    rigid = Device({"masses": [5.4], "ground": [(22.0, 800.0)], "links": []})
+    rng = np.random.default_rng(seed)
+    samples, period_s, count = int(rng.uniform(6000, 12000)), 1e-3, 3e-7
+    length, time_s = samples / rng.integers(4, 9), np.arange(samples) * period_s
+    force = chirp(time_s % (length * period_s), 0.5, length * period_s, 300.0)
+    position = held.simulate(force)
+    between_hz = (np.round(50.0 * length * period_s) + 0.5) / (length * period_s)
+    hum = 3e-6 * np.cos(2 * np.pi * between_hz * time_s)
+    for added, tones in ((0.0, 0), (hum, 1)):
+        rounded = np.round((position + added) / count) * count
+        recording = recording_from_arrays(
+            force=force, position=rounded, period_s=period_s, force_unit="N", position_unit="m"
+        )
+        band = estimate_etfe(recording).band_hz
+        assert len(find_tones(recording, band, rigid.response).tones) == tones

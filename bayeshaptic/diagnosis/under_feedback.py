@@ -17,7 +17,7 @@ from bayeshaptic.diagnosis.feedback.in_loop import (
 from bayeshaptic.diagnosis.feedback.lacking import Lacking
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.diagnosis.samples.tones import in_words
+from bayeshaptic.diagnosis.samples.tone import in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.effects.measurement import MainsTone

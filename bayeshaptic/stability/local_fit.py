@@ -27,12 +27,17 @@ class ResponseData:
     design : ndarray of complex, shape (W, k, k)
         ``design @ response`` has independent noise of variance 1 in each component.
     centre_hz : ndarray, shape (W,)
+    linear : ndarray of bool, shape (W,)
+        Where 1/G is linear in the noise: what it bends by in the direction that is known least is
+        less than the noise of the one that is known best.  Lines that a sweep hardly excites
+        leave sums of neighbours that are known to a thousandth, and responses that are noise.
     """
 
     frequency_hz: Floats
     response: Complexes
     design: Complexes
     centre_hz: Floats
+    linear: NDArray[np.bool_]
 
 
 def response_data(etfe: Etfe) -> ResponseData:
@@ -50,8 +55,10 @@ def response_data(etfe: Etfe) -> ResponseData:
     strength = np.linalg.norm(design * response[:, None, :], axis=(1, 2)) / np.sqrt(k)
     noisiest = 0.3  # relative sd above which 1/G is not linear in the noise
     good = strength > 1 / noisiest
-    frequency = windows.frequency_hz[good]
-    return ResponseData(frequency, response[good], design[good], frequency.mean(axis=1))
+    frequency, response, design = windows.frequency_hz[good], response[good], design[good]
+    known = np.linalg.svd(design * response[:, None, :], compute_uv=False)  # over the noise
+    linear = np.minimum(known[:, -1], known[:, -1] ** 2 / known[:, 0]) > 1
+    return ResponseData(frequency, response, design, frequency.mean(axis=1), linear)
 
 
 def _noise(scatter: Floats, freedom: Floats) -> Floats:
@@ -144,6 +151,8 @@ def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | 
     narrower = 2  # steps from the widest span where a cubic passes
     for span in _SPANS:
         near = np.abs(data.centre_hz / centre_hz - 1) <= span
+        if inverted:
+            near &= data.linear
         numbers = int(near.sum()) * data.frequency_hz.shape[1]
         freedom, richer = numbers - order - 1, numbers - _RICHER - 1
         if richer < 2:

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.samples.tones import Tone, find_tones
+from bayeshaptic.diagnosis.samples.tone import Tone
+from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit
 from bayeshaptic.inference.time_domain.loop import Hum
 from bayeshaptic.recordings.recording import Recording

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.feedback.humming import tones_of
-from bayeshaptic.diagnosis.samples.tones import in_words
+from bayeshaptic.diagnosis.samples.tone import in_words
 from bayeshaptic.inference.time_domain.fit import NAMES
 from bayeshaptic.quantities import pure, quantity, scale
 from bayeshaptic.report.loop.followed import followed
