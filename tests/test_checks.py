@@ -19,7 +19,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
 from bayeshaptic.recordings.checks import FEWEST_SAMPLES
 from bayeshaptic.recordings.read import recording_from_arrays
-from bayeshaptic.recordings.units_in_doubt import steps_of_a_turn
+from bayeshaptic.recordings.units_in_doubt import position_is_in_doubt, steps_of_a_turn
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -233,3 +233,24 @@ def test_a_mass_of_170_kg_is_doubted_where_nobody_said_the_units(
     recording = recording_from_arrays(force=force, position=position, period_s=PERIOD, **said)
     texts = [notice.text for notice in check_recording(recording)]
     assert any("slip of units" in text for text in texts) == doubted
+
+
+@pytest.mark.parametrize(
+    ("columns", "doubted"),
+    [
+        ("force=u,position=y", True),
+        ("force=u,position=y[m]", False),
+        ("force=u,position=x", False),
+        ("force=u_V,position=x", False),
+    ],
+)
+def test_a_position_in_counts_is_in_doubt_unless_somebody_said_so(
+    tmp_path: Path, columns: str, doubted: bool
+) -> None:
+    """A limit in N/m of counts that were taken for metres was recommended."""
+    recording = held()
+    counts = np.round(recording.position / np.ptp(recording.position) * 30000)
+    path = tmp_path / "a.npz"
+    np.savez(path, u=recording.force, u_V=recording.force, y=counts, x=recording.position)
+    found = check_recording(read_recording(path, columns, period_s=recording.period_s))
+    assert position_is_in_doubt(found) == doubted

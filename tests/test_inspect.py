@@ -193,3 +193,72 @@ def test_signals_are_suggested_by_their_own_names(tmp_path: Path, name: str) -> 
     named = read_recording(tmp_path / name, mapping_of(name))
     assert {found.roles["force"][:1], found.roles["position"][:1]} == {"u", "q"}
     np.testing.assert_array_equal(recording.force, named.force)
+
+
+@pytest.mark.parametrize(
+    ("header", "roles"),
+    [
+        (
+            "time_s,pwm,setpoint,angle",
+            {"force": "pwm", "position": "angle", "reference": "setpoint"},
+        ),
+        ("t,target_pos,effort,position", {"force": "effort", "reference": "target_pos"}),
+        ("t,motor_cmd,commanded_deg,feedback_deg", {"force": "motor_cmd"}),
+        ("t,Target Torque,Target Pos,Position", {"force": "Target Torque", "position": "Position"}),
+        ("t,iq_ref,error,theta", {"force": "iq_ref", "position": "theta"}),
+    ],
+)
+def test_what_a_controller_followed_is_no_force(
+    tmp_path: Path, header: str, roles: dict[str, str]
+) -> None:
+    """Names tell: a reference in degrees was suggested as the force, or as the position."""
+    first, second = header.split(",")[1:3]
+    rough = np.random.default_rng(3).normal(size=N)  # rougher than the force, as a reference may be
+    signals = {roles["force"]: np.convolve(FORCE, [1, 1, 1], "same")}
+    columns = [np.arange(N), signals.get(first, rough), signals.get(second, rough), POSITION]
+    np.savetxt(
+        tmp_path / "a.csv", np.column_stack(columns), header=header, comments="", delimiter=","
+    )
+    found = overview(tmp_path / "a.csv")
+    assert roles.items() <= found.roles.items()
+    assert found.mapping is not None
+    assert "reference=" not in found.mapping
+    shown = "\n".join(lines(found))
+    assert ("Then add ,reference=" in shown) == ("reference" in found.roles)
+
+
+def test_a_speed_alone_is_named_as_one(tmp_path: Path) -> None:
+    """Beside it another signal is a position only where it goes as far as the speed says."""
+    speed, volts = np.gradient(POSITION), 12 + 0.01 * RNG.normal(size=N).cumsum()
+    for other, role in ((volts, "velocity"), (POSITION, "position")):
+        columns = np.column_stack([np.arange(N), FORCE, other, speed])
+        np.savetxt(
+            tmp_path / "a.csv", columns, header="t,PWM,a,Speed (RPM)", comments="", delimiter=","
+        )
+        found = overview(tmp_path / "a.csv")
+        assert role in found.roles and len(found.roles) == 3
+    np.savetxt(
+        tmp_path / "b.dat", np.column_stack([FORCE, speed]), header="torque rpm", comments="#"
+    )
+    shown = lines(overview(tmp_path / "b.dat"))
+    assert shown[-1] == '--columns "force=torque,velocity=rpm[rpm]" --period-s SECONDS'
+    np.savetxt(tmp_path / "c.csv", POSITION, header="angle", comments="")
+    assert "no force was recognised; name them with --columns" in lines(
+        overview(tmp_path / "c.csv")
+    )
+
+
+def test_a_guess_is_called_so_and_a_clock_asked_for(tmp_path: Path) -> None:
+    """Steps of a hundred are ten a second in ms and ten thousand in us."""
+    path = tmp_path / "a.csv"
+    columns = np.column_stack([100.0 * np.arange(N), FORCE, POSITION])
+    np.savetxt(path, columns, delimiter=",")
+    found = overview(path)
+    shown = "\n".join(lines(found))
+    assert "time: 1: 10 Hz in ms, 1e+04 Hz in us: write the unit after the name" in shown
+    assert "force: 2: a guess, the roughest signal" in shown
+    assert found.mapping == "force=2,position=3,time=1[UNIT]"
+    with pytest.raises(InputError, match="'UNIT' is no unit of time"):
+        read_recording(path, found.mapping)
+    np.savetxt(path, columns, header="t (millisec),u,x", comments="", delimiter=",")
+    assert read_recording(path, overview(path).mapping).period_s == pytest.approx(0.1)

@@ -62,7 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def lines(found: Overview) -> list[str]:
     """The table, the doubts, and the suggested line."""
-    from bayeshaptic.recordings.overview import doubts
+    from bayeshaptic.recordings.columns import POSITIONS
+    from bayeshaptic.recordings.overview import doubts, is_guess
 
     roles = {name: role for role, name in found.roles.items()}
     most_columns = 40
@@ -81,10 +82,17 @@ def lines(found: Overview) -> list[str]:
         table.append(f"and {len(found.columns) - len(shown)} more")
     by_name = {one.name: one for one in found.columns}
     for role, name in found.roles.items():
-        if doubt := doubts(by_name[name], role):
-            table.append(f"{role}: {printable(name)}: {doubt}")
+        said = [doubts(by_name[name], role)]
+        if is_guess(by_name[name], role):
+            rough = "roughest" if role == "force" else "smoothest"
+            said.insert(0, f"a guess, the {rough} signal: look whether it is")
+        if text := "; ".join(filter(None, said)):
+            table.append(f"{role}: {printable(name)}: {text}")
     if found.mapping is None:
-        table.append("no force and position were recognised; name them with --columns")
+        needed = {"force": ("force",), "position": POSITIONS}
+        missing = [what for what, any_of in needed.items() if not set(any_of) & set(found.roles)]
+        was = "was" if len(missing) == 1 else "were"
+        table.append(f"no {' and '.join(missing)} {was} recognised; name them with --columns")
     else:
         period = "" if "time" in found.roles else " --period-s SECONDS"
         table.append(f"--columns {_quoted(printable(found.mapping))}{period}")
@@ -98,13 +106,14 @@ def _quoted(text: str) -> str:
 
 def asked(found: Overview) -> str:
     """The mapping as somebody at the terminal wants it: a line each, empty for the guess."""
-    from bayeshaptic.recordings.columns import parse_columns
+    from bayeshaptic.recordings.columns import POSITIONS, parse_columns
     from bayeshaptic.recordings.overview import unit_of
 
     guesses = dict(part.split("=", 1) for part in (found.mapping or "").split(",") if part)
     chosen: dict[str, str] = {}
     print("Which columns are these? NAME, NAME*FACTOR or NAME*FACTOR[UNIT]; empty for the guess.")
-    for role in ("time", "force", "position"):
+    motion = next((role for role in POSITIONS if role in found.roles), "position")
+    for role in ("time", "force", motion):
         while True:
             term = _answer(f"  {role} [{printable(guesses.get(role, '-'))}]: ")
             term = term or guesses.get(role, "")

@@ -269,7 +269,7 @@ def recorded(
     recording = replace(recording, notices=recording.notices + by_names)
     if units[force] is None and force in mapping and _in_volts(mapping[force]):
         text = (
-            f"The name of the force, '{mapping[force].text}', says volts, and it is taken to be "
+            f"The force's name, '{mapping[force].text}', says volts, and it is taken to be "
             f"in {recording.force_unit}: stiffness and masses are then wrong by the force of one "
             f"volt, C. Write {force}=NAME*C[{recording.force_unit}] in --columns."
         )

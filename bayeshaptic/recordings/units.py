@@ -48,15 +48,33 @@ _ACCELERATION = {
 }
 # Units of other things, and of these in other systems: known as units, and not turned into others.
 _FOREIGN = """
-    V mV kV Hz kHz K C degC % counts count cnt inc incr ticks tick lsb kg g kgf gf lb lbf oz in
-    inch ft min h rev turns
+    V mV kV Hz kHz K C degC % counts count cnt inc incr ticks tick steps pulses lsb kg g kgf gf lb
+    lbf oz in inch ft min h rev turns
 """
+# As they are written out.
+_WRITTEN_OUT = {
+    word: unit
+    for unit, words in {
+        "s": "sec second seconds",
+        "ms": "msec millis millisec millisecond milliseconds",
+        "us": "usec micros microsecond microseconds",
+        "N": "newton newtons",
+        "A": "amp amps ampere amperes",
+        "m": "metre metres meter meters",
+        "rad": "radian radians",
+        "deg": "degree degrees",
+        "V": "volt volts",
+        "rpm": "rpm",
+    }.items()
+    for word in words.split()
+}
 # What is measured in them, by words that names of such signals have.
 _BY_NAME = {
     "force": {"Nm": r"torque|moment|\btau", "A": r"current|strom|^i$|iq", "N": r"force|kraft|^f$"},
     "position": {"rad": r"angle|winkel|theta|phi", "m": r"pos|weg|displ|^x$"},
 }
 _VOLTS = re.compile(r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$")
+_OUTPUTS = ("position", "velocity", "acceleration")
 _BY_ROLE = {
     "time": _TIME,
     "force": _FORCE,
@@ -89,6 +107,12 @@ def base_unit(role: str, unit: str) -> tuple[str, float]:
             cure = "; multiply other units by the force constant, as in force=volts*35.15[N]"
         raise InputError(f"'{unit}' is no unit of {role}: use {', '.join(known)}{cure}")
     return known[plain]
+
+
+def units_of(role: str) -> str:
+    """The usual units of a role, in words."""
+    usual = {"force": "[N], [Nm] or [A]", "position": "[m], [mm], [rad] or [deg]"}
+    return usual.get(role) or ", ".join(f"[{unit}]" for unit in _BY_ROLE[role])
 
 
 def is_unit(text: str) -> bool:
@@ -124,7 +148,7 @@ def unit_in_name(role: str, name: str) -> str | None:
         end, stem = "/".join(words[-count:]), "_".join(words[:-count])
         written = _plain(end)
         unit = written if written in known else spelled.get(written.lower())
-        if unit is None or not stem:
+        if unit is None or not (stem or len(written) > 2):
             continue
         quantity = {"measured_force": "force", "velocity": "position"}.get(role, role)
         spoken = unit_by_name(quantity, stem) if quantity in _BY_NAME else None
@@ -137,15 +161,26 @@ def unit_in_name(role: str, name: str) -> str | None:
 def said_by_names(
     names: Mapping[str, str], units: Mapping[str, str | None], force_unit: str
 ) -> tuple[Notice, ...]:
-    """A note of which `units` the ends of `names` say, by their roles, and of a force's if none."""
+    """A note of which `units` the ends of `names` say, by their roles, and of a force's if none.
+
+    Where none is said of anything there is a note already.
+    """
     said = [role for role in names if units.get(role) == (unit_in_name(role, names[role]) or ...)]
-    if not said:
-        return ()
+    nobody = any("force" in role and unit is None for role, unit in units.items())
     text = ", ".join(f"the {role} '{names[role]}' in {units[role]}" for role in said)
-    if any("force" in role and unit is None for role, unit in units.items()):
-        text += f"; nothing says that of the force, which is taken to be in {force_unit}"
-    text = f"By its name is {text}. Say otherwise with --columns, as in {said[0]}=NAME[UNIT]."
-    return (Notice("note", "units", text),)
+    assumed = f"nothing says that of the force, which is taken to be in {force_unit}"
+    if said:
+        text = f"By its name is {text}{f'; {assumed}' if nobody else ''}."
+    elif nobody and any(units.get(role) is not None for role in _OUTPUTS):
+        text = f"The force's unit is not given: it is taken to be in {force_unit}."
+    else:
+        return ()
+    example = said[0] if said else "force"
+    return (
+        Notice(
+            "note", "units", f"{text} Say otherwise with --columns, as in {example}=NAME[UNIT]."
+        ),
+    )
 
 
 def kind_by_names(force: str, position: str) -> str | None:
@@ -164,7 +199,7 @@ def _plain(unit: str) -> str:
     plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg")
     for sign in (" ", "*", "\u00b7", "."):
         plain = plain.replace(sign, "")
-    return plain
+    return _WRITTEN_OUT.get(plain.lower(), plain)
 
 
 def choose_units(

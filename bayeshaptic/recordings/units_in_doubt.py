@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from bayeshaptic.errors import Notice
@@ -10,6 +12,7 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 from bayeshaptic.types import Floats
 
+_FORCE = "The force"  # how warnings begin that speak of it alone
 # Mass of a device as its motor feels it: the lightest, a usual and the heaviest one; and from where
 # on it is doubted if nobody said the units, since what is a thousand times too heavy gets a limit
 # that is a thousand times too high.
@@ -19,12 +22,22 @@ _MASSES = {
 }
 
 
+def position_is_in_doubt(notices: Iterable[Notice]) -> bool:
+    """Whether nobody said the units, and a warning speaks against the position's.
+
+    The limit is wrong by what a position is wrong by, in whichever direction; a force that is wrong
+    by a factor cancels, since the limit is in units of the command.
+    """
+    others = [n for n in notices if n.topic == "units" and not n.text.startswith(_FORCE)]
+    return {"note", "warning"} <= {notice.level for notice in others}
+
+
 def mixed_units(recording: Recording) -> list[Notice]:
     """A force and a position that are not of one kind of motion."""
     if (recording.force_unit, recording.position_unit) not in (("N", "rad"), ("Nm", "m")):
         return []
     text = (
-        f"The force is in {recording.force_unit} and the position in {recording.position_unit}: "
+        f"{_FORCE} is in {recording.force_unit} and the position in {recording.position_unit}: "
         f"stiffness is then in {recording.stiffness_unit}, and masses are not in kg or kg m^2. "
         "Give the units with --columns, as in force=NAME[Nm]."
     )
@@ -40,7 +53,7 @@ def whole_numbers(recording: Recording) -> list[Notice]:
     levels = 20  # of a force, which may be whole newtons
     if is_whole(recording.force) and len(np.unique(recording.force)) > levels:
         text = (
-            f"The forces are whole numbers, from {recording.force.min():g} to "
+            f"{_FORCE}s are whole numbers, from {recording.force.min():g} to "
             f"{recording.force.max():g} {recording.force_unit}: are they counts of a converter? "
             f"Write force=NAME*C[{recording.force_unit}] with the force C of one count."
         )

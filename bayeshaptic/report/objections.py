@@ -13,6 +13,7 @@ from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.sufficiency import told_too_little
+from bayeshaptic.recordings.units_in_doubt import position_is_in_doubt
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
     misfit_factor,
@@ -67,6 +68,11 @@ def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
     if verdict is None and analysis.sampled and residual_is_noticed(analysis):
         found.append(
             "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
+        )
+    if position_is_in_doubt(analysis.notices):
+        unit = analysis.model.position_unit
+        found.append(
+            f"nobody said the position's unit, and what was recorded does not look like {unit}"
         )
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]

@@ -216,5 +216,5 @@ def _seconds(text: NDArray[np.str_]) -> Floats | None:
     return np.unwrap(clock @ [3600.0, 60.0, 1.0], period=12 * 3600.0)
 
 
-_SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz", ".lvm")
+_SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz", ".dat", ".asc", ".lvm")
 READER = Reader("CSV", _SUFFIXES, read_delimited)

@@ -6,7 +6,6 @@ advances evenly; a position answers to a force, so it is the smoother of the two
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,24 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.columns import DEFAULT_HEADERS, name_and_unit, parse_columns, pick
+from bayeshaptic.recordings.columns import (
+    DEFAULT_HEADERS,
+    POSITIONS,
+    REFERENCE,
+    name_and_unit,
+    parse_columns,
+    pick,
+)
+from bayeshaptic.recordings.overview.roles import ColumnFacts, guess_roles, says
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.units import (
     base_unit,
-    is_of_another_role,
     says_volts,
     unit_by_name,
     unit_in_name,
+    units_of,
 )
 from bayeshaptic.recordings.units_in_doubt import is_whole, steps_of_a_turn
 
-# Words that names of such signals have, in the order in which they are believed.
-_WORDS = {
-    "time": r"^t$|time|zeit|stamp|^sec|\bt_?\(?m?s",
-    "force": r"force|torque|kraft|moment|current|strom|^u$|tau|^f$|^i$|iq|cmd|command|volt|^vir",
-    "position": r"pos|angle|winkel|weg|theta|^q|^y$|^x$|enc|phi|displ",
-}
 # What turns counts and volts into them.
 _FACTORS = {
     "force": "multiply by the force of one, as in *0.01[N]",
@@ -41,49 +42,16 @@ _FACTORS = {
 }
 # In the line for ``--columns``, where a person must say it: it is refused.
 UNIT_TO_SAY = "[UNIT]"
-# Behind these a signal is not what was commanded, or not a position.
-_OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$|(^|[/._ ])d(x|y|q|phi|theta)\b"
-
-
-@dataclass(frozen=True)
-class ColumnFacts:
-    """What one column of a file looks like.
-
-    Attributes
-    ----------
-    name : str
-    samples : int
-    low, high : float
-        Range; NaN where it holds text.
-    resolution : float or None
-        Common divisor of its increments: an encoder count, or the rounding of the file.
-    period : float or None
-        Median step, where the column advances evenly as time does.
-    roughness : float
-        Root mean square of its steps over its standard deviation: 1.4 is white noise.
-    unit : str or None
-        From the header.
-    missing : int
-        How many are no number.
-    whole : bool
-        Whether all are whole numbers.
-    """
-
-    name: str
-    samples: int
-    low: float
-    high: float
-    resolution: float | None
-    period: float | None
-    roughness: float
-    unit: str | None
-    missing: int = 0
-    whole: bool = False
+# Periods of loops and of loggers: 25 kHz to 5 Hz.
+_PERIODS_S = (4e-5, 0.2)
 
 
 @dataclass(frozen=True)
 class Overview:
-    """The columns of a file, longest first, and which may be time, force and position."""
+    """The columns of a file, longest first, and which may be time, force, position, reference.
+
+    A velocity or an acceleration stands for a position that no name tells of.
+    """
 
     path: Path
     columns: tuple[ColumnFacts, ...]
@@ -93,11 +61,13 @@ class Overview:
     @property
     def mapping(self) -> str | None:
         """What to give to ``--columns``; None where no force or no position was found."""
-        if not {"force", "position"} <= set(self.roles):
+        if "force" not in self.roles or not set(POSITIONS) & set(self.roles):
             return None
         facts = {column.name: column for column in self.columns}
         return ",".join(
-            f"{role}={name}{_scale(role, facts[name])}" for role, name in sorted(self.roles.items())
+            f"{role}={name}{_scale(role, facts[name])}"
+            for role, name in sorted(self.roles.items())
+            if role != REFERENCE
         )
 
 
@@ -117,7 +87,7 @@ def overview(path: Path) -> Overview:
             seen[id(values)] = name
     facts = [_facts(name, arrays[name]) for name in seen.values()]
     facts.sort(key=lambda one: -one.samples)
-    return Overview(path, tuple(facts), _roles(facts), arrays)
+    return Overview(path, tuple(facts), guess_roles(facts, arrays), arrays)
 
 
 def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
@@ -133,7 +103,7 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
     steps = np.diff(signal)
     step = float(np.median(steps))
     even = 0.25  # of the period: what varies by more is time only by its name
-    advances = (steps >= 0) if _says(name, "time") else np.abs(steps - step) < even * step
+    advances = (steps >= 0) if says(name, "time") else np.abs(steps - step) < even * step
     is_time = step > 0 and np.mean(advances) > 0.99
     spread = float(np.std(signal))
     return ColumnFacts(
@@ -150,47 +120,6 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
     )
 
 
-def _roles(facts: list[ColumnFacts]) -> dict[str, str]:
-    """Time by its even steps; force and position among the signals of the same length."""
-    roles: dict[str, str] = {}
-    clocks = [one for one in facts if one.period is not None]
-    if clocks:
-        roles["time"] = min(clocks, key=lambda one: not _says(one.name, "time")).name
-    length = next((one.samples for one in facts if one.name == roles.get("time")), None)
-    signals = [
-        one
-        for one in facts
-        if one.period is None
-        and one.roughness > 0
-        and (length is None or one.samples == length)
-        and not re.search(_OTHERS, one.name, re.I)
-    ]
-    for role, sign in (("force", -1), ("position", 1)):
-        free = [
-            one
-            for one in signals
-            if one.name not in roles.values()
-            and not (one.unit and is_of_another_role(role, one.unit))
-        ]
-        other = "position" if role == "force" else "force"
-        # By the name: of several the roughest, which is nearest to where the force acts. Without
-        # one the roughest is the force, and the smoothest the position.
-        if named := [one for one in free if _says(one.name, role)]:
-            roles[role] = max(named, key=lambda one: one.roughness).name
-        elif unnamed := [one for one in free if not _says(one.name, other)]:
-            roles[role] = min(unnamed, key=lambda one: sign * one.roughness).name
-    return roles
-
-
-def _says(name: str, role: str) -> bool:
-    """Whether a name tells the role: its last part, or an earlier one where that says nothing."""
-    for part in reversed(re.split(r"[/.]", name_and_unit(name)[0])):
-        says = {each for each, words in _WORDS.items() if re.search(words, part, re.I)}
-        if says:
-            return role in says
-    return False
-
-
 def _scale(role: str, column: ColumnFacts) -> str:
     """The unit to write after a name, where the header has none in brackets.
 
@@ -203,12 +132,21 @@ def _scale(role: str, column: ColumnFacts) -> str:
         return f"[{unit}]"
     if role == "position" and _is_large(column):
         return UNIT_TO_SAY
-    if role == "time" and column.period is not None:
-        # Loops run at 100 Hz to 20 kHz.
-        for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
-            if 4e-5 <= column.period * factor <= 1.1e-2:
-                return "" if unit == "s" else f"[{unit}]"
+    if role in POSITIONS[1:]:
+        return UNIT_TO_SAY
+    if role == "time":
+        units = tuple(_rates(column))
+        if len(units) > 1:
+            return UNIT_TO_SAY
+        return f"[{units[0]}]" if units and units != ("s",) else ""
     return ""
+
+
+def _rates(column: ColumnFacts) -> dict[str, float]:
+    """The units in which the steps of a time are a usual period, with the rate in Hz."""
+    low, high = _PERIODS_S
+    periods = {u: (column.period or 0.0) * base_unit("time", u)[1] for u in ("s", "ms", "us", "ns")}
+    return {unit: 1 / period for unit, period in periods.items() if low <= period <= high}
 
 
 def _is_large(column: ColumnFacts) -> bool:
@@ -221,7 +159,14 @@ def _is_large(column: ColumnFacts) -> bool:
 
 def doubts(column: ColumnFacts, role: str) -> str:
     """What a person should settle about a column that plays a role; empty where nothing."""
-    if role == "time" or column.name in DEFAULT_HEADERS[role]:
+    if role == REFERENCE:
+        return f"what a controller followed? Then add ,reference={column.name}"
+    if role == "time":
+        if _scale(role, column) != UNIT_TO_SAY:
+            return ""
+        rates = (f"{rate:.4g} Hz in {unit}" for unit, rate in _rates(column).items())
+        return f"{', '.join(rates)}: write the unit after the name"
+    if column.name in DEFAULT_HEADERS[role]:
         return ""
     if column.missing:
         return f"{column.missing} rows without a number: fill them in, or read a part without them"
@@ -231,7 +176,7 @@ def doubts(column: ColumnFacts, role: str) -> str:
         return f"in {unit} by its name: say so if it is not"
     if role == "position" and column.whole:
         return f"whole numbers: encoder counts? {_FACTORS[role]}"
-    guess = unit_by_name(role, column.name)
+    guess = unit_by_name(role, column.name) if role in _FACTORS else None
     if guess == "rad" and (turn := steps_of_a_turn(column.resolution)):
         return f"{turn:,} steps to 360: degrees? Write [deg] after the name"
     if role == "position" and _is_large(column):
@@ -240,10 +185,15 @@ def doubts(column: ColumnFacts, role: str) -> str:
         return f"whole numbers: converter counts? {_FACTORS[role]}"
     if role == "force" and says_volts(column.name):
         return f"volts? {_FACTORS[role]}"
-    units = "[N], [Nm] or [A]" if role == "force" else "[m], [mm], [rad] or [deg]"
+    units = units_of(role)
     guess = "rad] or [deg" if guess == "rad" else guess
     perhaps = f", perhaps [{guess}]" if guess else ""
     return f"unit not known{perhaps}: write it after the name, {units}"
+
+
+def is_guess(column: ColumnFacts, role: str) -> bool:
+    """Whether a role was given by what the numbers do, and the name says nothing of it."""
+    return role in ("force", "position") and not says(column.name, role)
 
 
 def _factor_for(unit: str, role: str) -> str:
