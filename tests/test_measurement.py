@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from linear_bench import LHIFAM_HELD, Device
+from scipy.linalg import expm
 from scipy.signal import butter, chirp, lfilter
 
 from bayeshaptic.diagnosis import thresholds
@@ -91,6 +92,37 @@ def test_a_motion_of_less_than_a_count_a_sample_has_lost_no_rows(seed: int) -> N
     motion = lfilter(*butter(2, 0.04), force)
     counts = np.round(0.1 * motion / np.std(np.diff(motion)))
     assert faults(as_recorded(recording_from_arrays(force, counts, 1e-3))).lost == 0
+
+
+def rubbing(seed: int, samples: int = 20000) -> tuple[np.ndarray, np.ndarray]:
+    """White force on two masses of which the motor's rubs; no noise."""
+    force = np.random.default_rng(seed).standard_normal(samples)
+    motor, load, stiffness, fine, friction = 0.15, 0.85, 1.3e-3, 20, 0.2
+    system = np.zeros((5, 5))
+    system[0, 2] = system[1, 3] = 1.0
+    system[2] = [-stiffness / motor, stiffness / motor, -5e-3, 0, 1 / motor]
+    system[3, :2] = stiffness / load, -stiffness / load
+    moves = expm(system / fine)[:4]
+    state, position = np.zeros(4), np.empty(samples)
+    for k in range(samples):
+        position[k] = state[0]
+        for _ in range(fine):
+            state = moves @ np.append(state, force[k])
+            rub = np.clip(-state[2] / moves[2, 4], -friction, friction)
+            state = state + rub * moves[:, 4]
+    return force, position
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_rows_that_are_put_back_had_a_force_that_was_commanded(seed: int) -> None:
+    """Rows that were there were put back twice, with forces of twenty times the largest."""
+    force, position = rubbing(seed)
+    lost = np.random.default_rng(seed).choice(np.arange(100, len(force) - 100), 20, replace=False)
+    force, position = np.delete(force, lost), np.delete(position, lost)
+    found = faults(as_recorded(recording_from_arrays(force, 1e-3 * position, 1e-3)))
+    put_back = found.samples.recording.force
+    assert np.ptp(put_back) == pytest.approx(np.ptp(force), rel=1e-9)
+    assert 15 <= found.lost <= 26
 
 
 def test_a_mains_tone_is_sized_and_subtracted() -> None:

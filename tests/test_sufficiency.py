@@ -8,9 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.recordings.sufficiency import refuse_too_little
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
 
@@ -71,6 +76,32 @@ def test_what_says_too_little_is_refused(reason: str) -> None:
     with pytest.raises(InputError, match=reason) as caught:
         refuse_too_little(SAYS_TOO_LITTLE[reason]())
     assert "\n" not in str(caught.value)
+
+
+def levels(force: np.ndarray) -> bool:
+    """Whether a recording of that force is said to hide what its actuator keeps back."""
+    return any(notice.topic == "two levels" for notice in check_recording(recorded(force)))
+
+
+def test_a_force_of_two_levels_hides_what_the_actuator_keeps_back() -> None:
+    """A dead zone of a quarter of binary noise put the limit a third too high, said to be safe."""
+    binary = 0.1 * np.sign(noise())
+    paused = np.where(np.arange(len(binary)) < 500, 0.0, binary)
+    for force in (binary, binary + 0.02, paused):
+        assert levels(force)
+    two_strengths = np.where(np.arange(len(binary)) % 2000 < 1000, binary, 0.5 * binary)
+    for force in (noise(), two_strengths, binary + 0.1 * noise()):
+        assert not levels(force)
+
+
+def test_no_test_reads_rounding_where_a_force_has_two_levels() -> None:
+    """Its cube is itself: rounding was taken for a test, and an effect for unlikely."""
+    etfe = estimate_etfe(recorded(0.1 * np.sign(noise())), (0.7, 200.0))
+    assert BENCH.device is not None
+    fit = least_squares(build_model("free", BENCH.device), etfe)
+    cubed = {test.name: test for test in nonlinear_tests(fit, etfe)}["u^3"]
+    assert cubed.statistic == 0.0
+    assert cubed.force is not None and cubed.force.sd == 0.0
 
 
 def test_what_says_enough_is_not() -> None:

@@ -14,7 +14,7 @@ from bayeshaptic.recordings.signals.causality import causality
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
-from bayeshaptic.recordings.sufficiency import LEAST_COHERENCE
+from bayeshaptic.recordings.sufficiency import LEAST_COHERENCE, says_nothing_of_the_actuator
 from bayeshaptic.recordings.units_in_doubt import (
     degrees,
     implausible_mass,
@@ -49,7 +49,8 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
     -------
     tuple of Notice
         Those of the recording itself, then by topic: "units", "time stamps", "resolution",
-        "coherence", "alignment", and "feedback" where the force was computed from the motion.
+        "coherence", "two levels", "alignment", and "feedback" where the force was computed from
+        the motion.
 
     Raises
     ------
@@ -79,6 +80,7 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *recording.notices,
         *scales,
         *_response(recording, device, slipped),
+        *says_nothing_of_the_actuator(recording),
         *_causality(recording, where),
     )
 

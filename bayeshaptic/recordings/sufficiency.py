@@ -39,6 +39,8 @@ _IDLE_S = 0.1
 # of 60 under steps five are refused (two with 0.1 s alone), one of them without friction.
 _USUAL_COUNTS = 30.0
 _FEWEST = 20
+# Share of the samples: a recording may begin at zero.
+_OF_ONE_SIZE = 0.99
 
 TOO_LITTLE = "too little"  # the topic of a warning
 _USUAL = (
@@ -70,6 +72,25 @@ def too_little(recording: Recording) -> tuple[Notice, ...]:
     if reason is None:
         return ()
     return (Notice("warning", TOO_LITTLE, f"Too little to find a stiffness from: {reason}."),)
+
+
+def says_nothing_of_the_actuator(recording: Recording) -> list[Notice]:
+    """A warning where the force has one size: what an actuator keeps of it is one share, always.
+
+    A dead zone or a limit is then a smaller gain, to the last digit, and no test can see it.
+    """
+    size = np.abs(recording.force - (recording.force.max() + recording.force.min()) / 2)
+    near = 1e-6 * size.max()
+    pause = np.abs(recording.force) <= near
+    if np.mean(pause | (size.max() - size <= near)) < _OF_ONE_SIZE:
+        return []
+    text = (
+        "The force has two levels, so that what the actuator may keep back of small commands (a "
+        "dead zone) or of large ones (saturation) is the same share of every one and cannot be "
+        "seen; the limit would be too high by that share. Record once more with levels twice as "
+        "far apart, or with noise of many levels: the response must be the same."
+    )
+    return [Notice("warning", "two levels", text)]
 
 
 class TooLittle(NamedTuple):

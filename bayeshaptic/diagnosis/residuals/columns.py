@@ -26,6 +26,10 @@ from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
+# Share of a column that is left beside the response where it is the response itself: a power of a
+# force of two levels is that force, with the nine digits of a file.
+_ROUNDING = 1e-6
+
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     """One test for each nonlinear function of command and motion; none without a recording.
@@ -62,6 +66,8 @@ def common_coefficient(windows: Windows) -> tuple[float, float, float]:
     """
     nodes = windows.frequency_hz.shape[1]
     slope, found = windows.design[:, -1, -1], windows.target[:, -1]
+    whole = np.linalg.norm(windows.design[:, :, -1], axis=1)
+    slope = np.where(np.abs(slope) > _ROUNDING * whole, slope, 0.0)
     lines = np.maximum(windows.lines - nodes - 2, 0.5)
     weight = lines / windows.scatter
     each = weight * np.abs(slope) ** 2

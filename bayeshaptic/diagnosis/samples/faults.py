@@ -201,6 +201,11 @@ def _trial(
         design[j:, position + j] = -predictor.force[: equations - j]
     scale = np.abs(design).max(axis=0)
     values = np.linalg.lstsq(design / scale, -errors, rcond=1e-10)[0] / scale
+    if missing:  # their forces were commanded as those of the other rows
+        values[position:] = np.clip(values[position:], *samples.range_of_force)
+        free, rest = slice(0, position), errors + design[:, position:] @ values[position:]
+        places = design[:, free] / scale[free]
+        values[free] = np.linalg.lstsq(places, -rest, rcond=1e-10)[0] / scale[free]
     errors = errors + design @ values
     left = float(errors @ errors) / predictor.spread**2
     return _Trial(left, at, values[:position], values[position:])

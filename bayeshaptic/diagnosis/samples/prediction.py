@@ -58,6 +58,11 @@ class Samples:
         """What the recorded positions are multiples of, zero where they are of nothing."""
         return increment_unit(self.recording.position[~self.missing]) or 0.0
 
+    @cached_property
+    def range_of_force(self) -> tuple[float, float]:
+        """Between its lowest and highest value."""
+        return float(self.recording.force.min()), float(self.recording.force.max())
+
     def without(self, wrong: Bools) -> Samples:
         """The same with more samples known to be wrong; itself where there are no more."""
         missing = self.missing | wrong
