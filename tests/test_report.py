@@ -495,6 +495,32 @@ def test_a_limit_that_only_the_prior_ends_below_is_no_recommendation(
     assert any("dampers" in step.text for step in next_steps(found, analysis)) == refused
 
 
+def test_the_next_command_reads_the_file_as_this_one_did() -> None:
+    """It said no columns and no period, and was refused."""
+    analysis = fake_analysis(converged=False)
+    options = {"columns": "force=u[N],position=q[mm]", "period_s": 0.005, "held": False}
+    (step,) = next_steps(headline(analysis), analysis, {"options": options})
+    said = "--columns 'force=u[N],position=q[mm]' --period-s 0.005 --held no"
+    assert step.command.endswith(f"{said} --seed {analysis.posterior.seed + 1}")
+
+
+def test_units_that_nobody_said_are_on_the_first_screen() -> None:
+    note = Notice("note", "units", "The force's unit is not given: it is taken to be in N.")
+    found = headline(fake_analysis("rigid", notices=(note,)))
+    assert found.stiffness is not None
+    assert any(
+        "N stands for whatever the command was recorded in" in text for text in found.details
+    )
+    assert not any("stands for" in text for text in headline(fake_analysis("rigid")).details)
+    both = Notice("note", "units", "No units were given: the force is taken to be in N.")
+    counts = Notice("warning", "units", "The positions are whole numbers.")
+    doubted = fake_analysis("rigid", notices=(both, counts))
+    refused = headline(doubted)
+    assert refused.status == "untrusted" and "nobody said the position's unit" in refused.sentence
+    (step,) = next_steps(refused, doubted)
+    assert "position=NAME*3.1e-6[m]" in step.command
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_a_page_without_a_recommendation_says_what_to_do(case: str) -> None:
     analysis = fake_analysis(**CASES[case])

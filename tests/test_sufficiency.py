@@ -38,6 +38,11 @@ def idle() -> np.ndarray:
     return force
 
 
+def pulses() -> np.ndarray:
+    """Rests of 0.3 s between stretches of 0.2 s: none of them is long enough to be read."""
+    return noise() * (np.arange(8000) % 500 < 200)
+
+
 def backwards() -> Recording:
     made = recorded(noise())
     return replace(made, position=made.position[::-1])
@@ -58,7 +63,8 @@ SAYS_TOO_LITTLE = {
     r"the force is 2 tones \(3, 11 Hz\)": lambda: recorded(
         0.1 * np.sin(6 * np.pi * TIME) + 0.05 * np.sin(22 * np.pi * TIME)
     ),
-    "zero for 50 % .*with --rows 5001:8000": lambda: recorded(idle()),
+    "zero for 50 % .*, --rows 5001:8000": lambda: recorded(idle()),
+    "zero for 60 % of the recording; excite the device all the time": lambda: recorded(pulses()),
     "stands still for": lambda: recorded(
         noise(rms=0.03), BENCH.with_effect("coulomb_friction", force=0.07)
     ),

@@ -14,7 +14,11 @@ from bayeshaptic.recordings.signals.causality import causality
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
-from bayeshaptic.recordings.sufficiency import LEAST_COHERENCE, says_nothing_of_the_actuator
+from bayeshaptic.recordings.sufficiency import (
+    FEWEST_SAMPLES,
+    LEAST_COHERENCE,
+    says_nothing_of_the_actuator,
+)
 from bayeshaptic.recordings.units_in_doubt import (
     degrees,
     implausible_mass,
@@ -22,8 +26,6 @@ from bayeshaptic.recordings.units_in_doubt import (
     whole_numbers,
 )
 
-# Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
-FEWEST_SAMPLES = 1000
 USUAL_SECONDS = 30
 # Slips of units: thousands, and degrees for radians; with the cure for each.
 _SLIPS = {

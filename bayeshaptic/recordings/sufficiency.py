@@ -24,6 +24,8 @@ LEAST_COHERENCE = 0.3
 # Shortest recording of a force that does not repeat: a dozen lines below 5 Hz, where a device's
 # rigid-body crossing lies.
 SHORTEST_S = 2.5
+# Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
+FEWEST_SAMPLES = 1000
 # A force that changes less often than this is a few steps.
 FEWEST_CHANGES = 20
 # Fewer tones than this leave more parameters than numbers.
@@ -168,10 +170,11 @@ def _no_force(recording: Recording) -> str | None:
     if np.mean(idle) <= MOST_IDLE:
         return None
     first, stop = _longest(~idle)
-    return (
-        f"the force is zero for {100 * np.mean(idle):.0f} % of the recording; read the longest "
-        f"part with force alone, with --rows {first + 1}:{stop}, or record again"
-    )
+    if stop - first < max(FEWEST_SAMPLES, SHORTEST_S / recording.period_s):
+        cure = "excite the device all the time, and record again"
+    else:
+        cure = f"read the longest part with force alone, --rows {first + 1}:{stop}, or record again"
+    return f"the force is zero for {100 * np.mean(idle):.0f} % of the recording; {cure}"
 
 
 def _standstill(recording: Recording) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import FORCE_UNITS, POSITION_UNITS
@@ -73,6 +73,10 @@ _BY_NAME = {
     "force": {"Nm": r"torque|moment|\btau", "A": r"current|strom|^i$|iq", "N": r"force|kraft|^f$"},
     "position": {"rad": r"angle|winkel|theta|phi", "m": r"pos|weg|displ|^x$"},
 }
+_CURES = {
+    "force": "; multiply other units by the force constant, as in force=volts*35.15[N]",
+    "position": "; multiply counts by the size of one, as in position=counts*3.1e-6[m]",
+}
 _VOLTS = re.compile(r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$")
 _OUTPUTS = ("position", "velocity", "acceleration")
 _BY_ROLE = {
@@ -102,10 +106,9 @@ def base_unit(role: str, unit: str) -> tuple[str, float]:
     plain = _plain(unit)
     known = _BY_ROLE[role]
     if plain not in known:
-        cure = ""
-        if role == "force":
-            cure = "; multiply other units by the force constant, as in force=volts*35.15[N]"
-        raise InputError(f"'{unit}' is no unit of {role}: use {', '.join(known)}{cure}")
+        raise InputError(
+            f"'{unit}' is no unit of {role}: use {', '.join(known)}{_CURES.get(role, '')}"
+        )
     return known[plain]
 
 
@@ -180,6 +183,13 @@ def said_by_names(
         Notice(
             "note", "units", f"{text} Say otherwise with --columns, as in {example}=NAME[UNIT]."
         ),
+    )
+
+
+def force_is_assumed(notices: Iterable[Notice]) -> bool:
+    """Whether a note says that nobody said the force's unit, and which one was taken."""
+    return any(
+        (n.level, n.topic) == ("note", "units") and "taken to be in" in n.text for n in notices
     )
 
 

@@ -78,7 +78,7 @@ def render(
         label=LABELS[head.status],
         lights=lights(result),
         answer=answer,
-        next_steps=next_steps(head, result),
+        next_steps=next_steps(head, result, origin),
         doubtful=words.doubtful(result),
         widened=words.widened(result),
         no_limit=unstated(analysis),

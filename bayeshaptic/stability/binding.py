@@ -97,7 +97,8 @@ def group_crossings(kinds: Ints, frequency_hz: Floats) -> tuple[tuple[BindingCro
         for part in _split(members, frequency_hz, len(kinds)):
             median = float(np.median(frequency_hz[part]))
             has_frequency = kind not in (NEVER, NONE)
-            place = f" at {median:.3g} Hz" if has_frequency else ""
+            shown = f"{median:.3g} Hz" if median < 999.5 else f"{median / 1e3:.3g} kHz"
+            place = f" at {shown}" if has_frequency else ""
             crossing = BindingCrossing(
                 TITLES[int(kind)] + place,
                 median if has_frequency else None,

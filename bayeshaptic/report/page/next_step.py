@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.trials.drift import PARTS
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.sufficiency import SHORTEST_S, told_too_little
+from bayeshaptic.recordings.units_in_doubt import position_is_in_doubt
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
 from bayeshaptic.report.objections import changes, is_open
 
@@ -33,18 +36,45 @@ class Step:
     command: str
 
 
-def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
-    """What to do, the best first; empty where a stiffness is recommended."""
+# What is said of how the file is read, and of the device: the next report needs it, too.
+_KEPT = ("columns", "period_s", "delay_s", "encoder_resolution", "held")
+
+
+def next_steps(
+    head: Headline, result: Result, origin: Mapping[str, Any] | None = None
+) -> tuple[Step, ...]:
+    """What to do, the best first; empty where a stiffness is recommended.
+
+    Parameters
+    ----------
+    head : Headline
+    result : Analysis or Closed
+    origin : mapping, optional
+        What `bayeshaptic.provenance` gives, for the options that the next command needs as well.
+    """
     if head.status != "untrusted":
         return ()
-    analysis, command = result.analysis, _command(result)
+    options = (origin or {}).get("options") or {}
+    device = _device(result) + _said(options, _KEPT)
+    analysis, command = result.analysis, f"bayeshaptic report {_source(result)}{device}"
+    new = f"bayeshaptic report NEW.csv{device}"
     if has_feedback(analysis.notices):
-        return _after_feedback(result, command)
+        through = f"bayeshaptic report {_source(result)}{_device(result)}"
+        return _after_feedback(result, command, new, through + _said(options, _KEPT[1:]))
+    if position_is_in_doubt(analysis.notices):
+        bare = f"bayeshaptic report {_source(result)}{_device(result)}{_said(options, _KEPT[1:])}"
+        return (
+            Step(
+                "Say in which units they are, with the size of a count where they are counts. This "
+                "recording will do:",
+                f'{bare} --columns "time=NAME[s],force=NAME*0.01[N],position=NAME*3.1e-6[m]"',
+            ),
+        )
     if (too_little := told_too_little(analysis.notices)) is not None:
         cure = too_little.cure[0].upper() + too_little.cure[1:]
-        return (Step(f"{cure}. Then:", f"bayeshaptic report NEW.csv{_device(result)}"),)
+        return (Step(f"{cure}. Then:", new),)
     if analysis.etfe.through_reference:
-        return _after_reference(result, command)
+        return _after_reference(result, command, new)
     if not analysis.posterior.converged:
         return (
             Step(
@@ -59,7 +89,7 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
                 "Let the force be larger and slower, or record longer, so that the device moves as "
                 "far as it will in use; or say what is known of its dampers in a device file, "
                 "--device. Then:",
-                f"bayeshaptic report NEW.csv{_device(result)}",
+                new,
             ),
         )
     if result.closed is None:
@@ -71,7 +101,7 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
                 f"Let the device warm up{grip}, and record at least "
                 f"{pure(PARTS * SHORTEST_S)} s of a force that does not repeat: in that a change "
                 "can be followed. Then:",
-                f"bayeshaptic report NEW.csv{_device(result)}",
+                new,
             ),
         )
     if is_unexplained(result):
@@ -92,25 +122,24 @@ def next_steps(head: Headline, result: Result) -> tuple[Step, ...]:
     )
 
 
-def _after_feedback(result: Result, command: str) -> tuple[Step, ...]:
+def _after_feedback(result: Result, command: str, new: str, bare: str) -> tuple[Step, ...]:
     """Where the force was computed from the motion."""
     analysis = result.analysis
     again = Step(
         "Record again with a force that does not depend on the motion: white noise, or a "
         "multisine. Then report on that recording:",
-        f"bayeshaptic report NEW.csv{_device(result)}",
+        new,
     )
     if analysis.in_loop is None or analysis.in_loop.doubts:
         given = any(notice.topic == "reference" for notice in analysis.notices)
-        return (again, _through(result)) if is_certain(analysis.notices) and not given else (again,)
+        return (again, _through(bare)) if is_certain(analysis.notices) and not given else (again,)
     rigid = "Or, where the device is known to be one rigid mass, say so. This recording will do:"
     return again, Step(rigid, f"{command} --model rigid")
 
 
-def _after_reference(result: Result, command: str) -> tuple[Step, ...]:
+def _after_reference(result: Result, command: str, new: str) -> tuple[Step, ...]:
     """Where a controller's reference was followed."""
     analysis = result.analysis
-    new = f"bayeshaptic report NEW.csv{_device(result)}"
     if analysis.model.held:
         return (Step("Record in open loop: a force that comes from a table. Then:", new),)
     free = Step("Where nobody holds the device, say so:", f"{command} --held no")
@@ -124,18 +153,31 @@ def _after_reference(result: Result, command: str) -> tuple[Step, ...]:
     )
 
 
-def _through(result: Result) -> Step:
+def _through(command: str) -> Step:
     return Step(
         "Or tell what the controller followed: declare it in [feedback] of a study, or write its "
         "reference beside the force and name that column:",
-        f"{_command(result)} --columns time=NAME,force=NAME,position=NAME,reference=NAME",
+        f"{command} --columns time=NAME,force=NAME,position=NAME,reference=NAME",
     )
 
 
-def _command(result: Result) -> str:
+def _source(result: Result) -> str:
     recording = result.measured.recording
-    source = "RECORDING" if recording is None or recording.source is None else recording.source.name
-    return f"bayeshaptic report {source}{_device(result)}"
+    if recording is None or recording.source is None:
+        return "RECORDING"
+    return shlex.quote(recording.source.name)
+
+
+def _said(options: Mapping[str, Any], names: tuple[str, ...]) -> str:
+    """Options as they were given, those that were not left out."""
+    words = {True: "yes", False: "no"}
+    given = {name: options.get(name) for name in names}
+    return "".join(
+        f" --{name.replace('_', '-')} "
+        + (words[value] if isinstance(value, bool) else shlex.quote(str(value)))
+        for name, value in given.items()
+        if value is not None
+    )
 
 
 def _device(result: Result) -> str:
