@@ -17,6 +17,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
+from bayeshaptic.recordings.signals.sweeps import moves_until
 from bayeshaptic.types import Bools
 
 # The coherence of two unrelated signals, averaged over twelve segments, stays below 0.2.
@@ -186,8 +187,8 @@ def _standstill(recording: Recording) -> str | None:
     position = recording.position[: parts * length].reshape(parts, length)
     resting = np.ptp(position, axis=1) <= 1.01 * step
     still = np.mean(resting)
-    if still <= MOST_IDLE:
-        return None
+    if still <= MOST_IDLE or moves_until(recording):
+        return None  # a sweep's band ends where it moves the device no more
     ends = clipping(recording.position)
     cut_off = (ends.low_clipped & (position[:, 0] <= ends.low)) | (
         ends.high_clipped & (position[:, 0] >= ends.high)

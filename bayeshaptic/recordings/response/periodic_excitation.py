@@ -28,6 +28,7 @@ from bayeshaptic.recordings.signals.excitation import (
     noise_of,
 )
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
+from bayeshaptic.recordings.signals.sweeps import moves_until
 
 FEWEST_BETWEEN, MOST_BETWEEN = 20, 60
 
@@ -212,9 +213,12 @@ def _leakage(
 
 
 def _responding(spectra: PeriodicSpectra, recording: Recording) -> PeriodicSpectra:
-    """Only the lines up to where the response stands out."""
+    """Only the lines up to where the response stands out, and a sweep moves the device."""
     noise = spectra.scatter / (spectra.freedom - 1)
     last = responds_until(np.abs(spectra.position) ** 2 / noise - 1)
+    until = moves_until(recording)
+    if last is not None and until is not None:
+        last = min(last, int(np.searchsorted(spectra.frequency_hz, until)))
     if last is None or last + 1 < FEWEST_LINES:
         raise InputError(
             f"{recording.name}: the position does not follow the periodic force; check which "

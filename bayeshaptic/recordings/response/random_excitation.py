@@ -19,6 +19,7 @@ from bayeshaptic.recordings.response.reference import fit_local_rational, unit_m
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.recordings.signals.raw_signals import clipping
+from bayeshaptic.recordings.signals.sweeps import FEWEST_COUNTS, moves_until
 
 FEWEST_WINDOWS = 8
 # The lowest window then spans a factor 2.14: for 30 s and 24 lines, 0.7 to 1.5 Hz.
@@ -96,13 +97,14 @@ def _in_chosen_band(recording: Recording, minimum: int) -> tuple[RandomSpectra, 
         low, high = choose_band(everything, recording.name)
     except InputError as error:
         raise _cut_off(recording) or error from None
-    text = (
-        f"Band {low:.3g} to {high:.4g} Hz, chosen where the force has power and the position "
-        "answers it."
-    )
-    return _spectra(recording, (low, high), minimum, "the force drives"), Notice(
-        "note", "band", text
-    )
+    why, drives = "the force has power and the position answers it", "the force drives"
+    until = moves_until(recording)
+    if until is not None and low < until < high:
+        high = until
+        why = f"the sweep moves the device by {FEWEST_COUNTS} counts of its encoder or more"
+        drives = f"the force moves the device by {FEWEST_COUNTS} counts of its encoder from"
+    text = f"Band {low:.3g} to {high:.4g} Hz, chosen where {why}."
+    return _spectra(recording, (low, high), minimum, drives), Notice("note", "band", text)
 
 
 def _through_reference(

@@ -7,8 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.types import Floats
-
 # Excited lines lie at most 50 dB below the strongest.
 EXCITED = 1e-5
 
@@ -169,23 +167,3 @@ def noise_of(force: NDArray[Any]) -> NDArray[Any] | float:
     power = np.sum(np.abs(apart) ** 2, axis=0) / (count * (count - 1))
     width = min(21, len(power))
     return np.convolve(power, np.ones(width) / width, mode="same")
-
-
-def is_sweep(force: Floats) -> bool:
-    """Whether a force is, for much of the time, one tone at a time that is not slow.
-
-    Tones are looked for in pieces of 128 samples, above four of their lines: below these a ramp is
-    one, too.
-    """
-    piece, slowest, beside = 128, 4, 2
-    of_power, of_time = 0.95, 0.2
-    pieces = len(force) // piece
-    if pieces == 0:
-        return False
-    framed = force[: pieces * piece].reshape(pieces, piece)
-    spectrum = (framed - framed.mean(axis=1, keepdims=True)) * np.hanning(piece)
-    power = np.abs(np.fft.rfft(spectrum, axis=1)) ** 2
-    peak = np.argmax(power, axis=1)
-    near = np.abs(np.arange(power.shape[1]) - peak[:, None]) <= beside
-    share = np.sum(power * near, axis=1) / np.maximum(power.sum(axis=1), np.finfo(float).tiny)
-    return bool(np.mean((peak >= slowest) & (share > of_power)) > of_time)
