@@ -262,3 +262,11 @@ def test_a_guess_is_called_so_and_a_clock_asked_for(tmp_path: Path) -> None:
         read_recording(path, found.mapping)
     np.savetxt(path, columns, header="t (millisec),u,x", comments="", delimiter=",")
     assert read_recording(path, overview(path).mapping).period_s == pytest.approx(0.1)
+
+
+def test_a_second_header_is_named(tmp_path: Path) -> None:
+    """Several trials in one file: no column was recognised, and nothing said why."""
+    path = tmp_path / "a.csv"
+    rows = [f"{k},{u:.3f},{x:.7f}" for k, (u, x) in enumerate(zip(FORCE, POSITION, strict=True))]
+    path.write_text("\n".join(["t,u,x", *rows, "t,u,x", *rows]), encoding="utf-8")
+    assert f"t: 't' is not a number in row {N + 1}; mend or remove the row" in lines(overview(path))

@@ -674,3 +674,29 @@ def test_a_part_of_a_recording(tmp_path: Path) -> None:
     np.testing.assert_allclose(part.force, FORCE[10:])
     with pytest.raises(InputError, match="nothing is left of its 50 rows"):
         read_recording(path, MAPPING, rows=(60, 70))
+
+
+@pytest.mark.parametrize("low", [0.0, -np.pi])
+def test_an_angle_that_begins_again_after_a_turn_is_counted_on(low: float) -> None:
+    """A measured motor's angle in 0 to 360 degrees hardly answered to the force."""
+    rng = np.random.default_rng(5)
+    force = rng.normal(size=4000)
+    angle = 1e-3 * np.cumsum(np.cumsum(force)) / 100 + 0.01 * np.arange(4000)
+    within = (angle - low) % (2 * np.pi) + low
+    read = recording_from_arrays(force, within, period_s=1e-3, position_unit="rad")
+    np.testing.assert_allclose(read.position - read.position[0], angle - angle[0], atol=1e-9)
+    assert any("jumps by a turn" in notice.text for notice in read.notices)
+    metres = recording_from_arrays(force, within, period_s=1e-3, position_unit="m")
+    np.testing.assert_array_equal(metres.position, within)
+
+
+def test_what_is_no_turn_stays() -> None:
+    """A motion of several turns, and readings that fall out."""
+    rng = np.random.default_rng(6)
+    force, angle = rng.normal(size=2000), 5 + 0.001 * np.cumsum(rng.normal(size=2000))
+    fallen = angle.copy()
+    fallen[700] = 0.0
+    far = np.concatenate([angle, angle + 4 * np.pi])
+    for kept, drive in ((angle, force), (fallen, force), (far, np.tile(force, 2))):
+        read = recording_from_arrays(drive, kept, period_s=1e-3, position_unit="rad")
+        np.testing.assert_array_equal(read.position, kept)

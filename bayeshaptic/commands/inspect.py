@@ -14,7 +14,7 @@ from bayeshaptic.errors import InputError, printable
 from bayeshaptic.files import whole_file, write_whole
 
 if TYPE_CHECKING:
-    from bayeshaptic.recordings.overview import Overview
+    from bayeshaptic.recordings.overview import ColumnFacts, Overview
 
 NAME = "inspect"
 SUMMARY = "what is in a file, and a --columns line to read it with"
@@ -88,6 +88,7 @@ def lines(found: Overview) -> list[str]:
             said.insert(0, f"a guess, the {rough} signal: look whether it is")
         if text := "; ".join(filter(None, said)):
             table.append(f"{role}: {printable(name)}: {text}")
+    table += filter(None, (_text_in(one, found) for one in shown))
     if found.mapping is None:
         needed = {"force": ("force",), "position": POSITIONS}
         missing = [what for what, any_of in needed.items() if not set(any_of) & set(found.roles)]
@@ -97,6 +98,20 @@ def lines(found: Overview) -> list[str]:
         period = "" if "time" in found.roles else " --period-s SECONDS"
         table.append(f"--columns {_quoted(printable(found.mapping))}{period}")
     return table
+
+
+def _text_in(column: ColumnFacts, found: Overview) -> str | None:
+    """Where a column of numbers holds text, as a second header in the middle; None elsewhere."""
+    from bayeshaptic.recordings.columns import as_numbers
+
+    values = found.arrays[column.name]
+    first = values[:1]
+    try:
+        as_numbers(first, "")
+        as_numbers(values, printable(column.name))
+    except InputError as error:
+        return None if str(error).startswith(":") else str(error)
+    return None
 
 
 def _quoted(text: str) -> str:

@@ -27,6 +27,7 @@ from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
 from bayeshaptic.recordings.signals.timing import sampling_period
+from bayeshaptic.recordings.signals.turns import unwrapped
 from bayeshaptic.recordings.units import (
     base_unit,
     choose_units,
@@ -162,12 +163,13 @@ def recording_from_arrays(
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
     timing = sampling_period(stamps, period_s, where)
+    unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind)
+    position, notices = unwrapped(position) if unit_of_position == "rad" else (position, ())
     if timing.rows is not None:
         from bayeshaptic.recordings.signals.gaps import put_back
 
         force, position, followed = put_back(force, position, followed, timing.rows, where)
-    unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind)
-    notices = timing.notices
+    notices += timing.notices
     if force_unit is None and position_unit is None:
         text = (
             f"No units were given: the force is taken to be in {unit_of_force}, the position in "

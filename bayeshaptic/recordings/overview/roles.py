@@ -16,8 +16,8 @@ from bayeshaptic.recordings.units import is_of_another_role, unit_in_name
 # Words that names of such signals have, in the order in which they are believed.
 _WORDS = {
     "time": r"^t$|time|zeit|stamp|^sec|\bt_?\(?m?s",
-    "force": r"force|torque|kraft|moment|current|strom|^u$|tau|^f$|^i$|iq|cmd|command|volt|^vir"
-    r"|pwm|duty|effort|control",
+    "force": r"force|torque|kraft|moment|current|strom|^u$|tau|^f$|^i$|iq|cmd|command|^vir"
+    r"|volt|spannung|pwm|duty|effort|control",
     "position": r"pos|angle|winkel|weg|theta|^q|^y$|^x$|enc|phi|displ",
     "velocity": r"vel|speed|omega|rpm|(^|[/._ ])d(x|y|q|phi|theta)\b",
     "acceleration": r"acc",
