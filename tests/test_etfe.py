@@ -267,6 +267,22 @@ def test_periodic_error_over_sd_has_unit_variance(chain, force, encoder, periods
     assert_unit_variance([np.concatenate(squares)[::share]], [np.concatenate(freedom)[::share]])
 
 
+@pytest.mark.parametrize(("chain", "force", "encoder"), SYSTEMS)
+def test_two_periods_of_thousands_of_tones_are_read_in_windows(chain, force, encoder):
+    """A window a tone cost minutes: of two sweeps of 6,082 lines no report ended within 400 s."""
+    device, squares, freedom = Device(chain), [], []
+    for seed in range(4):
+        rng = np.random.default_rng(200 + seed)
+        u = np.tile(force * multisine(rng, 10000, np.arange(5, 3300)), 2)
+        recording = Recording(u, answer(device, u, rng, encoder, 0.2 * force), device.period)
+        etfe = estimate_etfe(recording)
+        assert etfe.period_lines is None and len(etfe.value) < 400
+        error = etfe.value - device.response(etfe.frequency_hz)
+        squares.append(np.abs(error) ** 2 / etfe.variance)
+        freedom.append(etfe.spectra.windows().lines - 3)
+    assert_unit_variance(squares, freedom)
+
+
 @pytest.mark.parametrize("applied", [False, True])
 @pytest.mark.parametrize("periods", [2, 5])
 def test_noise_of_a_force_that_repeats_is_noise_of_the_response(periods, applied):

@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import responds_until
-from bayeshaptic.recordings.response.local_polynomial import LEAKAGE_TERMS, leakage_terms
+from bayeshaptic.recordings.response.local_polynomial import (
+    LEAKAGE_TERMS,
+    default_minimum_lines,
+    leakage_terms,
+)
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, PeriodicSpectra
 from bayeshaptic.recordings.signals.excitation import (
@@ -31,6 +35,10 @@ from bayeshaptic.recordings.signals.rounding import hidden_rounding
 from bayeshaptic.recordings.signals.sweeps import moves_until
 
 FEWEST_BETWEEN, MOST_BETWEEN = 20, 60
+# More excited lines than that are as many windows: 6,082 took 400 s of CPU time and more.
+_MOST_LINES = 2000
+# Excited lines in a window of all lines from which on it knows the response as well: two a node.
+_ENOUGH_EXCITED = 6
 
 
 def estimate_periodic(
@@ -69,12 +77,27 @@ def estimate_periodic(
         harmonics = harmonics[inside]
     if len(harmonics) < fewest:
         _refuse_few(recording, len(harmonics), band_hz)
+    if _as_dense_as_noise(recording, harmonics, len(position)):
+        return None
     transient = transient_periods(position, harmonics)
     kept = position[transient:]
     spectra = _spectra(recording, force[transient:], kept, harmonics)
     if band_hz is None:
         spectra = _responding(spectra, recording)
     return spectra, points(spectra), _notices(recording, spectra, repetition, position, transient)
+
+
+def _as_dense_as_noise(recording: Recording, harmonics: NDArray[np.int64], periods: int) -> bool:
+    """Whether there are thousands of excited lines, and enough in windows of all lines.
+
+    A window then knows the response as well as its lines do, and there are ten times fewer of them.
+    """
+    if len(harmonics) <= _MOST_LINES:
+        return False
+    between = np.count_nonzero(harmonics >= harmonics[len(harmonics) // 2])
+    spanned = harmonics[-1] - harmonics[len(harmonics) // 2] + 1
+    share = between / spanned / periods
+    return share * default_minimum_lines(recording.duration_s) >= _ENOUGH_EXCITED
 
 
 def points(spectra: PeriodicSpectra) -> Points:

@@ -12,7 +12,10 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band
 from bayeshaptic.recordings.response.instrument import STRONG, InstrumentSpectra
-from bayeshaptic.recordings.response.local_polynomial import window_edges
+from bayeshaptic.recordings.response.local_polynomial import (
+    default_minimum_lines,
+    window_edges,
+)
 from bayeshaptic.recordings.response.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
@@ -36,11 +39,6 @@ BETTER = 10.0
 _MUCH_CUT_OFF = 0.05
 # What to advise: 12 lines are then 12 Hz, and limits below 20 Hz are common.
 SHORTEST_S = 1.0
-
-
-def default_minimum_lines(duration_s: float) -> int:
-    """Lines in the narrowest window: 24, but 12 where 24 would be wider than 2.4 Hz."""
-    return 24 if duration_s >= 10 else 12
 
 
 def estimate_random(
