@@ -270,3 +270,15 @@ def test_a_second_header_is_named(tmp_path: Path) -> None:
     rows = [f"{k},{u:.3f},{x:.7f}" for k, (u, x) in enumerate(zip(FORCE, POSITION, strict=True))]
     path.write_text("\n".join(["t,u,x", *rows, "t,u,x", *rows]), encoding="utf-8")
     assert f"t: 't' is not a number in row {N + 1}; mend or remove the row" in lines(overview(path))
+
+
+def test_a_measured_force_is_no_command(tmp_path: Path) -> None:
+    """A log of a motor has both, and the sensor's is the rougher."""
+    header = "loop_time,motor_torque_command,motor_measured_torque,angle"
+    rough = FORCE + np.random.default_rng(4).normal(size=N)
+    columns = np.column_stack([1e-3 * np.arange(N), FORCE, rough, POSITION])
+    path = tmp_path / "a.csv"
+    np.savetxt(path, columns, header=header, comments="", delimiter=",")
+    assert overview(path).roles["force"] == "motor_torque_command"
+    np.savetxt(path, columns[:, [0, 2, 3]], header="t,torque_fb,angle", comments="", delimiter=",")
+    assert "measured, not commanded? Then write measured_force=" in "\n".join(lines(overview(path)))

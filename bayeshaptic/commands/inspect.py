@@ -64,6 +64,7 @@ def lines(found: Overview) -> list[str]:
     """The table, the doubts, and the suggested line."""
     from bayeshaptic.recordings.columns import POSITIONS
     from bayeshaptic.recordings.overview import doubts, is_guess
+    from bayeshaptic.recordings.overview.roles import is_measured
 
     roles = {name: role for role, name in found.roles.items()}
     most_columns = 40
@@ -86,6 +87,8 @@ def lines(found: Overview) -> list[str]:
         if is_guess(by_name[name], role):
             rough = "roughest" if role == "force" else "smoothest"
             said.insert(0, f"a guess, the {rough} signal: look whether it is")
+        if role == "force" and is_measured(name):
+            said.insert(0, "measured, not commanded? Then write measured_force= for force=")
         if text := "; ".join(filter(None, said)):
             table.append(f"{role}: {printable(name)}: {text}")
     table += filter(None, (_text_in(one, found) for one in shown))

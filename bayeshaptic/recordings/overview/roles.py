@@ -24,6 +24,7 @@ _WORDS = {
 }
 # What a controller followed: no force where its name tells of none, and no measured position.
 _FOLLOWED = r"ref|target|desired|set.?point|soll|goal|demand|cmd|command"
+_MEASURED = r"meas|actual|feedback|sens|(^|[_ ])(act|fb|adc|mon)([_ ]|$)"
 # Behind these a signal is not what was commanded, or not a position.
 _OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$|(^|[/._ ])d(x|y|q|phi|theta)\b"
 
@@ -93,8 +94,10 @@ def guess_roles(facts: list[ColumnFacts], arrays: Arrays) -> dict[str, str]:
         other = "position" if role == "force" else "force"
         # By the name: of several the roughest, which is nearest to where the force acts. Without
         # one the roughest is the force, and the smoothest the position.
+        # What was measured of a force is not what was commanded.
         if named := [one for one in free if says(one.name, role)]:
-            roles[role] = max(named, key=lambda one: one.roughness).name
+            commands = [one for one in named if role == "position" or not is_measured(one.name)]
+            roles[role] = max(commands or named, key=lambda one: one.roughness).name
             continue
         unnamed = [one for one in free if not says(one.name, other)]
         if role == "position" and (speed := _measured("velocity", moving)):
@@ -108,6 +111,11 @@ def guess_roles(facts: list[ColumnFacts], arrays: Arrays) -> dict[str, str]:
     if followed:
         roles[REFERENCE] = min(followed, key=lambda one: says(one.name, "velocity")).name
     return roles
+
+
+def is_measured(name: str) -> bool:
+    """Whether a name tells of a sensor: ``motor_measured_current``, ``torque_fb``."""
+    return re.search(_MEASURED, name_and_unit(name)[0], re.I) is not None
 
 
 def _is_followed(name: str) -> bool:
