@@ -1,10 +1,19 @@
-"""What processes that are ours alone leave undone: looking for garbage, rewriting docstrings."""
+"""What processes that are ours alone leave undone: looking for garbage, rewriting docstrings.
+
+And importing what nobody asks for: SciPy's filters bring its statistics, splines and trees along.
+"""
 
 from __future__ import annotations
 
 import gc
+import sys
 from contextlib import suppress
 from functools import cache, partial
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+_LATER = ("scipy.stats", "scipy.interpolate", "scipy.spatial", "scipy.optimize")
 
 
 def look_rarely() -> None:
@@ -21,7 +30,8 @@ def leave_unread() -> None:
 
     They do so for some 900 functions and classes, a sixteenth of a report.  What SciPy does without
     is what it does under ``python -OO``.  To be called before either is imported; versions that
-    have no such names are left as they are.
+    have no such names are left as they are.  SciPy's filters and emcee are imported here, without
+    what they bring along.
     """
     with suppress(ImportError, AttributeError):
         from scipy._lib import _docscrape
@@ -31,3 +41,38 @@ def leave_unread() -> None:
         import matplotlib.artist
 
         matplotlib.artist.kwdoc = lambda artist: ""
+    _import_lightly("scipy.signal", "emcee")
+
+
+def _import_lightly(*names: str) -> None:
+    """Import modules while what they hardly use is stood in for: a twentieth of a report.
+
+    Whatever they call of it is imported then.  Where that does not work they are as not imported.
+    """
+    before = set(sys.modules)
+    away = [name for name in _LATER if name not in before]
+    sys.modules.update({name: _Later(name) for name in away})
+    try:
+        for name in names:
+            import_module(name)
+    except Exception:
+        for name in set(sys.modules) - before:
+            if any(f"{name}.".startswith(f"{one}.") for one in names):
+                del sys.modules[name]
+    finally:
+        for name in away:
+            if isinstance(sys.modules.get(name), _Later):
+                del sys.modules[name]
+
+
+class _Later(ModuleType):
+    """Stands in for a module of which only functions and classes are called."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return partial(_called, self.__name__, name)
+
+
+def _called(module: str, name: str, *args: Any, **options: Any) -> Any:
+    return getattr(import_module(module), name)(*args, **options)

@@ -149,17 +149,17 @@ def choose_model(
     Choice
     """
 
-    def fitted(name: str) -> Fit:
+    def fitted(name: str, shorter: Fit | None = None) -> Fit:
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
         own = {key: value for key, value in (prior or {}).items() if key in model.names}
-        return least_squares(model.with_prior(own), etfe, seed=seed)
+        return least_squares(model.with_prior(own), etfe, seed=seed, shorter=shorter)
 
     names = {None: ("rigid", "free", "grasped"), True: ("grasped",), False: ("rigid", "free")}
     fits = {name: fitted(name) for name in names[held]}
     best, candidates, noise = _compared(fits)
     # Where two masses that nobody holds explain it, a third has nothing to explain.
     if held is None and (fits[best].misfits or candidates[best].held):
-        fits[_CHAIN] = fitted(_CHAIN)
+        fits[_CHAIN] = fitted(_CHAIN, shorter=fits["free"])
         if fits[_CHAIN].misfits:
             fits[_CHAIN] = _from_the_hand(fits[_CHAIN], fits["grasped"], etfe)
         best, candidates, noise = _compared(fits)

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
@@ -68,7 +68,7 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
             "noise: what was found in it stands under What the model lacked."
         )
     if outside.any():
-        by_chance = float(binom.sf(outside.sum() - 1, len(outside), 1 - EXPECTED[1]))
+        by_chance = float(bdtrc(float(outside.sum() - 1), len(outside), 1 - EXPECTED[1]))
         return (
             f"Overall the residual is no larger than the noise ({chi}), but {outside.sum()} of "
             f"{len(outside)} third octaves {'lies' if outside.sum() == 1 else 'lie'} above what "

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
-from scipy.optimize import minimize_scalar
-from scipy.stats import f
+from scipy.special import fdtrc
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.tone import Tone, Tones
@@ -204,7 +203,8 @@ def _strongest(lines: _Lines, windows: list[_Windows]) -> tuple[float, float]:
         freedom = window.lines.shape[1] - window.basis.shape[2] - 1
         ratio = freedom * power / np.maximum(total - power, freedom * lines.floor + 1e-12 * total)
         at = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
-        score = -float(f.logsf(ratio[at], 2, 2 * freedom)) / np.log(10)
+        with np.errstate(divide="ignore"):  # beyond what a float holds
+            score = -float(np.log10(fdtrc(2, 2 * freedom, ratio[at])))
         if score > best:
             best, where = score, float(window.frequency_hz[at])
     return best - float(np.log10(2 * len(lines.searched))), where
@@ -212,6 +212,8 @@ def _strongest(lines: _Lines, windows: list[_Windows]) -> tuple[float, float]:
 
 def _fitted(lines: _Lines, near_hz: float) -> Tone:
     """Frequency and amplitude of the tone nearest to a frequency, by least squares."""
+    from scipy.optimize import minimize_scalar
+
     around = lines.around(int(np.searchsorted(lines.frequency_hz, near_hz)))
     basis = lines.explained(around)
     spacing = 1 / (lines.count * lines.period_s)

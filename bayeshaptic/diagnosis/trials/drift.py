@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import (
@@ -170,6 +169,8 @@ def _with_steady_gain(state: State, narrow: Model, start: dict[str, float]) -> t
     critical stiffness in units of the command is lowest.  How well that is known the roughness of
     the course tells.
     """
+    from scipy.interpolate import CubicSpline
+
     recording = state.etfe.recording
     assert recording is not None
     gain_part_s = 3.0

@@ -152,13 +152,15 @@ def predict(
     )
     for fitted in (half, ~half):
         rest = ~fitted
+        known, open_ = columns[fitted], columns[rest]
+        gram = known.T @ known  # of one matrix with itself: half the work
         for error, size in zip(errors, (own, columns.shape[1]), strict=True):
-            weights, beyond = _robust(columns[fitted, :size], wanted[fitted])
-            error[rest] = wanted[rest] - columns[rest, :size] @ weights
+            weights, beyond = _robust(known[:, :size], wanted[fitted], gram[:size, :size])
+            error[rest] = wanted[rest] - open_[:, :size] @ weights
             if size == own:
                 cut[rest] = beyond
-        weights = _least_squares(columns[fitted], beside[fitted])
-        new[:, rest] = (beside[rest] - columns[rest] @ weights).T
+        weights = _solved(gram, known.T @ beside[fitted], len(known))
+        new[:, rest] = (beside[rest] - open_ @ weights).T
     return Prediction(errors[0], errors[1], cut, new, half, rows)
 
 
@@ -192,26 +194,31 @@ def _scaled(signal: Floats) -> Floats:
     return np.zeros_like(centred) if still else np.asarray(centred / sd)
 
 
-def _robust(columns: Floats, wanted: Floats) -> tuple[Floats, float]:
-    """Coefficients, and the error beyond which an error counts no more."""
-    weight = np.ones(len(wanted))
+def _robust(columns: Floats, wanted: Floats, gram: Floats) -> tuple[Floats, float]:
+    """Coefficients, and the error beyond which an error counts no more.
+
+    `gram` is that of the columns.  Few errors lie beyond, and only their share is taken off it.
+    """
     reweightings = 6
+    normal, product = gram, columns.T @ wanted
     for _ in range(reweightings):
-        coefficients = _least_squares(columns, wanted, weight)
+        coefficients = _solved(normal, product, len(columns))
         size = np.abs(wanted - columns @ coefficients)
         cut = float(_CUT * np.quantile(size, _USUAL)) + np.finfo(float).eps
-        weight = np.minimum(1.0, cut / np.maximum(size, cut)) ** 2
-        if size.max() <= cut:
+        beyond = size > cut
+        if not beyond.any():
             break
+        lost = 1.0 - (cut / size[beyond]) ** 2
+        far = columns[beyond] * np.sqrt(lost)[:, None]
+        normal = gram - far.T @ far
+        product = columns.T @ wanted - far.T @ (wanted[beyond] * np.sqrt(lost))
     return coefficients, cut
 
 
-def _least_squares(columns: Floats, wanted: Floats, weight: Floats | None = None) -> Floats:
-    root = np.ones(len(columns)) if weight is None else np.sqrt(weight)
-    weighted = columns * root[:, None]
-    gram = weighted.T @ weighted  # of one matrix with itself: half the work
-    gram[np.diag_indices_from(gram)] += _RIDGE * len(columns)
-    return np.asarray(np.linalg.solve(gram, weighted.T @ (wanted.T * root).T))
+def _solved(gram: Floats, product: Floats, rows: int) -> Floats:
+    """Coefficients of least squares."""
+    ridge = _RIDGE * rows * np.eye(len(gram))
+    return np.asarray(np.linalg.solve(gram + ridge, product))
 
 
 def _correlation(one: Floats, other: Floats) -> Share:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 BAND_OCTAVES = 1 / 3
 EXPECTED = (0.005, 0.995)
@@ -34,5 +34,5 @@ def third_octaves(frequency_hz: NDArray[Any], residual: NDArray[Any]) -> BandRes
     count = np.bincount(index)
     power = np.bincount(index, np.abs(residual) ** 2) / count
     centre = np.exp(np.bincount(index, np.log(frequency_hz)) / count)
-    low, high = (np.sqrt(chi2.ppf(p, 2 * count) / (2 * count)) for p in EXPECTED)
+    low, high = (np.sqrt(gammaincinv(count, p) / count) for p in EXPECTED)
     return BandResidual(centre, np.sqrt(power), low, high)

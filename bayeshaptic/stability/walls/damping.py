@@ -79,8 +79,13 @@ class LowPass:
 def derivative(damping: Damping, theta: Floats, period_s: float) -> Complexes:
     """D(e^{j theta}), of the shape of `theta`; its imaginary part is positive inside (0, pi)."""
     a = damping.smoothing(period_s)
-    back = np.exp(-0.5j * theta)
-    return (1 - a) / period_s * 2j * np.sin(0.5 * theta) * back / (1 - a * back**2)
+    sine, cosine = np.sin(0.5 * theta), np.cos(0.5 * theta)
+    scale = 2 * (1 - a) / period_s * sine
+    rate = np.empty(theta.shape, complex)  # by its parts: a complex exponential takes five sines
+    rate.real, rate.imag = scale * sine, scale * cosine
+    if a:
+        rate /= 1 - a * (cosine - 1j * sine) ** 2
+    return rate
 
 
 def derivative_at_nyquist(damping: Damping, period_s: float) -> float:
