@@ -20,6 +20,7 @@ from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import read_recording
 from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.stability.binding import BindingCrossing, moved
 from bayeshaptic.stability.critical import critical_stiffness
 
 
@@ -172,3 +173,21 @@ def test_the_end_of_a_gains_course_is_known_as_its_neighbours_agree() -> None:
     found = np.sqrt(np.mean([_edge_error(course) ** 2 for course in courses]))
     # 4000 courses know either standard deviation to 1.1 %.
     assert found == pytest.approx(ends.std(), rel=0.05)
+
+
+def test_a_crossing_is_named_where_it_binds() -> None:
+    """A measured arm's page said 0.273 Hz in one table and 20 Hz in the other."""
+    crossing = BindingCrossing("rigid body at 0.273 Hz", 0.273, 0.98)
+    there = np.array([19.0, 19.9, 1500.0])
+    assert moved(crossing, there).label == "rigid body at 19.9 Hz"
+    assert moved(crossing, 100 * there).label == "rigid body at 1.99 kHz"
+    assert moved(crossing, np.array([0.25, 0.3])) == crossing
+    assert moved(crossing, np.array([])) == crossing
+    closed = fake_closed("unexplained", "linear")
+    one = closed.analysis
+    wide = with_discrepancy(one.limit, one.posterior, one.fit, one.fit, closed.traced)
+    for number, found in enumerate(wide.crossings):
+        bound = wide.frequency_hz[wide.group == number]
+        assert len(bound) > 0
+        assert found.probability == pytest.approx(len(bound) / len(wide.samples))
+        assert found.frequency_hz == pytest.approx(np.median(bound), rel=0.25)

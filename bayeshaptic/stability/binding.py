@@ -97,8 +97,7 @@ def group_crossings(kinds: Ints, frequency_hz: Floats) -> tuple[tuple[BindingCro
         for part in _split(members, frequency_hz, len(kinds)):
             median = float(np.median(frequency_hz[part]))
             has_frequency = kind not in (NEVER, NONE)
-            shown = f"{median:.3g} Hz" if median < 999.5 else f"{median / 1e3:.3g} kHz"
-            place = f" at {shown}" if has_frequency else ""
+            place = _at(median) if has_frequency else ""
             crossing = BindingCrossing(
                 TITLES[int(kind)] + place,
                 median if has_frequency else None,
@@ -111,6 +110,25 @@ def group_crossings(kinds: Ints, frequency_hz: Floats) -> tuple[tuple[BindingCro
     for number, (_, part) in enumerate(found):
         group[part] = number
     return tuple(crossing for crossing, _ in found), group
+
+
+def moved(crossing: BindingCrossing, places: Floats) -> BindingCrossing:
+    """The crossing with the frequency where it is now; as it was where it hardly went.
+
+    What a model leaves over may bend its response so that the phase crosses elsewhere.
+    """
+    hardly = 0.25  # of the frequency: as far as the draws of one crossing lie apart anyway
+    if crossing.frequency_hz is None or len(places) == 0:
+        return crossing
+    median = float(np.median(places))
+    if abs(median - crossing.frequency_hz) <= hardly * crossing.frequency_hz:
+        return crossing
+    title = crossing.label.partition(" at ")[0]
+    return replace(crossing, label=title + _at(median), frequency_hz=median)
+
+
+def _at(hertz: float) -> str:
+    return f" at {hertz:.3g} Hz" if hertz < 999.5 else f" at {hertz / 1e3:.3g} kHz"
 
 
 def _at_one_place(

@@ -21,6 +21,7 @@ from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE, LOAD_VELOCITY, VE
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models.structures import GROUND_DAMPERS
+from bayeshaptic.stability.binding import moved
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
@@ -182,8 +183,12 @@ def _with_linear(
     samples, places = samples[kept], places[kept]
     centres = np.log([c.frequency_hz or 1e-9 for c in limit.crossings])
     group = np.argmin(np.abs(np.log(places)[:, None] - centres[None, :]), axis=1)
+    bind, group = np.unique(group, return_inverse=True)
     crossings = tuple(
-        replace(c, probability=float(np.mean(group == i))) for i, c in enumerate(limit.crossings)
+        moved(limit.crossings[one], places[group == i]) for i, one in enumerate(bind.tolist())
+    )
+    crossings = tuple(
+        replace(c, probability=float(np.mean(group == i))) for i, c in enumerate(crossings)
     )
     return CriticalStiffness(samples, places, limit.unit, crossings, group, notices=limit.notices)
 
