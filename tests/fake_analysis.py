@@ -19,6 +19,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import build_model
 from bayeshaptic.models.model import Model
+from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, TableSpectra
 from bayeshaptic.stability.critical import critical_stiffness
@@ -150,9 +151,11 @@ def _etfe(model: Model, rng: np.random.Generator, misfit: float, title: str, tab
     noise = rng.normal(size=(2, len(frequency))) * sd / np.sqrt(2)
     wrong = (misfit - 1) * sd * np.exp(-0.5 * (np.log(frequency / 80) / 0.4) ** 2) * 3
     value = truth + noise[0] + 1j * noise[1] + wrong
+    force, rounding = rng.normal(size=30_000), rng.normal(size=30_000) * 1e-6
+    motion = linear_motion(model.system(_truth(model)), force, 1e-3)[0]
     recording = Recording(
-        rng.normal(size=30_000),
-        rng.normal(size=30_000) * 1e-4,
+        force,
+        motion + rounding,
         1e-3,
         model.force_unit,
         model.position_unit,

@@ -24,11 +24,14 @@ from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Complexes, Floats
 
 # Share of a column that is left beside the response where it is the response itself: a power of a
 # force of two levels is that force, with the nine digits of a file.
 _ROUNDING = 1e-6
+# Below it a hand moves the device, and the encoder sees it well.
+_SLOW_HZ, _OF_THE_RATE = 20.0, 0.4
 
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
@@ -146,10 +149,7 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
     x, v = linear_motion(system, force, recording.period_s)
     if fit.model.held or recording.reference is not None:
         rest = recording.position - recording.position.mean() - x
-        rate = 1 / recording.period_s
-        hand_hz = 20.0  # below it a hand moves the device, and the encoder sees it well
-        low = butter(4, min(hand_hz, 0.4 * rate), fs=rate, output="sos")
-        v = v + np.gradient(sosfiltfilt(low, rest), recording.period_s)
+        v = v + _slow_velocity(rest, recording.period_s)
     else:
         v = v + drift_velocity(system, recording.position - x, recording.period_s)
     return x, v
@@ -168,10 +168,45 @@ def drift_velocity(system: LinearSystem, besides: Floats, period_s: float) -> Fl
         The measured position less that of the command.
     period_s : float
     """
+    return _drift(system, besides, period_s)[1]
+
+
+def _drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Floats, Floats]:
+    """Position and velocity of what `drift_velocity` tells."""
     steady = np.ones(len(besides))
     x, v = linear_motion(system, steady, period_s)
-    weights = np.linalg.lstsq(np.stack([steady, x, v], axis=1), besides, rcond=None)[0]
-    return np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
+    columns = np.stack([steady, x, v], axis=1)
+    weights = np.linalg.lstsq(columns, besides, rcond=None)[0]
+    return columns @ weights, np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
+
+
+def moved_besides(fit: Fit, recording: Recording) -> float:
+    """How fast a device that nobody holds moves beside what its command does, as a share of that.
+
+    Root mean squares of slow velocities, the encoder's rounding taken off.  Where a hand or the
+    floor moves a device dry friction looks like damping, and no test can tell; or a force that no
+    test saw makes the difference itself.
+
+    Parameters
+    ----------
+    fit : Fit
+    recording : Recording
+    """
+    period_s, system = recording.period_s, fit.model.system(fit.theta)
+    x, v = linear_motion(system, recording.force - recording.force.mean(), period_s)
+    besides = recording.position - x
+    drift, along = _drift(system, besides, period_s)
+    count = increment_unit(recording.position) or 0.0
+    slow_hz = min(_SLOW_HZ, _OF_THE_RATE / period_s)
+    rounding = count**2 / 12 * 2 * period_s * (2 * np.pi) ** 2 * slow_hz**3 / 3
+    power = float(np.var(_slow_velocity(besides - drift, period_s))) - rounding
+    return float(np.sqrt(max(power, 0.0)) / np.std(v + along))
+
+
+def _slow_velocity(position: Floats, period_s: float) -> Floats:
+    rate = 1 / period_s
+    low = butter(4, min(_SLOW_HZ, _OF_THE_RATE * rate), fs=rate, output="sos")
+    return np.gradient(sosfiltfilt(low, position), period_s)
 
 
 def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped-def]
