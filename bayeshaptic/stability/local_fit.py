@@ -149,8 +149,11 @@ def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | 
     order = 3
     better = 5.0  # gain in chi-square by the richer polynomial that noise exceeds in 4 % of cases
     narrower = 2  # steps from the widest span where a cubic passes
+    away = np.abs(data.centre_hz / centre_hz - 1)
+    within = away <= _SPANS[0]
+    every = _equations(data, within, centre_hz, _SPANS[0], inverted)
     for span in _SPANS:
-        near = np.abs(data.centre_hz / centre_hz - 1) <= span
+        near = away <= span
         if inverted:
             near &= data.linear
         numbers = int(near.sum()) * data.frequency_hz.shape[1]
@@ -158,8 +161,9 @@ def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | 
         if richer < 2:
             break
         # The triangle of both polynomials: what is left of the target stands in its last column.
-        equations = _equations(data, near, centre_hz, span, inverted)
+        equations = every[near[within]].reshape(-1, _RICHER + 2)
         triangle: Complexes = np.asarray(np.linalg.qr(equations, mode="r"))
+        triangle[:, :-1] *= (_SPANS[0] / span) ** np.arange(_RICHER + 1)  # its own powers
         left = np.cumsum(np.abs(triangle[::-1, -1]) ** 2)[::-1]  # by k coefficients: at k
         fewer, more = float(left[order + 1]), float(left[_RICHER + 1])
         enough = fewer - more < better and fewer < freedom + 3 * np.sqrt(1.2 * freedom)
@@ -197,7 +201,10 @@ def _fit(
 def _equations(
     data: ResponseData, near: NDArray[np.bool_], centre_hz: float, span: float, inverted: bool
 ) -> Complexes:
-    """Whitened linear equations for the coefficients of the richer polynomial; last, the target."""
+    """Whitened linear equations for the coefficients of the richer polynomial; last, the target.
+
+    Those of each window by themselves, shape (W, k, 7).
+    """
     frequency, response = data.frequency_hz[near], data.response[near]
     if inverted:  # d(1/G) = -dG / G^2
         scale, value = response**2, 1 / response
@@ -207,7 +214,7 @@ def _equations(
     columns = np.empty((*frequency.shape, _RICHER + 2), complex)
     columns[..., :-1] = _powers(frequency, centre_hz, span, _RICHER)
     columns[..., -1] = value
-    return ((data.design[near] * scale[:, None, :]) @ columns).reshape(-1, _RICHER + 2)
+    return np.asarray((data.design[near] * scale[:, None, :]) @ columns)
 
 
 def _powers(frequency_hz: Floats, centre_hz: float, span: float, order: int) -> Floats:
