@@ -30,10 +30,6 @@ from bayeshaptic.types import Floats
 # reach the deepest need more than 15 steps: with 24 starts of 15 steps, one fit in 20 of a held
 # Phantom without a device file ended in another valley.
 _KEPT_STARTS, _STEPS_TO_A_VALLEY = 48, 40
-# The best few go on until it shows which leads, and that one to its end.  Of 171 fits in reports of
-# the benchmark, most of them of candidates that are wrong, 12 end above the best of four such ways
-# by more than a thousandth, and 13 where all six go to the end, at 1.7 times the cost.
-_REFINED, _STEPS_AHEAD = 6, 20
 # Sets of starting points: where a model misfits its valleys are many, and one set of a held LHIfAM
 # with a second mode ended in a worse one for one to two seeds in six.
 _SETS = 4
@@ -127,7 +123,7 @@ class Optimum:
     theta : ndarray, shape (P,)
         The best.
     agreeing : int
-        How many of those refined found the same optimum as far as it was followed with all.
+        How many of those refined to the end found the same optimum.
     elsewhere : ndarray, shape (V, P)
         The best points of the other valleys in which several ended, that with most of them first.
     reduced_chi_square : float
@@ -158,16 +154,13 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
 
     phi, cost = _valleys(residuals, phi, low, high)
     elsewhere = here.natural(_other_valleys(phi, cost))
-    phi = phi[np.argsort(cost + penalty(phi))[:_REFINED]]
-    if len(phi) > 1:
-        phi, cost = minimise(residuals, phi, low, high, _STEPS_AHEAD, tolerance=1e-2)
-    else:
-        cost = np.zeros(1)
+    refined = 6  # of them converged to the end
+    phi = phi[np.argsort(cost + penalty(phi))[:refined]]
+    phi, cost = minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
     best = np.argmin(cost + penalty(phi))
     agreeing = int(np.sum(cost < cost[best] + 0.5))
-    phi, cost = minimise(residuals, phi[[best]], low, high, steps=100, tolerance=1e-6)
-    left = float(cost[0] / windows.target.size)
-    return Optimum(here.natural(phi)[0], agreeing, elsewhere, left)
+    left = float(cost[best] / windows.target.size)
+    return Optimum(here.natural(phi)[best], agreeing, elsewhere, left)
 
 
 def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Optimum:
