@@ -30,6 +30,8 @@ from bayeshaptic.types import Complexes, Floats
 # Share of a column that is left beside the response where it is the response itself: a power of a
 # force of two levels is that force, with the nine digits of a file.
 _ROUNDING = 1e-6
+# Share of an instrument that its input has at least: less says nothing of how strong a force is.
+_WEAK = 0.05
 # Below it a hand moves the device, and the encoder sees it well.
 _SLOW_HZ, _OF_THE_RATE = 20.0, 0.4
 
@@ -49,9 +51,9 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     if recording is None or etfe.period_lines is not None:
         return ()
     tests = []
-    for name, (column, rms) in columns(fit, etfe, recording).items():
-        windows = etfe.spectra.windows(fit.response, column[None])
-        strength, sd, freedom = common_coefficient(windows)
+    for name, (inputs, rms) in columns(fit, etfe, recording).items():
+        windows = etfe.spectra.windows(fit.response, inputs)
+        strength, sd, freedom = common_coefficient(windows, len(inputs))
         score = as_normal(abs(strength / sd), freedom) if sd > 0 else 0.0
         text = f"a force like {name} stands {score:.1f} standard deviations out of the noise"
         seen = ForceSeen(strength, sd, rms)
@@ -59,30 +61,33 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     return tuple(tests)
 
 
-def common_coefficient(windows: Windows) -> tuple[float, float, float]:
+def common_coefficient(windows: Windows, inputs: int = 1) -> tuple[float, float, float]:
     """Coefficient of the last input, the same in all windows, and its robust standard deviation.
 
-    Each window's own smooth response is free, so only what it cannot explain counts.  Third come
-    the degrees of freedom of the deviation: each window knows its own noise from its lines, and
-    what a motion that is slow can tell stands in one or two of them (F. E. Satterthwaite,
-    Biometrics Bulletin 2, 1946).
+    Each window's own smooth response is free, so only what it cannot explain counts.  Of two inputs
+    the first is the instrument of the last.  Third come the degrees of freedom of the deviation:
+    each window knows its own noise from its lines, and what a motion that is slow can tell stands
+    in one or two of them (F. E. Satterthwaite, Biometrics Bulletin 2, 1946).
     """
     nodes = windows.frequency_hz.shape[1]
-    slope, found = windows.design[:, -1, -1], windows.target[:, -1]
-    whole = np.linalg.norm(windows.design[:, :, -1], axis=1)
-    slope = np.where(np.abs(slope) > _ROUNDING * whole, slope, 0.0)
+    instrument, found = windows.design[:, -inputs, -inputs], windows.target[:, -inputs]
+    slope = windows.design[:, -inputs, -1]
+    whole = np.linalg.norm(windows.design[:, :, -inputs], axis=1)
+    instrument = np.where(np.abs(instrument) > _ROUNDING * whole, instrument, 0.0)
     lines = np.maximum(windows.lines - nodes - 2, 0.5)
-    weight = lines / windows.scatter
-    each = weight * np.abs(slope) ** 2
-    information = float(np.sum(each))
-    if information == 0:
+    others = np.sum(np.abs(windows.target[:, nodes + 1 :]) ** 2, axis=1)
+    weight = lines / (windows.scatter + others)
+    each = weight * np.abs(instrument) ** 2
+    if not each.any():
         return 0.0, 0.0, 1.0
-    coefficient = float(np.sum(weight * (slope.conj() * found).real) / information)
-    left = found - coefficient * slope
-    spread = np.sqrt(np.sum((weight * (slope.conj() * left).real) ** 2))
-    usual = np.sqrt(0.5 * information)
-    freedom = information**2 / float(np.sum(each**2 / (2 * lines)))
-    return coefficient, max(float(spread), float(usual)) / information, freedom
+    answers = float(np.sum(weight * (instrument.conj() * slope).real))
+    information = max(answers, _WEAK * float(np.sum(each)))
+    along = float(np.sum(weight * (instrument.conj() * found).real))
+    left = found - along / np.sum(each) * instrument
+    spread = np.sqrt(np.sum((weight * (instrument.conj() * left).real) ** 2))
+    usual = np.sqrt(0.5 * np.sum(each))
+    freedom = np.sum(each) ** 2 / float(np.sum(each**2 / (2 * lines)))
+    return along / information, max(float(spread), float(usual)) / information, float(freedom)
 
 
 def as_normal(score: float, freedom: float) -> float:
@@ -92,20 +97,38 @@ def as_normal(score: float, freedom: float) -> float:
 
 
 def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, tuple[Complexes, float]]:
-    """Motions that nonlinear forces would add, at the lines of the spectra; by name.
+    """Motions that nonlinear forces would add, at the lines of the spectra, (1 or 2, L); by name.
 
-    Each with the rms of the motion that the force is a function of.
+    Each with the rms of the motion that the force is a function of.  Where a hand moves the device,
+    too, its own motion is in such a force and in what no response explains: what the command alone
+    would make of the force comes first, as an instrument.
     """
     s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     at_lines = line_transform(etfe, recording)
     found = {}
     for over, motion in motions(fit, recording).items():
         response = response_to(fit, over, s)
+        driven = _by_the_command(fit, recording, over)
         for shape in tested().values():
             if shape.over == over:
                 rms = float(motion.std())
-                found[shape.name] = response * at_lines(shape.force(motion / rms)), rms
+                made = [motion] if driven is None else [driven, motion]
+                added = [response * at_lines(shape.force(moved / rms)) for moved in made]
+                found[shape.name] = np.stack(added), rms
     return found
+
+
+def _by_the_command(fit: Fit, recording: Recording, over: str) -> Floats | None:
+    """A velocity that the command alone makes, where a hand makes some of it; None elsewhere."""
+    if (
+        over not in (VELOCITY, LOAD_VELOCITY)
+        or not fit.model.held
+        or recording.reference is not None
+    ):
+        return None
+    force = recording.force - recording.force.mean()
+    mass = 1 if over == LOAD_VELOCITY else 0
+    return linear_motion(fit.model.system(fit.theta), force, recording.period_s, mass)[1]
 
 
 def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
