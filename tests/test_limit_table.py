@@ -11,6 +11,8 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.models import build_model
+from bayeshaptic.report.figures.style import drawn
+from bayeshaptic.report.figures.walls import kb
 from bayeshaptic.report.numbers.rules import rules_of
 from bayeshaptic.report.walls.section import limits_section
 from bayeshaptic.stability.cases import Case
@@ -130,6 +132,13 @@ def test_rules_of_the_case_with_the_least_damping(one):
     assert (
         rules.label == "nobody holds it"
     )  # 6.9 N s/m to the ground; held 4.1, and 18.3 of the hand
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_rule_far_above_the_walls_leaves_the_figure_its_size(one, table):
+    rules = rules_of([one], friction=0.5, resolution=1e-7)
+    above = replace(rules, damping=10 * rules.damping)  # eight times the highest wall
+    assert drawn(kb.draw(table, above), "limits_kb").png
 
 
 def test_small_risks_come_from_the_lowest_of_many_draws():

@@ -115,13 +115,16 @@ def _rules(axes: Axes, rules: Rules, last: float, b: float, k: float) -> None:
     )
     quantised = rules.quantised
     if quantised is not None:
+        # On the edge where it lies above: a mark outside would take the page from the axes.
+        top = axes.get_ylim()[1]
+        above = quantised * k > top
         axes.plot(
             [0.0],
-            [quantised * k],
-            ">",
+            [min(quantised * k, top)],
+            "^" if above else ">",
             color=style.CYCLE[3],
             markersize=7,
             clip_on=False,
             zorder=6,
-            label="passive with friction and encoder",
+            label="passive with friction and encoder" + (" (above)" if above else ""),
         )
