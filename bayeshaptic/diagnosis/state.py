@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -15,10 +16,9 @@ from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.models.model import Extension
-from bayeshaptic.numerics.bracketed import roots_between
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
-from bayeshaptic.types import Complexes, Floats, Ints
+from bayeshaptic.types import Complexes, Floats
 
 # Windows are dealt out in turn: half of them to fit, a quarter to choose, a quarter to report on.
 FIT, CHOOSE, REPORT = (0, 2), (1,), (3,)
@@ -220,15 +220,13 @@ def log_likelihoods(model: Model, windows: Windows, theta: Floats) -> Floats:
 def _noise_factor(power: Floats, scatter: Floats, freedom: Floats, nodes: int) -> float:
     """The most likely factor, at least 1, on the noise variance of all windows."""
 
-    def surplus(log_c: Floats, _: Ints) -> Floats:  # the likelihood's slope, which falls
-        noise = np.exp(log_c)[:, None] * scatter
-        return np.asarray(np.sum(freedom * power / (noise + power) - nodes, axis=1))
+    def surplus(log_c: float) -> float:  # the likelihood's slope, which falls
+        return float(np.sum(freedom * power / (np.exp(log_c) * scatter + power) - nodes))
 
-    highest = float(np.log(np.max(freedom * power / scatter)))  # where every term is negative
-    ends = np.array([0.0]), np.array([max(highest, 1.0)])
-    if surplus(ends[0], np.zeros(1, int)) <= 0:
+    if surplus(0.0) <= 0:
         return 1.0
-    return float(np.exp(roots_between(surplus, *ends, 1e-13)[0]))
+    highest = float(np.log(np.max(freedom * power / scatter)))  # where every term is negative
+    return float(np.exp(brentq(surplus, 0.0, max(highest, 1.0))))
 
 
 def held_out_rms(fit: Fit, part: tuple[int, ...] = REPORT) -> float:

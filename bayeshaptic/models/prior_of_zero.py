@@ -76,17 +76,12 @@ class NearZero(ByTerms):
 @lru_cache(maxsize=64)
 def _near_zero(ratio: float, rise: float) -> tuple[float, Floats, Floats]:
     """The integral of a `NearZero` density; log(1 + x / floor) with the probability below it."""
+    from scipy.integrate import cumulative_simpson
+
     factors = np.linspace(0.0, np.log1p(9.0 / ratio), 20_001)
     density = np.exp(rise * factors - 0.5 * (ratio * np.expm1(factors)) ** 2)
-    below = np.maximum.accumulate(_integrated(density, factors[1]))
+    below = np.maximum.accumulate(cumulative_simpson(density, x=factors, initial=0.0))
     return float(below[-1]), factors, below / below[-1]
-
-
-def _integrated(density: Floats, step: float) -> Floats:
-    """From the first of an odd number of points to each, by Simpson's parabolas."""
-    first, middle, last = density[:-2:2], density[1::2], density[2::2]
-    half = np.stack([5 * first + 8 * middle - last, 5 * last + 8 * middle - first], axis=1)
-    return np.append(0.0, np.cumsum(half.ravel() * step / 12))
 
 
 def weight_of_zero(prior: Prior) -> float:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import elementwise
 
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.bracketed import roots_between
 from bayeshaptic.stability.responses.evaluated import EvaluableSystem, EvaluatedResponse
 from bayeshaptic.stability.responses.grid import in_chunks, search_grid
 from bayeshaptic.stability.responses.linked import linked_response
@@ -142,11 +142,12 @@ def plain_search(response: Response) -> tuple[Ints, Floats, Floats]:
     scans = [_scan(response, rows) for rows in in_chunks(len(response.delay))]
     row, low, high = (np.concatenate(part) for part in zip(*scans, strict=True))
 
-    def value(theta: Floats, index: Ints) -> Floats:
-        return _sine(response.at(row[index], theta[:, None])[:, 0])
+    def value(theta: Floats, row: Ints) -> Floats:
+        return _sine(response.at(row, theta[:, None])[:, 0])
 
     tolerance = 1e-13  # of a crossing's angle
-    theta = roots_between(value, low, high, tolerance)
+    found = elementwise.find_root(value, (low, high), args=(row,), tolerances={"xrtol": tolerance})
+    theta = np.asarray(found.x)
     return row, theta, response.at(row, theta[:, None])[:, 0].real
 
 

@@ -31,6 +31,7 @@ from bayeshaptic.types import Complexes, Floats
 # force of two levels is that force, with the nine digits of a file.
 _ROUNDING = 1e-6
 # Share of an instrument that its input has at least: less says nothing of how strong a force is.
+# It bounds a strength's standard deviation, and no score, so it raises no alarm.
 _WEAK = 0.05
 # Below it a hand moves the device, and the encoder sees it well.
 _SLOW_HZ, _OF_THE_RATE = 20.0, 0.4

@@ -92,9 +92,9 @@ def guess_roles(facts: list[ColumnFacts], arrays: Arrays) -> dict[str, str]:
             if one.name not in roles.values() and not _is_of_another_role(role, one)
         ]
         other = "position" if role == "force" else "force"
-        # By the name: of several the roughest, which is nearest to where the force acts. Without
-        # one the roughest is the force, and the smoothest the position.
-        # What was measured of a force is not what was commanded.
+        # By the name: of several the roughest, which is nearest to where the force acts, and no
+        # measured force beside a commanded one. Without a name the roughest is the force, and the
+        # smoothest the position.
         if named := [one for one in free if says(one.name, role)]:
             commands = [one for one in named if role == "position" or not is_measured(one.name)]
             roles[role] = max(commands or named, key=lambda one: one.roughness).name

@@ -84,6 +84,8 @@ class RoughResponse(NamedTuple):
 
 def _left_by_one_mass(s: Complexes, velocity: Complexes, period_s: float) -> float:
     """What of one is left by (m s + b) exp(s delay) velocity, its power averaged over log s."""
+    from scipy.optimize import nnls
+
     weight = np.sqrt(1 / np.abs(s) / np.sum(1 / np.abs(s)))
     one = np.concatenate([weight, np.zeros(len(s))])
     left = []
@@ -92,20 +94,8 @@ def _left_by_one_mass(s: Complexes, velocity: Complexes, period_s: float) -> flo
             weight[:, None] * (np.exp(s * delay) * velocity)[:, None] * np.stack([s, 1 + 0 * s], 1)
         )
         stacked = np.concatenate([columns.real, columns.imag])
-        left.append(_left_by_two(stacked / np.linalg.norm(stacked, axis=0), one))
-    return min(left)
-
-
-def _left_by_two(columns: Floats, one: Floats) -> float:
-    """The squares left of a vector by two columns of length 1, with factors that are not negative.
-
-    Where the best of all have one that is, one column alone is best.
-    """
-    factors = np.linalg.lstsq(columns, one, rcond=None)[0]
-    if np.any(factors < 0):
-        alone = np.maximum(columns.T @ one, 0.0)
-        factors = np.where(alone == alone.max(), alone, 0.0)
-    return float(np.sum((one - columns @ factors) ** 2))
+        left.append(nnls(stacked / np.linalg.norm(stacked, axis=0), one)[1] ** 2)
+    return float(min(left))
 
 
 def rough_response(recording: Recording) -> RoughResponse:

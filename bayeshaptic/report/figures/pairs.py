@@ -197,18 +197,12 @@ def credible(
 
     Read at the draws themselves: a histogram that is smoothed is wider than they are.
     """
-    heights = _smooth(count)
-    (i, u), (j, v) = _along(_middle(x_edges), x), _along(_middle(y_edges), y)
-    low = (1 - v) * heights[i, j] + v * heights[i, j + 1]
-    high = (1 - v) * heights[i + 1, j] + v * heights[i + 1, j + 1]
-    there = np.where((u >= 0) & (u <= 1) & (v >= 0) & (v <= 1), (1 - u) * low + u * high, 0.0)
-    return np.quantile(there, [1 - level for level in LEVELS])
+    from scipy.interpolate import RegularGridInterpolator
 
-
-def _along(grid: NDArray[Any], values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The cell of each value, and how far into it; outside 0 to 1 beside the grid."""
-    cell = np.clip(np.searchsorted(grid, values, side="right") - 1, 0, len(grid) - 2)
-    return cell, (values - grid[cell]) / (grid[cell + 1] - grid[cell])
+    height = RegularGridInterpolator(
+        (_middle(x_edges), _middle(y_edges)), _smooth(count), bounds_error=False, fill_value=0.0
+    )
+    return np.quantile(height(np.column_stack([x, y])), [1 - level for level in LEVELS])
 
 
 def _nothing() -> Figure:

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import elementwise
 
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.bracketed import roots_between
 from bayeshaptic.numerics.polynomial import roots
 from bayeshaptic.stability.crossings import response_of
 from bayeshaptic.stability.responses.evaluated import EvaluableSystem
@@ -231,9 +231,16 @@ def _roots(
     off: Callable[[Ints, Floats], Floats], theta: Floats, row: Ints, segment: Ints
 ) -> Floats:
     """The angle in each segment where a function changes its sign."""
+    every = np.arange(len(row))
     low, high = theta[row, segment], theta[row, segment + 1]
     tolerance = 1e-8  # of a bracket's angle
-    return roots_between(lambda place, index: off(index, place), low, high, tolerance)
+    found = elementwise.find_root(
+        lambda place, index: off(index, place),
+        (low, high),
+        args=(every,),
+        tolerances={"xrtol": tolerance},
+    )
+    return np.asarray(found.x)
 
 
 def _with_line(
