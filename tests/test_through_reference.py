@@ -21,10 +21,10 @@ from bayeshaptic.models import build_model
 from bayeshaptic.recordings import join_recordings, read_recording, recording_from_arrays
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import Feedback, has_feedback
-from bayeshaptic.recordings.followed import through_reference
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
-from bayeshaptic.recordings.signals.controller import followed
+from bayeshaptic.recordings.signals.controller import controller_reference
+from bayeshaptic.recordings.through_reference import through_reference
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.page.next_step import next_steps
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
@@ -126,11 +126,11 @@ def test_a_controller_declared_wrongly_is_not_believed() -> None:
 
 def test_the_controller_is_read_off_where_its_reference_steps() -> None:
     recording, _, _ = in_loop("steps")
-    target, found = recording.reference, followed(recording)
+    target, found = recording.reference, controller_reference(recording)
     assert found is not None and target is not None
     changes = np.flatnonzero(np.diff(target))
     assert {int(np.abs(changes - k).min()) for k in np.flatnonzero(found)} <= set(range(8))
-    assert followed(in_loop("noise")[0]) is None
+    assert controller_reference(in_loop("noise")[0]) is None
 
 
 def test_a_reference_that_says_nothing_leaves_the_warning() -> None:

@@ -22,7 +22,6 @@ from bayeshaptic.models.structures import chain
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks import check_recording
 from bayeshaptic.recordings.feedback import has_feedback, told
-from bayeshaptic.recordings.followed import through_reference, too_weak, unusable
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
@@ -30,6 +29,7 @@ from bayeshaptic.recordings.response.differences import with_differences
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
 from bayeshaptic.recordings.sufficiency import refuse_where_told, told_too_little, too_little
+from bayeshaptic.recordings.through_reference import through_reference, too_weak, unusable
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded
 

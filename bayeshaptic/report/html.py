@@ -17,7 +17,7 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop import tables as loop_tables
 from bayeshaptic.report.loop import words as loop_words
-from bayeshaptic.report.loop.followed import followed
+from bayeshaptic.report.loop.motion_words import motion_words
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.page import answer, methods
@@ -89,7 +89,7 @@ def render(
         tables=tables,
         loop_words=loop_words,
         force_words=force_words,
-        followed=followed(analysis),
+        motion_words=motion_words(analysis),
         loop_tables=loop_tables,
         assumptions=assumptions(analysis, closed),
         priors=priors(analysis),

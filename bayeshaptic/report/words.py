@@ -11,7 +11,7 @@ from scipy.special import bdtrc
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.quantities import estimate, interval, percent, pure, quantity
-from bayeshaptic.report.loop.followed import followed
+from bayeshaptic.report.loop.motion_words import motion_words
 from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
 from bayeshaptic.report.numbers.octaves import EXPECTED, third_octaves
@@ -34,7 +34,7 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
     """How the residual compares with the noise, and where it is worst."""
     if analysis.in_loop is not None:
         return (
-            f"{followed(analysis).response} The model was not fitted to it but to the motion: "
+            f"{motion_words(analysis).response} The model was not fitted to it but to the motion: "
             "where the two differ here, the response is wrong, or more than one mass moves."
         )
     if not analysis.sampled:

@@ -88,7 +88,7 @@ def _mass() -> Model:
     return rigid()
 
 
-def followed(
+def simulate(
     values: Floats,
     laws: Sequence[Law],
     forward: Floats,

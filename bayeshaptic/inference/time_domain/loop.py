@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.acting import COULOMB, Acting, followed
+from bayeshaptic.inference.time_domain.acting import COULOMB, Acting, simulate
 from bayeshaptic.inference.time_domain.follower import Follower, spring_and_damper
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
 from bayeshaptic.recordings.recording import Recording
@@ -185,7 +185,7 @@ class Loop:
         for piece, own in zip(self.pieces, self.beginnings, strict=True):
             hum = values[own[2:]] @ self._waves(piece.stop - piece.start)
             with np.errstate(all="ignore"):
-                simulated[piece] = followed(
+                simulated[piece] = simulate(
                     np.array([mass, damping, offset, delay_s, *values[own[:2]]]),
                     laws,
                     forward[piece] + hum,

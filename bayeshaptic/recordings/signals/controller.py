@@ -30,7 +30,7 @@ _FEWEST_CHANGES = 8
 _MOST_AT_LIMIT = 1e-3  # of the samples: a command that was cut off obeys no law there
 
 
-def followed(recording: Recording) -> Floats | None:
+def controller_reference(recording: Recording) -> Floats | None:
     """What the controller followed, through its law, shape (N,); None where no law is exact."""
     if _cut_off(recording.force):
         return None

@@ -10,7 +10,7 @@ from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.samples.tone import in_words
 from bayeshaptic.inference.time_domain.fit import NAMES
 from bayeshaptic.quantities import pure, quantity, scale
-from bayeshaptic.report.loop.followed import followed
+from bayeshaptic.report.loop.motion_words import motion_words
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -91,7 +91,7 @@ def remains(force: ForceExplained, analysis: Analysis) -> str:
     limit = (
         "No limit follows from this: for a critical stiffness, record with an external excitation."
         if analysis.in_loop is None
-        else f"{followed(analysis).told} do not rest on these numbers, but on the motion."
+        else f"{motion_words(analysis).told} do not rest on these numbers, but on the motion."
     )
     first, further = (pure(100 * f.relative_error, 3) for f in (force.first, force.further))
     return (
@@ -110,8 +110,8 @@ def motion(analysis: Analysis) -> str:
     way = quantity(float(np.ptp(recording.position)), unit)
     text = (
         "One mass with viscous and dry friction, a constant force and a delay, simulated "
-        f"{followed(analysis).beside}, stays within {quantity(found.motion.error_rms, unit)} rms "
-        f"of the measured motion over {way}."
+        f"{motion_words(analysis).beside}, stays within "
+        f"{quantity(found.motion.error_rms, unit)} rms of the measured motion over {way}."
     )
     for law in found.laws:
         text += (

@@ -18,7 +18,7 @@ from bayeshaptic.quantities import (
 from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.report.loop import force_words
-from bayeshaptic.report.loop.followed import determined
+from bayeshaptic.report.loop.motion_words import determined
 from bayeshaptic.report.loop.unexplained import remainder, worst
 from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear

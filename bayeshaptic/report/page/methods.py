@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import interval, quantity
 from bayeshaptic.recordings.sufficiency import told_too_little
-from bayeshaptic.report.loop.followed import followed
+from bayeshaptic.report.loop.motion_words import motion_words
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.version import __version__
 
@@ -102,7 +102,7 @@ def _in_loop(analysis: Analysis) -> str:
     recording = analysis.recording
     assert recording is not None
     length = quantity(recording.duration_s, "s")
-    words = followed(analysis)
+    words = motion_words(analysis)
     return (
         f"Force and position were recorded for {length} at "
         f"{quantity(1 / recording.period_s, 'Hz')} {words.where}. {words.response} One mass with "

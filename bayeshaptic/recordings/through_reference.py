@@ -11,7 +11,7 @@ from bayeshaptic.recordings.feedback import Feedback, has_feedback
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality import causality
-from bayeshaptic.recordings.signals.controller import followed
+from bayeshaptic.recordings.signals.controller import controller_reference
 from bayeshaptic.types import Floats
 
 _COLUMN = "the reference that was written down beside it"
@@ -48,7 +48,7 @@ def through_reference(
         found, what = recording.reference, _COLUMN
     elif recording.feedback is not None:
         found, what = _left_by(recording.feedback, recording), _DECLARED
-    elif (left := followed(recording)) is not None:
+    elif (left := controller_reference(recording)) is not None:
         found, what = left, _READ_OFF
     else:
         return alone, notices

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Followed:
+class MotionWords:
     """What a page says otherwise of a closed loop than of an open one.
 
     Attributes
@@ -36,7 +36,7 @@ class Followed:
     told: str
 
 
-_CLOSED = Followed(
+_CLOSED = MotionWords(
     "in closed loop",
     "The force was computed from the motion, so the measured response is biased, and so is all "
     "that is read from it.",
@@ -44,7 +44,7 @@ _CLOSED = Followed(
     "closed-loop output error [janot2014]",
     "Parameters, limit and interval",
 )
-_OPEN = Followed(
+_OPEN = MotionWords(
     "in open loop",
     "The force says too little of the response for a limit to be read from it.",
     "under the same command",
@@ -53,7 +53,7 @@ _OPEN = Followed(
 )
 
 
-def followed(analysis: Analysis) -> Followed:
+def motion_words(analysis: Analysis) -> MotionWords:
     """The words for where the motion of an analysis was recorded."""
     return _CLOSED if told_too_little(analysis.notices) is None else _OPEN
 
@@ -69,9 +69,8 @@ def determined(analysis: Analysis) -> str:
         if not leaves[name]
     ]
     text = (
-        f"It was recorded {followed(analysis).where}, as far as it shows, and followed in time as "
-        "one mass: "
-        f"{', '.join(known)} (90 %)."
+        f"It was recorded {motion_words(analysis).where}, as far as it shows, and followed in time "
+        f"as one mass: {', '.join(known)} (90 %)."
     )
     left = [stated.model.parameter(name).title for name in stated.names if leaves[name]]
     return f"{text} It leaves open: {', '.join(left)}." if left else text
