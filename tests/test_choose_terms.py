@@ -7,7 +7,7 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.feedback.choose_terms import between_sets, choose_terms
-from bayeshaptic.diagnosis.feedback.terms import at_rest
+from bayeshaptic.diagnosis.feedback.smooth_motion import at_rest
 
 RNG = np.random.default_rng(7)
 START = ("mass", "damping")

@@ -27,14 +27,13 @@ from bayeshaptic.diagnosis.feedback.choose_terms import (
     choose_terms,
     held_out,
 )
-from bayeshaptic.diagnosis.feedback.terms import (
+from bayeshaptic.diagnosis.feedback.smooth_motion import (
     SmoothMotion,
-    Term,
     at_rest,
     smooth_motion,
     smoothed,
-    terms_of,
 )
+from bayeshaptic.diagnosis.feedback.terms import Term, terms_of
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Bools, Floats
@@ -126,17 +125,7 @@ def inverse_dynamics(
     band = 0.05  # of the sampling rate: the usual cut-off
     cutoff_hz = band / recording.period_s if cutoff_hz is None else cutoff_hz
     low = _LowPass(cutoff_hz, recording.period_s)
-    fewest = 100  # samples left after decimation
-    if (recording.samples - 2 * low.edge) // low.every < fewest:
-        raise InputError(
-            f"{recording.name}: {recording.samples} samples are too few for inverse dynamics below "
-            f"{cutoff_hz:g} Hz; raise cutoff_hz"
-        )
-    moving = ~low.picked(at_rest(recording, cutoff_hz))
-    if np.count_nonzero(moving) < fewest // 2:
-        raise InputError(
-            f"{recording.name}: it stands still too long for inverse dynamics; record it in motion"
-        )
+    moving = _moving(recording, low)
     path = smooth_motion(recording, cutoff_hz)
     start, library = terms_of(recording, path)
     known = {term.name: term for term in (*start, *library)}
@@ -207,6 +196,22 @@ class _LowPass:
 
     def smooth(self, signal: Floats) -> Floats:
         return self.thin(smoothed(signal, self.cutoff_hz, self.period_s))
+
+
+def _moving(recording: Recording, low: _LowPass) -> Bools:
+    """Where the device moves, of the samples that are kept; refused where that is too seldom."""
+    fewest = 100  # samples left after decimation
+    if (recording.samples - 2 * low.edge) // low.every < fewest:
+        raise InputError(
+            f"{recording.name}: {recording.samples} samples are too few for inverse dynamics below "
+            f"{low.cutoff_hz:g} Hz; raise cutoff_hz"
+        )
+    moving = ~low.picked(at_rest(recording, low.cutoff_hz))
+    if np.count_nonzero(moving) < fewest // 2:
+        raise InputError(
+            f"{recording.name}: it stands still too long for inverse dynamics; record it in motion"
+        )
+    return moving
 
 
 def _asked_for(

@@ -9,18 +9,17 @@ not: they say that a limit from one mass is another device's.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from bayeshaptic.diagnosis.feedback.candidate_laws import Candidate, candidate_laws
 from bayeshaptic.diagnosis.feedback.humming import with_tones
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
-from bayeshaptic.diagnosis.feedback.terms import SmoothMotion, smooth_motion
-from bayeshaptic.effects.laws import corrections
+from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
+from bayeshaptic.diagnosis.feedback.unlike_one_mass import unlike_one_mass
 from bayeshaptic.effects.nonlinear.friction import (
-    CubicDamping,
     DahlFriction,
     Drag,
     RisingFriction,
@@ -30,10 +29,10 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import Usual
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.acting import COULOMB, Acting
 from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.loop import Hum
+from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
 from bayeshaptic.inference.time_domain.scores import Score, scores
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
@@ -47,29 +46,8 @@ _SEEN = 5.04
 # as small as the encoder's to a law that has joined.
 _WORTH = 0.1
 _ROUNDS = 2  # another law of dry friction, and a resistance
-_BAND = 0.05  # of the sampling rate: in which the motion that laws are over is smooth
-_FADING_S = (3e-3, 1e-2, 3e-2, 0.1)  # times within which damping fades
-_SLOW = "stribeck_"
 _DRY = (StribeckFriction.name, RisingFriction.name, DahlFriction.name)
 _COULOMB, _DELAY = NAMES.index("coulomb"), NAMES.index("delay_s")
-
-
-@dataclass(frozen=True)
-class _Candidate:
-    """A force to ask for.
-
-    Attributes
-    ----------
-    name : str
-    force : ndarray, shape (N,)
-        Of strength one, as the measured motion says.
-    joined : callable
-        From what acts already, its dry friction and the strength asked for, to what acts with it.
-    """
-
-    name: str
-    force: Floats = field(repr=False)
-    joined: Callable[[Acting, float, float], Acting] = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -105,7 +83,7 @@ def with_laws(
     InputError
         Where no motion of one mass can be found beside the measured one.
     """
-    path = _path(recording)
+    path = smooth_pieces(recording)
     usual = Usual.of(path.velocity, path.position, recording.position_unit)
     motion = fit_motion(recording, follower)
 
@@ -116,7 +94,7 @@ def with_laws(
     seen: dict[str, Score] = {}
     further = _with_drag(recording, follower, motion)
     for _ in range(_ROUNDS):
-        asked = [c for c in _laws(recording, path, usual) if c.name not in seen]
+        asked = [c for c in candidate_laws(recording, path, usual) if c.name not in seen]
         if motion.forces.friction.name != COULOMB.friction.name:
             asked = [c for c in asked if c.name not in _DRY]
         better = further + [
@@ -147,7 +125,7 @@ def _with_drag(
     mass, damping, offset, dry = (found[n][0] for n in ("mass", "damping", "offset", "coulomb"))
     start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[_DELAY]])
     start[_DELAY] = min(start[_DELAY], recording.period_s)
-    dragged = Acting(others=(Drag(MOTOR),), strengths=(strength,))
+    dragged = MassForces(others=(Drag(MOTOR),), strengths=(strength,))
     more = _again(recording, follower, dragged, start, alone.hums)
     if more is None:
         return []
@@ -157,7 +135,7 @@ def _with_drag(
 
 def _with(
     motion: MotionFit,
-    candidate: _Candidate,
+    candidate: Candidate,
     score: Score,
     recording: Recording,
     follower: Follower | None,
@@ -175,7 +153,7 @@ def _with(
 def _again(
     recording: Recording,
     follower: Follower | None,
-    forces: Acting,
+    forces: MassForces,
     start: Floats,
     hums: tuple[Hum, ...],
 ) -> MotionFit | None:
@@ -196,11 +174,11 @@ def _found(motion: MotionFit, seen: Mapping[str, Score]) -> tuple[Lacking, ...]:
 
 
 def _best_of_each(
-    motion: MotionFit, recording: Recording, asked: Sequence[_Candidate]
-) -> list[tuple[_Candidate, Score]]:
+    motion: MotionFit, recording: Recording, asked: Sequence[Candidate]
+) -> list[tuple[Candidate, Score]]:
     """Of each law that is seen and makes sense the candidate that leaves least."""
     scored = scores(motion, recording, [one.force for one in asked])
-    found: dict[str, tuple[_Candidate, Score]] = {}
+    found: dict[str, tuple[Candidate, Score]] = {}
     for one, score in zip(asked, scored, strict=True):
         if score is None or score.t < _SEEN or score.left > 1 - _WORTH:
             continue
@@ -211,7 +189,7 @@ def _best_of_each(
 
 def _against(motion: MotionFit, recording: Recording, path: SmoothMotion) -> tuple[str, ...]:
     """What no limit of one mass goes with, where it is seen."""
-    asked = [*_fading(recording, path), *_changing(recording, path)]
+    asked = list(unlike_one_mass(recording, path))
     scored = scores(motion, recording, [force for _, force in asked])
     seen = [
         (score.left, f"{why} (t = {abs(score.t):.3g})")
@@ -219,92 +197,3 @@ def _against(motion: MotionFit, recording: Recording, path: SmoothMotion) -> tup
         if score is not None and abs(score.t) > _SEEN and score.left < 1 - _WORTH
     ]
     return (min(seen)[1],) if seen else ()
-
-
-def _laws(recording: Recording, path: SmoothMotion, usual: Usual) -> Iterator[_Candidate]:
-    """Other laws of dry friction, and resistances that grow with a power of the velocity."""
-    for shape in corrections(usual):
-        part = float(shape.name.removeprefix(_SLOW)) * usual.velocity
-        force = shape.force(path.velocity)
-        yield _Candidate(StribeckFriction.name, force, _stribeck(StribeckFriction, part))
-        yield _Candidate(RisingFriction.name, -force, _stribeck(RisingFriction, part))
-    for share in (0.01, 0.03, 0.1):  # of the way, in which friction begins as a spring
-        length = share * float(np.ptp(path.position))
-        yield _Candidate(DahlFriction.name, _presliding(recording, length), _dahl(length))
-    for kind in (Drag, CubicDamping):
-        (shape, *_) = kind.shapes(MOTOR, usual)
-        yield _Candidate(kind.name, shape.force(path.velocity), _beside(kind))
-
-
-def _stribeck(
-    kind: type[StribeckFriction] | type[RisingFriction], slow: float
-) -> Callable[[Acting, float, float], Acting]:
-    """Coulomb's friction, more or less near standstill."""
-
-    def joined(acting: Acting, dry: float, strength: float) -> Acting:
-        share = strength / max(dry, strength)
-        change, speed = kind.tuned
-        law = kind(MOTOR, {change: min(share, 0.9 * kind.most.get(change, np.inf)), speed: slow})
-        return replace(acting, friction=law)
-
-    return joined
-
-
-def _dahl(length: float) -> Callable[[Acting, float, float], Acting]:
-    (distance,) = DahlFriction.tuned
-    law = DahlFriction(MOTOR, {distance: length})
-    return lambda acting, dry, strength: replace(acting, friction=law)
-
-
-def _beside(kind: type[Drag] | type[CubicDamping]) -> Callable[[Acting, float, float], Acting]:
-    def joined(acting: Acting, dry: float, strength: float) -> Acting:
-        others = (*acting.others, kind(MOTOR))
-        return replace(acting, others=others, strengths=(*acting.strengths, strength))
-
-    return joined
-
-
-def _presliding(recording: Recording, length: float) -> Floats:
-    """Dahl's friction of strength one, shape (N,)."""
-    parts = []
-    for piece in recording.pieces:
-        held, found = 0.0, [0.0]
-        for step in np.diff(_path(piece).position).tolist():
-            slides = math.copysign(1.0, step)
-            held = slides + (held - slides) * math.exp(-abs(step) / length)
-            found.append(-held)
-        parts.append(found)
-    return np.concatenate(parts)
-
-
-def _path(recording: Recording) -> SmoothMotion:
-    """Of the pieces, one after the other."""
-    paths = [smooth_motion(piece, _BAND / piece.period_s) for piece in recording.pieces]
-    return SmoothMotion(*map(np.concatenate, zip(*map(astuple, paths), strict=True)))
-
-
-def _fading(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
-    """Damping that is gone within a time."""
-    from scipy.signal import lfilter
-
-    why = (
-        "the damping is another at other frequencies, as with a base that gives or a connection "
-        "that relaxes, and what it is at the limit's nobody saw"
-    )
-    for time_s in _FADING_S:
-        kept = np.exp(-recording.period_s / time_s)
-        v = path.velocity
-        slow, _ = lfilter([1 - kept], [1, -kept], v, zi=[kept * v[0]])
-        yield why, slow - v
-
-
-def _changing(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
-    """Damping, dry friction and gain that grow with the time."""
-    grows = np.linspace(-1, 1, recording.samples)
-    slow = 0.02 * float(np.std(path.velocity))
-    for name, force in (
-        ("damping", path.velocity),
-        ("dry friction", np.tanh(path.velocity / slow)),
-        ("gain from force to motion", recording.force),
-    ):
-        yield f"the {name} changes in the course of the recording", grows * force

@@ -6,26 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.signal import butter, sosfiltfilt
 
+from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion
 from bayeshaptic.effects.laws import corrections, fitted
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.types import Bools, Floats
-
-
-@dataclass(frozen=True)
-class SmoothMotion:
-    """A motion without what the encoder adds: position, velocity, acceleration, jerk, (N,)."""
-
-    position: Floats = field(repr=False)
-    velocity: Floats = field(repr=False)
-    acceleration: Floats = field(repr=False)
-    jerk: Floats = field(repr=False)
+from bayeshaptic.types import Floats
 
 
 @dataclass(frozen=True)
@@ -54,33 +42,6 @@ class Column(Term):
     column: Callable[[SmoothMotion], Floats] = field(repr=False)
     linear: bool = False
     positive: bool = False
-
-
-def smoothed(signal: Floats, cutoff_hz: float, period_s: float) -> Floats:
-    """Zero-phase low-pass, Butterworth, order 4, forwards and backwards."""
-    low = butter(4, cutoff_hz, fs=1 / period_s, output="sos")
-    return np.asarray(sosfiltfilt(low, signal))
-
-
-def at_rest(recording: Recording, cutoff_hz: float) -> Bools:
-    """Samples at which the position stays within a count for a period of the cut-off, (N,).
-
-    Dry friction is there whatever holds the mass, and the motion says nothing of it.
-    """
-    count = recording.encoder_resolution or increment_unit(recording.position) or 0.0
-    length = max(int(1 / (cutoff_hz * recording.period_s)), 1)
-    y = recording.position
-    still = maximum_filter1d(y, length) - minimum_filter1d(y, length) <= 2.01 * count
-    return np.asarray(maximum_filter1d(still.astype(np.int8), length) > 0)
-
-
-def smooth_motion(recording: Recording, cutoff_hz: float) -> SmoothMotion:
-    """Low-passed, and central differences."""
-    x = smoothed(recording.position, cutoff_hz, recording.period_s)
-    v = np.gradient(x, recording.period_s)
-    a = np.zeros_like(x)
-    a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / recording.period_s**2
-    return SmoothMotion(x, v, a, np.gradient(a, recording.period_s))
 
 
 def terms_of(

@@ -19,10 +19,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.acting import COULOMB, Acting
 from bayeshaptic.inference.time_domain.days import between_pieces
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
 from bayeshaptic.inference.time_domain.loop import FORCES, Hum, Loop
+from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
 from bayeshaptic.inference.time_domain.one_way import one_way
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, Way, ridge
 from bayeshaptic.inference.time_domain.widths import covariance, mean_of_uneven
@@ -62,7 +62,7 @@ class MotionFit:
     follower : Follower
     whole : ndarray
         All values of the `Loop`: `inside`, where pieces begin, numbers of the laws.
-    forces : Acting
+    forces : MassForces
         Dry friction's law, and further ones.
     whole_sd : ndarray
         Of all values.
@@ -82,7 +82,7 @@ class MotionFit:
     way: Way
     follower: Follower
     whole: Floats = field(repr=False)
-    forces: Acting
+    forces: MassForces
     whole_sd: Floats
     hums: tuple[Hum, ...] = ()
 
@@ -119,7 +119,7 @@ class MotionFit:
 def fit_motion(
     recording: Recording,
     feedback: Follower | None = None,
-    forces: Acting = COULOMB,
+    forces: MassForces = COULOMB,
     start: Floats | None = None,
     hums: tuple[Hum, ...] = (),
 ) -> MotionFit:
@@ -131,7 +131,7 @@ def fit_motion(
     feedback : Follower, optional
         The controller's feedback of the position, as a force for measured - simulated.  Unknown by
         default: a spring and a damper as wide as the command's spectrum stand for it.
-    forces : Acting
+    forces : MassForces
         Laws of forces on the mass, whose numbers are inferred; Coulomb's friction by default.
     start : ndarray, shape (5,), optional
         Values to begin with; by default those of the inverse dynamics.

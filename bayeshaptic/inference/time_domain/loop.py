@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.acting import COULOMB, Acting, simulate
 from bayeshaptic.inference.time_domain.follower import Follower, spring_and_damper
+from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces, simulate
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats, Ints
@@ -50,7 +50,7 @@ class Loop:
         Of the force that changes along the way.
     follower : Follower or None
         None until `led`.
-    forces : Acting
+    forces : MassForces
         Dry friction's law, and further ones.
     joints : tuple of int
         Where further pieces begin.
@@ -63,7 +63,7 @@ class Loop:
     bandwidth_hz: float
     shapes: Floats = field(repr=False)
     follower: Follower | None = None
-    forces: Acting = COULOMB
+    forces: MassForces = COULOMB
     joints: tuple[int, ...] = ()
     hums: tuple[Hum, ...] = ()
 
@@ -73,7 +73,7 @@ class Loop:
         recording: Recording,
         bandwidth_hz: float,
         way: Way,
-        forces: Acting = COULOMB,
+        forces: MassForces = COULOMB,
         hums: tuple[Hum, ...] = (),
     ) -> Loop:
         """Of a recording, with the waves of a way."""

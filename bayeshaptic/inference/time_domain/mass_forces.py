@@ -17,7 +17,7 @@ from bayeshaptic.types import Floats
 
 
 @dataclass(frozen=True)
-class Acting:
+class MassForces:
     """Dry friction by one law, and further forces, with their numbers to begin with.
 
     Attributes
@@ -54,7 +54,7 @@ class Acting:
         """Above which no further number may go."""
         return np.array([effect.most.get(name, np.inf) for effect, name in self.names])
 
-    def at(self, values: Floats) -> Acting:
+    def at(self, values: Floats) -> MassForces:
         """With other numbers to begin with."""
         rest = iter(values.tolist())
         friction = _shaped(self.friction, rest)
@@ -62,7 +62,7 @@ class Acting:
         for effect in self.others:
             strengths.append(next(rest))
             others.append(_shaped(effect, rest))
-        return Acting(friction, tuple(others), tuple(strengths))
+        return MassForces(friction, tuple(others), tuple(strengths))
 
     def laws(self, dry: float, values: Floats) -> list[Law]:
         """With dry friction of strength `dry`, and values of the further numbers."""
@@ -73,7 +73,7 @@ class Acting:
         return found
 
 
-COULOMB = Acting()
+COULOMB = MassForces()
 
 
 def _shaped(effect: NonlinearEffect, numbers: Iterator[float]) -> NonlinearEffect:
