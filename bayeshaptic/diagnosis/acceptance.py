@@ -119,6 +119,11 @@ def _allowing(test: Test, explained: float) -> Test:
     return replace(test, threshold=allowed, usual=test.threshold)
 
 
+def force_acts(accepted: Sequence[Accepted]) -> bool:
+    """Whether a force that is simulated is among what was accepted."""
+    return any(one.acts for one in accepted)
+
+
 def wanted(tests: Sequence[Test], accepted: Sequence[Accepted]) -> tuple[Test, ...]:
     """The tests that call for one more effect.
 
@@ -127,7 +132,7 @@ def wanted(tests: Sequence[Test], accepted: Sequence[Accepted]) -> tuple[Test, .
     """
     if any(test.flagged for test in tests):
         return tuple(tests)
-    if not any(one.acts for one in accepted):
+    if not force_acts(accepted):
         return ()
     noticed = [test for test in tests if test.family == "nonlinear" and test.noticed]
     return tuple(replace(test, threshold=test.usual or test.threshold) for test in noticed)

@@ -264,15 +264,14 @@ class Loop:
 
         Under a sweep each frequency comes at one speed, and drag looks like another response.
         """
-        if any(one.acts for one in self.state.accepted):
+        if acceptance.force_acts(self.state.accepted):
             return ()
         found = tuple(test for test in self._kind.beside(self.state) if test.flagged)
         self._before, self._seen = (*self._before, *found), (*self._seen, *found)
         return found
 
     def _accept(self, state: State, tests: tuple[Test, ...]) -> None:
-        acts = any(one.acts for one in state.accepted)
-        if acts and not any(test.flagged for test in tests):
+        if acceptance.force_acts(state.accepted) and not any(test.flagged for test in tests):
             beside = self._kind.beside(state)
             tests = (*tests, *acceptance.remaining(beside, state.accepted, self._seen))
         self._seen = (*self._seen, *tests)
