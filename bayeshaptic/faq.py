@@ -87,7 +87,7 @@ def entry_of(error: BaseException) -> Entry | None:
 
 
 def _places(error: BaseException) -> list[str]:
-    """The files that the error came through, as ``recordings/checks.py``; "" for others."""
+    """The files that the error came through, as ``recordings/checks/check.py``; "" for others."""
     places, trace = [], error.__traceback__
     while trace is not None:
         path = Path(trace.tb_frame.f_code.co_filename)

@@ -17,7 +17,7 @@ from scipy.signal import chirp, lfilter
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality import NOTABLE_SHARE, Causality, causality

@@ -17,9 +17,9 @@ from tiny_bench import PERIOD, SCALE, band_noise, record
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
+from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES
+from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt, steps_of_a_turn
 from bayeshaptic.recordings.read import recording_from_arrays
-from bayeshaptic.recordings.sufficiency import FEWEST_SAMPLES
-from bayeshaptic.recordings.units_in_doubt import position_is_in_doubt, steps_of_a_turn
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")

@@ -8,11 +8,11 @@ from linear_bench import PHANTOM_FREE, Device
 from scipy.signal import chirp
 
 from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.checks.sufficiency import too_little
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import estimate_etfe
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.sweeps import is_sweep, moves_until
-from bayeshaptic.recordings.sufficiency import too_little
 
 RNG = np.random.default_rng(5)
 T = 1e-3 * np.arange(20_000)

@@ -12,11 +12,11 @@ from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.checks.check import check_recording
+from bayeshaptic.recordings.checks.sufficiency import refuse_too_little
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import estimate_etfe
-from bayeshaptic.recordings.sufficiency import refuse_too_little
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"

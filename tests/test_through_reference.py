@@ -19,7 +19,7 @@ from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import join_recordings, read_recording, recording_from_arrays
-from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.feedback import Feedback, has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe

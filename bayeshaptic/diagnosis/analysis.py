@@ -23,10 +23,10 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.models import Model
 from bayeshaptic.quantities import pure, quantity
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness, etfe_critical_stiffness

@@ -20,7 +20,8 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.models.structures import chain
 from bayeshaptic.quantities import quantity
-from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.checks.check import check_recording
+from bayeshaptic.recordings.checks.sufficiency import refuse_where_told, told_too_little, too_little
 from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
@@ -28,7 +29,6 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.differences import with_differences
 from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
-from bayeshaptic.recordings.sufficiency import refuse_where_told, told_too_little, too_little
 from bayeshaptic.recordings.through_reference import through_reference, too_weak, unusable
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded

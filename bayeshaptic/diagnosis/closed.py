@@ -32,10 +32,10 @@ from bayeshaptic.diagnosis.widening.rest import with_rest
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.shown import Shown
 from bayeshaptic.threads import single_threaded
 

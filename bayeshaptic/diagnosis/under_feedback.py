@@ -28,8 +28,8 @@ from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import percent
+from bayeshaptic.recordings.checks.sufficiency import TOO_LITTLE, few_tones, told_too_little
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.sufficiency import TOO_LITTLE, few_tones, told_too_little
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 _SEEN = 2.9  # Student's t of eight degrees of freedom: 1 in 100

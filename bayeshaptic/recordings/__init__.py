@@ -1,6 +1,6 @@
 """What was measured: recordings, studies, their readers and checks."""
 
-from bayeshaptic.recordings.checks import check_recording
+from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays

@@ -12,9 +12,9 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
+from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.recordings.sufficiency import told_too_little
-from bayeshaptic.recordings.units_in_doubt import position_is_in_doubt
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
     misfit_factor,

@@ -19,8 +19,8 @@ from bayeshaptic.quantities import (
     scale,
     spread_of,
 )
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows

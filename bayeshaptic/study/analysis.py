@@ -19,9 +19,9 @@ from bayeshaptic.errors import Notice, describe
 from bayeshaptic.inference.population.population import Population
 from bayeshaptic.models import prior_from_table
 from bayeshaptic.quantities import quantity
+from bayeshaptic.recordings.checks.sufficiency import refuse_where_told
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study, StudyEntry
-from bayeshaptic.recordings.sufficiency import refuse_where_told
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit
 from bayeshaptic.study.analysed import Analysed

@@ -15,9 +15,9 @@ from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.models import HalfNormal
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import pure, quantity
+from bayeshaptic.recordings.checks.sufficiency import few_tones
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.sufficiency import few_tones
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.types import Floats
 

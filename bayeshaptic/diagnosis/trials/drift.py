@@ -25,8 +25,8 @@ from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings.checks.sufficiency import SHORTEST_S
 from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
-from bayeshaptic.recordings.sufficiency import SHORTEST_S
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Tick
 

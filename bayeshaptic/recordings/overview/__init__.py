@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.checks.units_in_doubt import is_whole, steps_of_a_turn
 from bayeshaptic.recordings.columns import (
     DEFAULT_HEADERS,
     POSITIONS,
@@ -33,7 +34,6 @@ from bayeshaptic.recordings.units import (
     unit_in_name,
     units_of,
 )
-from bayeshaptic.recordings.units_in_doubt import is_whole, steps_of_a_turn
 
 # What turns counts and volts into them.
 _FACTORS = {

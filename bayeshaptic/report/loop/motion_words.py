@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import interval
-from bayeshaptic.recordings.sufficiency import told_too_little
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -15,8 +15,8 @@ from bayeshaptic.quantities import (
     quantity,
     scale,
 )
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import is_certain
-from bayeshaptic.recordings.sufficiency import told_too_little
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop.motion_words import determined
 from bayeshaptic.report.loop.unexplained import remainder, worst

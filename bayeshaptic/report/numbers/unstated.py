@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.recordings.sufficiency import told_too_little
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

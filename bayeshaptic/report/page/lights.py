@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.recordings.sufficiency import TOO_LITTLE
+from bayeshaptic.recordings.checks.sufficiency import TOO_LITTLE
 from bayeshaptic.report.numbers.misfit import (
     misfit_factor,
     misfit_is_clear,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import interval, quantity
-from bayeshaptic.recordings.sufficiency import told_too_little
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.report.loop.motion_words import motion_words
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.version import __version__

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.trials.drift import PARTS
 from bayeshaptic.quantities import pure
+from bayeshaptic.recordings.checks.sufficiency import SHORTEST_S, told_too_little
+from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.recordings.sufficiency import SHORTEST_S, told_too_little
-from bayeshaptic.recordings.units_in_doubt import position_is_in_doubt
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
 from bayeshaptic.report.objections import changes, is_open
 

@@ -1,0 +1,1 @@
+"""Whether a recording can be used: what is wrong with it, in doubt, or too little."""

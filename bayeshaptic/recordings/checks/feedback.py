@@ -1,0 +1,107 @@
+"""What drives what: columns exchanged, a sign turned round, a relay, feedback, a velocity."""
+
+from __future__ import annotations
+
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.causality import Causality, causality
+from bayeshaptic.recordings.signals.rough_response import RoughResponse
+
+
+def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> list[Notice]:
+    """What drives what; of a measured force, whose past its motion knows better, the sign alone.
+
+    Parameters
+    ----------
+    recording : Recording
+    rough : RoughResponse
+        Its own.
+    where : str
+        How messages begin.
+    """
+    found = causality(recording)
+    measured = recording.sensed is not None and recording.sensed.measured_force
+    if measured and not rough.opposite(recording.period_s):
+        return []
+    if found.swapped and not measured:
+        raise _swapped(found, where)
+    against = not found.relay and rough.opposite(recording.period_s)
+    if measured or found.opposite or (against and not found.has_feedback):
+        raise _turned_round(where)
+    if found.relay:
+        raise _relay(recording, where)
+    if found.has_feedback or found.doubtful:
+        return [_feedback(found, against)]
+    own = recording.sensed is None or recording.sensed.derivatives == 0
+    if own and rough.is_velocity(recording.period_s):
+        raise _velocity(where)
+    return [_early()] if found.early_position else []
+
+
+def _swapped(found: Causality, where: str) -> InputError:
+    return InputError(
+        f"{where}: force and position look swapped: the past position predicts the force (it "
+        f"removes {100 * found.removed:.0f} % of the error), the past force does not "
+        "predict the position; exchange them with --columns force=...,position=...",
+        topic="swapped",
+    )
+
+
+def _turned_round(where: str) -> InputError:
+    return InputError(
+        f"{where}: the position moves against the force: one of them has the opposite sign, "
+        "and the device would have a negative mass; turn one round with --columns, as in "
+        "position=NAME*-1",
+        topic="swapped",
+    )
+
+
+def _relay(recording: Recording, where: str) -> InputError:
+    return InputError(
+        f"{where}: a relay recording (the force switches between {recording.force.min():.3g} "
+        f"and {recording.force.max():.3g} {recording.force_unit} where the position passes a "
+        "set point), of which no frequency response can be estimated; its gain margin is read "
+        f"by: bayeshaptic relay {where}",
+        topic="relay",
+    )
+
+
+def _velocity(where: str) -> InputError:
+    return InputError(
+        f"{where}: what should be the position looks like a velocity: a mass with a damper "
+        "explains it as its velocity, and not as its position; say so with --columns, as in "
+        "velocity=NAME[rad/s], or give the position",
+        topic="swapped",
+    )
+
+
+def _feedback(found: Causality, against: bool) -> Notice:
+    """That the force was computed from the motion, or may have been."""
+    if found.has_feedback:
+        text = (
+            f"The force was computed from the motion ({found.evidence}): the recording was made in "
+            "closed loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force "
+            "that does not depend on the motion."
+        )
+        if against:
+            text += (
+                " The position goes against the force: if this was an open loop, one of them has "
+                "the opposite sign; turn it round with --columns, as in position=NAME*-1."
+            )
+    else:
+        text = (
+            f"It cannot be decided whether the force was computed from the motion "
+            f"({found.evidence}, more than chance but little). If the recording was made in closed "
+            "loop, the ETFE, the fit and K_CR are biased: record again with a force that does not "
+            "depend on the motion, and longer."
+        )
+    return Notice("warning", "feedback", text)
+
+
+def _early() -> Notice:
+    text = (
+        "The position answers to the force within the same sample: it seems to be recorded "
+        "one sample early, and the delay will come out up to one period too short. Pair "
+        "each force with the position that was read before it was commanded."
+    )
+    return Notice("warning", "alignment", text)
