@@ -391,8 +391,10 @@ def test_damping_by_the_cube_is_told_from_drag(monkeypatch: pytest.MonkeyPatch) 
 
 def test_a_gradual_saturation_is_told_from_a_hard_one(monkeypatch: pytest.MonkeyPatch) -> None:
     only(monkeypatch, "actuator_saturation", "soft_saturation")
-    # The tanh is none of the family's curves, but near that of a sharpness of 2.5.
-    assert best_of(TanhSaturation(8.0), "u^3").name == "soft_saturation"
+    # The tanh is none of the family's curves, but near that of a sharpness of 2.5.  The command is
+    # 4 N rms: at 25 N a limit that is hard would be a third as far away, at 60 N there is none.
+    for limit in (8.0, 25.0, 60.0):
+        assert best_of(TanhSaturation(limit), "u^3").name == "soft_saturation"
     assert best_of("actuator_saturation", "u^3").name == "actuator_saturation"
 
 
@@ -433,17 +435,24 @@ def test_scores_of_few_lines_count_for_less() -> None:
 
 
 def test_a_scan_goes_on_to_fainter_forces_where_its_faintest_is_too_strong() -> None:
-    """A force of 0.01, and scans from one on: gains are a parabola, 40 at the force itself."""
+    """A force of 0.01, and scans from one on: gains are a parabola, 40 at the force itself.
+
+    The larger an actuator's limit, the fainter: there one over the force is 0.01.
+    """
 
     def point(forces: tuple[Acting], start: object) -> SimpleNamespace:
         strength = forces[-1].strength
-        share = strength / 0.01
+        share = (1 / strength if forces[-1].effect else strength) / 0.01
         return SimpleNamespace(strength=strength, gain_fit=80 * share - 40 * share**2, theta=start)
 
     bench = SimpleNamespace(point=point)
     found = _scan(bench, (), None, np.array([1.0, 3.0]), None, beyond=8)  # type: ignore[arg-type]
     best = max(found, key=lambda one: one.gain_fit)
     assert 0.01 / np.sqrt(3) < best.strength < 0.01 * np.sqrt(3)
+    limit: Any = "a limit"
+    found = _scan(bench, (), limit, np.array([1.0, 0.3]), None, beyond=8)  # type: ignore[arg-type]
+    best = max(found, key=lambda one: one.gain_fit)
+    assert 100 / np.sqrt(3) < best.strength < 100 * np.sqrt(3)
     beside = _scan(bench, (), None, np.array([0.8, 1.0]), None)  # type: ignore[arg-type]
     assert [one.strength for one in beside] == [0.8, 1.0], "a known force is looked for there"
 

@@ -162,37 +162,40 @@ def _scan(
 ) -> list[Point]:
     """From faint to strong beside the forces before it, until it is clearly too strong.
 
-    Where the strongest is still the best, up to `beyond` more, each three times the last: friction
-    that the linear model took for a damper leaves a motion from which it looks faint.
+    Where the strongest is still the best, up to `beyond` more, each three times as strong: friction
+    that the linear model took for a damper leaves a motion from which it looks faint.  And where
+    the faintest is too strong already, as many that are ever fainter.
     """
+    # The less an actuator's limit, the stronger it acts.
+    stronger = 3.0 if abs(strengths[-1]) > abs(strengths[0]) else 1 / 3.0
 
     def point(strength: float, start: Floats) -> Point:
         return bench.point((*before, Acting(effect, strength)), start)
 
     points: list[Point] = []
     too_strong = 10.0  # drop of the log likelihood at which a scan stops
-    further = strengths[-1] * 3.0 ** np.arange(1, beyond + 1)
+    further = strengths[-1] * stronger ** np.arange(1, beyond + 1)
     for number, strength in enumerate([*strengths, *further]):
         start = points[-1].theta if points else theta
         points.append(point(float(strength), start))
         gained = points[-1].gain_fit - points[-2].gain_fit if len(points) > 1 else np.inf
         if gained < -too_strong or (number >= len(strengths) - 1 and not gained > 0):
             break
-    rising = abs(strengths[-1]) > abs(strengths[0])  # the less an actuator's limit, the stronger
-    return points + (_fainter(point, points[0], theta, beyond) if rising else [])
+    return points + _fainter(point, points[0], theta, 1 / stronger, beyond)
 
 
 def _fainter(
-    at: Callable[[float, Floats], Point], first: Point, theta: Floats, most: int
+    at: Callable[[float, Floats], Point], first: Point, theta: Floats, factor: float, most: int
 ) -> list[Point]:
     """Where the faintest of a scan is too strong already: ever fainter, until less is no better.
 
-    Tests see forces that are a hundredth of what a scan begins with.
+    Tests see forces that are a hundredth of what a scan begins with.  `factor` is that on a
+    strength to make it act less.
     """
     points = [first]
     no_trace = 1.0  # of the log likelihood
     while first.gain_fit < 0 and len(points) <= most:
-        points.append(at(points[-1].strength / 3.0, theta))
+        points.append(at(factor * points[-1].strength, theta))
         gained = points[-1].gain_fit - points[-2].gain_fit
         if not gained > 0 or abs(points[-1].gain_fit) < no_trace:
             break

@@ -81,7 +81,9 @@ def nonlinear_trials(
         laws = [_beside(law, point) for law in others if law[0].contains(point.effect)]
         found += containing(bench, point, laws, meter, tick)
     rest = [law for law in others if not any(law[0].contains(p.effect) for p in known.values())]
-    found = fitted(bench, searched(rest, known), meter, found)
+    # Where a limit is gradual says nothing of where it would be hard.
+    alike = {name: p for name, p in known.items() if not isinstance(p.effect, CommandEffect)}
+    found = fitted(bench, searched(rest, alike), meter, found)
     return [_trial(bench, point) for point in found]
 
 
