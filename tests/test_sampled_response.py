@@ -174,6 +174,15 @@ def test_undamped_free_devices():
     assert relative(model.response(list(values.values()), FREQUENCY), truth) < 1e-9
 
 
+@pytest.mark.parametrize("kc", [1.5e6, 1.5e7])
+def test_undamped_free_devices_with_a_fast_mode(kc):
+    """The same where the pole form has to do: two poles at zero had no residues."""
+    values = {"m1": 0.19, "b1": 0.0, "bc": 20.0, "kc": kc, "m2": 5.2, "b2": 0.0}
+    model = build_model("free", delay_s=0.3 * T, period_s=T)
+    truth = reference("free", values, 0.3 * T)
+    assert relative(model.response(list(values.values()), FREQUENCY), truth) < 1e-7
+
+
 @pytest.mark.parametrize("structure", ["free", "grasped"])
 def test_fast_modes_are_handed_over_to_the_pole_form(structure):
     """Modes from 300 to 3000 rad/s: the series is used below, the poles above, both exact."""
@@ -276,11 +285,13 @@ def test_the_continuous_approximation(structure):
 
 @pytest.mark.parametrize("lag_s", [0.0, 1e-5, 1e-2])
 def test_poles_at_one_place_are_no_error(lag_s):
-    """Nothing holds it, and a mode is too fast for the series: two poles at zero, no number."""
+    """Nothing holds it, and a mode is too fast for the series: two poles at zero."""
     one = np.ones(2)
     links = (Link(0, 1, 0.1 * one, np.array([1e3, 1e9])), Link(0, None, 0 * one, 0 * one))
     system = LinearSystem(Mechanism((one, one), links), 1e-3 * one)
     if lag_s:
         system = system.with_filter(one[None], np.stack([one, lag_s * one]))
     found = system.sampled_response(FREQUENCY, T)
-    assert np.isfinite(found[0]).all() and not np.isfinite(found[1]).any()
+    slow = FREQUENCY < 1
+    assert np.isfinite(found).all()
+    assert relative(found[1, slow], found[0, slow]) < 0.1  # both are one mass of 2 kg there, nearly
