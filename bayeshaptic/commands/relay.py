@@ -11,7 +11,7 @@ from bayeshaptic.errors import InputError
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.relay.check import RelayCheck
-    from bayeshaptic.stability.relay.measure import RelayMeasurement
+    from bayeshaptic.stability.relay.measurement import RelayMeasurement
 
 NAME = "relay"
 SUMMARY = "measure gain margin and frequency from a relay recording"

@@ -16,7 +16,7 @@ from bayeshaptic.effects.linear import (
     reflex,
     transmission_loss,
 )
-from bayeshaptic.effects.nonlinear import actuator, friction, gravity, springs
+from bayeshaptic.effects.nonlinear import actuator, drag, friction, gravity, springs
 from bayeshaptic.effects.registry import register, registered
 from bayeshaptic.errors import InputError
 
@@ -32,6 +32,7 @@ OWN = (
     transmission_loss,
     actuator,
     friction,
+    drag,
     springs,
     gravity,
     measurement,

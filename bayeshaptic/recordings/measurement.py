@@ -8,7 +8,8 @@ from pathlib import Path
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.columns import is_frequency_response, parse_columns, pick
-from bayeshaptic.recordings.read import Columns, Cut, Span, recorded
+from bayeshaptic.recordings.cut import Cut, Span
+from bayeshaptic.recordings.read import Columns, recorded
 from bayeshaptic.recordings.readers import read_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe

@@ -8,11 +8,12 @@ from pathlib import Path
 
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.cut import Span
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.known_limits import KnownLimit
 from bayeshaptic.recordings.measurement import read_measurement
-from bayeshaptic.recordings.read import Columns, Span
+from bayeshaptic.recordings.read import Columns
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown, listed

@@ -12,9 +12,10 @@ from bayeshaptic.devices import Device, device_from_table, device_names, load_de
 from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import parse_columns
+from bayeshaptic.recordings.cut import Span
 from bayeshaptic.recordings.feedback import read_feedback
 from bayeshaptic.recordings.known_limits import read_references
-from bayeshaptic.recordings.read import Columns, Span
+from bayeshaptic.recordings.read import Columns
 from bayeshaptic.recordings.study import Study, StudyEntry
 
 STUDY_KEYS = ("device", "pool", "prior", "effects", "feedback", "recording", "reference")

@@ -9,7 +9,8 @@ from bayeshaptic.stability.guidance.elasticities import Elasticities, elasticiti
 from bayeshaptic.stability.guidance.shares import Share, VarianceShares, variance_shares
 from bayeshaptic.stability.guidance.sweep import Jump, Sweep, sweep
 from bayeshaptic.stability.relay.check import RelayCheck, check_relay
-from bayeshaptic.stability.relay.measure import RelayMeasurement, measure_relay
+from bayeshaptic.stability.relay.measure import measure_relay
+from bayeshaptic.stability.relay.measurement import RelayMeasurement
 from bayeshaptic.stability.rules import (
     ground_damping,
     passivity_limit,

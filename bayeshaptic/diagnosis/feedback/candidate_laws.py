@@ -10,10 +10,9 @@ import numpy as np
 
 from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
 from bayeshaptic.effects.laws import corrections
+from bayeshaptic.effects.nonlinear.drag import CubicDamping, Drag
 from bayeshaptic.effects.nonlinear.friction import (
-    CubicDamping,
     DahlFriction,
-    Drag,
     RisingFriction,
     StribeckFriction,
 )

@@ -19,9 +19,9 @@ from bayeshaptic.diagnosis.feedback.humming import with_tones
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
 from bayeshaptic.diagnosis.feedback.unlike_one_mass import unlike_one_mass
+from bayeshaptic.effects.nonlinear.drag import Drag
 from bayeshaptic.effects.nonlinear.friction import (
     DahlFriction,
-    Drag,
     RisingFriction,
     StribeckFriction,
 )

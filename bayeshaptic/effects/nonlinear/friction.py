@@ -1,10 +1,9 @@
-"""Dry friction: Coulomb's law, Stribeck's, Dahl's; and forces with a power of the velocity."""
+"""Dry friction: Coulomb's law, Stribeck's, Dahl's; rising with velocity; changing along the way."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import ClassVar
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -22,21 +21,22 @@ from bayeshaptic.effects.nonlinear.shapes import (
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
 
-_FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
+FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
 
 
-def _force_scale(model: Model, theta: Floats, motion: Motion) -> float:
+def force_scale(model: Model, theta: Floats, motion: Motion) -> float:
     """The force that viscous damping of the motion would take: what friction hides as."""
     values = dict(zip(model.names, theta, strict=True))
     mass = values.get("m", values.get("m1", 0.0) + values.get("m2", 0.0))
-    return float(mass * motion.velocity.std() * 2 * np.pi * 3.0)
+    corner_hz = 3.0  # b / (2 pi m) of a usual device
+    return float(mass * motion.velocity.std() * 2 * np.pi * corner_hz)
 
 
 def _against(v: Floats) -> Floats:
     return -np.sign(v)
 
 
-def _bodies(motion: Mapping[Place, Motion]) -> dict[Place, float]:
+def bodies(motion: Mapping[Place, Motion]) -> dict[Place, float]:
     """Where something may rub against the ground, and the rms velocity there."""
     return {p: float(motion[p].velocity.std()) for p in (MOTOR, LOAD) if p in motion}
 
@@ -48,7 +48,7 @@ class _DryFriction(NonlinearEffect):
     sticks = True
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return _force_scale(model, theta, motion) * _FAINT_TO_STRONG
+        return force_scale(model, theta, motion) * FAINT_TO_STRONG
 
 
 @register
@@ -68,7 +68,7 @@ class CoulombFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        return tuple(map(cls, _bodies(motion)))
+        return tuple(map(cls, bodies(motion)))
 
     @classmethod
     def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
@@ -106,7 +106,7 @@ class StribeckFriction(_DryFriction):
     ) -> tuple[NonlinearEffect, ...]:
         return tuple(
             cls(place, {"static_excess": rise, "stribeck_velocity": share * usual})
-            for place, usual in _bodies(motion).items()
+            for place, usual in bodies(motion).items()
             for rise in (0.35, 0.8)
             for share in (0.05, 0.25)
         )
@@ -157,7 +157,7 @@ class RisingFriction(_DryFriction):
     ) -> tuple[NonlinearEffect, ...]:
         return tuple(
             cls(place, {"lack_at_rest": 0.7, "rising_velocity": share * usual})
-            for place, usual in _bodies(motion).items()
+            for place, usual in bodies(motion).items()
             for share in (0.2, 0.6)
         )
 
@@ -217,10 +217,10 @@ class DahlFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        rate = 2 * np.pi * 10.0
+        rate = 2 * np.pi * 10.0  # rad/s; the way of the motion is its velocity over that
         return tuple(
             cls(place, {"presliding_distance": share * usual / rate})
-            for place, usual in _bodies(motion).items()
+            for place, usual in bodies(motion).items()
             for share in (0.1, 0.3, 1.0, 3.0)
         )
 
@@ -234,77 +234,3 @@ def _dahl(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyp
     stiffness = constants[0] * part
     slip = 1 + stiffness * gain + part * abs(v + 0.5 * gain * before)
     return (before - stiffness * v) / slip
-
-
-class _PowerOfVelocity(NonlinearEffect):
-    """A force against the motion that grows with a power of the velocity."""
-
-    over = (VELOCITY, LOAD_VELOCITY)
-    power: ClassVar[int]
-
-    also: ClassVar[tuple[int, ...]] = ()
-    """Powers that have no law of their own."""
-
-    @classmethod
-    def candidates(
-        cls, model: Model, motion: Mapping[Place, Motion]
-    ) -> tuple[NonlinearEffect, ...]:
-        return tuple(map(cls, _bodies(motion)))
-
-    @classmethod
-    def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
-        return tuple(_resistance(power) for power in (cls.power, *cls.also))
-
-    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        scale = _force_scale(model, theta, motion) / motion.velocity.std() ** self.power
-        return scale * _FAINT_TO_STRONG
-
-    def law(self, strength: float, model: Model, theta: Floats) -> Law:
-        return Law(_power_of_velocity, (strength, self.power))
-
-
-def _power_of_velocity(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
-    """Implicit, so that it never reverses the motion."""
-    middle, resistance = v, 0.0
-    for _ in range(2):  # the second time with the velocity that the first one leaves
-        resistance = constants[0]
-        for _ in range(int(constants[1]) - 1):
-            resistance *= abs(middle)
-        middle = v / (1 + 0.5 * resistance * gain)
-    return -resistance * middle
-
-
-def _power(power: int) -> Callable[[Floats], Floats]:
-    return lambda v: -v * np.abs(v) ** (power - 1)
-
-
-def _resistance(power: int) -> Shape:
-    title = f"drag {{where}} with power {power} of the velocity"
-    unit = f"{{force}} ({{x}}/s)^-{power}"
-    # A drag below zero would drive the motion.
-    return Shape(f"drag_{power}", title, VELOCITY, _power(power), unit, positive=True)
-
-
-@register
-class Drag(_PowerOfVelocity):
-    """A force -c v |v|, as of a turbulent fluid."""
-
-    name = "drag"
-    title = "drag that grows with the square of the velocity"
-    tests = (Shape("v|v|", "a force like v|v|, as drag", VELOCITY, _power(2)),)
-    strength = ("drag_coefficient", "drag")
-    power = 2
-    also = (5,)
-
-
-@register
-class CubicDamping(_PowerOfVelocity):
-    """A force -c v^3."""
-
-    name = "cubic_damping"
-    title = "damping that grows with the cube of the velocity"
-    tests = (
-        Shape("v^3", "a force like v\N{SUPERSCRIPT THREE}", VELOCITY, _power(3), "cubic_damping"),
-    )
-    strength = ("cubic_damping", "cubic_damping")
-    power = 3

@@ -238,15 +238,6 @@ def _joined(
     most = sum(periodic) > len(periodic) / 2
     left_out += [n for (n, _), own in zip(found, periodic, strict=True) if own != most]
     parts = [part for (_, part), own in zip(found, periodic, strict=True) if own == most]
-    longest = max(parts, key=lambda part: len(part.frequency_hz))
-    alike = [
-        part
-        for part in parts
-        if part.frequency_hz.shape == longest.frequency_hz.shape
-        and np.allclose(part.frequency_hz, longest.frequency_hz)
-    ]
-    weight = 1 / np.array([part.variance for part in alike])
-    value = np.sum(weight * [part.value for part in alike], axis=0) / weight.sum(axis=0)
     band = min(p.band_hz[0] for p in parts), max(p.band_hz[1] for p in parts)
     text = f"Band {band[0]:.3g} to {band[1]:.4g} Hz; that of each piece was chosen by itself."
     notices = {Notice("note", "band", text): None}
@@ -259,14 +250,29 @@ def _joined(
         )
         notices[Notice("warning", "pieces", text)] = None
     return replace(
-        longest,
-        value=value,
-        variance=1 / weight.sum(axis=0),
-        coherence=np.mean([part.coherence for part in alike], axis=0),
+        _mean_of_longest(parts),
         band_hz=band,
         spectra=JoinedSpectra(tuple(part.spectra for part in parts)),
         recording=recording,
         notices=tuple(notices),
+    )
+
+
+def _mean_of_longest(parts: list[Etfe]) -> Etfe:
+    """The mean of those that have the frequencies of the longest, weighted by their variances."""
+    longest = max(parts, key=lambda part: len(part.frequency_hz))
+    alike = [
+        part
+        for part in parts
+        if part.frequency_hz.shape == longest.frequency_hz.shape
+        and np.allclose(part.frequency_hz, longest.frequency_hz)
+    ]
+    weight = 1 / np.array([part.variance for part in alike])
+    return replace(
+        longest,
+        value=np.sum(weight * [part.value for part in alike], axis=0) / weight.sum(axis=0),
+        variance=1 / weight.sum(axis=0),
+        coherence=np.mean([part.coherence for part in alike], axis=0),
     )
 
 

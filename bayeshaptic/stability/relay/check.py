@@ -11,7 +11,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.binding import binding_kinds, group_crossings
 from bayeshaptic.stability.crossings import find_crossings
-from bayeshaptic.stability.relay.measure import RelayMeasurement
+from bayeshaptic.stability.relay.measurement import RelayMeasurement
 
 
 @dataclass(frozen=True)
