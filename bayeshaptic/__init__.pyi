@@ -133,11 +133,11 @@ from .recordings import (
 from .recordings import (
     recording_from_arrays as recording_from_arrays,
 )
-from .recordings.response.etfe import (
-    Etfe as Etfe,
+from .recordings.response.estimate import (
+    estimate_etfe as estimate_etfe,
 )
 from .recordings.response.etfe import (
-    estimate_etfe as estimate_etfe,
+    Etfe as Etfe,
 )
 from .report import (
     write_report as write_report,

@@ -16,7 +16,7 @@ from scipy.stats import kstest
 from bayeshaptic.inference import least_squares, sample
 from bayeshaptic.models import HalfNormal, LogNormal, MaybeZero, Model, NearZero, build_model, draw
 from bayeshaptic.recordings import Recording, recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.noise import tremor_density, wander_density
 from bayeshaptic.stability.critical import critical_stiffness

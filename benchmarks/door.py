@@ -25,7 +25,7 @@ from bayeshaptic import analyse
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.sufficiency import refuse_too_little
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.causality import causality
+from bayeshaptic.recordings.signals.causality.causality import causality
 from bayeshaptic.rig import simulate
 from benchmarks.recordings.door import Case, closed_case, open_case, written_down
 

@@ -31,7 +31,8 @@ from linear_bench import (
 from test_windows import PERIOD, cramer_rao, record, scale_and_delay
 
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability import etfe_critical_stiffness
 from benchmarks.calibration import CASES, truth_and_bench

@@ -31,7 +31,8 @@ from bayeshaptic.inference.fit import summarise, weighted_residuals  # noqa: E40
 from bayeshaptic.inference.likelihood import Likelihood  # noqa: E402
 from bayeshaptic.models import LogNormal, Model, build_model  # noqa: E402
 from bayeshaptic.numerics.gauss_newton import jacobian  # noqa: E402
-from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe  # noqa: E402
+from bayeshaptic.recordings.response.estimate import estimate_etfe  # noqa: E402
+from bayeshaptic.recordings.response.etfe import Etfe, compress  # noqa: E402
 from bayeshaptic.rig import Bench, Effect  # noqa: E402
 from bayeshaptic.rig.effects.effect import Log  # noqa: E402
 from bayeshaptic.types import Floats  # noqa: E402

@@ -22,7 +22,7 @@ from bayeshaptic.inference.time_domain.widths import FREEDOM
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats

@@ -20,7 +20,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.causality import NOTABLE_SHARE, Causality, causality
+from bayeshaptic.recordings.signals.causality.causality import NOTABLE_SHARE, Causality, causality
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.switching import is_switched
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate

@@ -19,7 +19,7 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import read_recording
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.stability.binding import BindingCrossing, moved
 from bayeshaptic.stability.critical import critical_stiffness
 

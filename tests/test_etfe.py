@@ -20,7 +20,7 @@ from scipy.signal import butter, lfilter
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
 from bayeshaptic.recordings.signals.rounding import hidden_rounding, repeated_rounding
 

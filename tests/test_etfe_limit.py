@@ -12,7 +12,8 @@ from scipy.signal import chirp
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import TableSpectra
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability import critical_stiffness, etfe_critical_stiffness

@@ -10,7 +10,7 @@ from scipy.signal import chirp
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.checks.sufficiency import too_little
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.sweeps import is_sweep, moves_until
 

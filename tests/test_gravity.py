@@ -16,7 +16,7 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 PHANTOM = Bench.from_device("phantom")

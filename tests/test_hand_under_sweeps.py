@@ -11,7 +11,7 @@ from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 
 
 def test_a_hand_that_moves_faster_than_a_sweep_feigns_no_friction() -> None:

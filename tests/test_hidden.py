@@ -32,7 +32,7 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import build_model
 from bayeshaptic.models.response.remainder import alias_sums
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, WhiteNoise, simulate

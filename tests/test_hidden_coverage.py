@@ -16,7 +16,7 @@ from bayeshaptic.effects.library import effect_class
 from bayeshaptic.inference import least_squares, sample
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.stability.critical import critical_stiffness
 
 DELAY_S, PERIOD_S = 2e-4, 1e-3

@@ -26,7 +26,7 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.models.response.motion import linear_motions
 from bayeshaptic.recordings import Recording, recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.excitation import Prescribed
 

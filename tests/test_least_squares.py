@@ -14,7 +14,7 @@ from bayeshaptic.models import LogNormal, free, grasped, rigid
 from bayeshaptic.numerics.gauss_newton import jacobian, minimise
 from bayeshaptic.numerics.truncated_normal import draw_above, moments_above
 from bayeshaptic.recordings import Recording
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 fitting = sys.modules[least_squares.__module__]

@@ -25,7 +25,8 @@ from bayeshaptic.models import build_model
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.effects.nonlinear import Drag
 from bayeshaptic.rig.excitation import Prescribed

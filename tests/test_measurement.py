@@ -24,7 +24,8 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability import critical_stiffness
 

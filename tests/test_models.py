@@ -26,7 +26,7 @@ from bayeshaptic.models.response.motion import linear_motion, modal_motion
 from bayeshaptic.models.start import informed, scales, starting_points
 from bayeshaptic.models.structures import STRUCTURES
 from bayeshaptic.recordings import Recording
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 
 FREE = ("m1", "b1", "bc", "kc", "m2", "b2")
 

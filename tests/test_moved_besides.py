@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.residuals.columns import moved_besides
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 

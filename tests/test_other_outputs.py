@@ -14,7 +14,7 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.response.between_samples import with_images
 from bayeshaptic.recordings.response.differences import with_differences
-from bayeshaptic.recordings.signals.causality import causality
+from bayeshaptic.recordings.signals.causality.causality import causality
 
 PERIOD_S, SAMPLES = 1e-3, 4000
 RATES_HZ = np.arange(1.0, 151.0)  # one period a second

@@ -11,7 +11,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import rigid
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 

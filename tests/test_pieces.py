@@ -19,7 +19,8 @@ from bayeshaptic.inference.time_domain.uneven import Ridge
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.join import unbroken
-from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 

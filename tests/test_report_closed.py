@@ -19,7 +19,8 @@ from bayeshaptic.diagnosis.residuals.columns import motions
 from bayeshaptic.diagnosis.residuals.force_curve import force_curve
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.response.etfe import compress, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.report import summary
 from bayeshaptic.report.assumptions import assumptions
 from bayeshaptic.report.figures import LOOP_PICTURES

@@ -20,7 +20,7 @@ from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import rigid
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 

@@ -16,7 +16,8 @@ from bayeshaptic.inference import least_squares
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.mixed import mixed
 

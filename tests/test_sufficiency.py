@@ -16,7 +16,7 @@ from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.checks.sufficiency import refuse_too_little
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"

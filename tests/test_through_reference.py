@@ -22,7 +22,8 @@ from bayeshaptic.recordings import join_recordings, read_recording, recording_fr
 from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.feedback import Feedback, has_feedback
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.signals.controller import controller_reference
 from bayeshaptic.recordings.through_reference import through_reference
 from bayeshaptic.report.headline import headline

@@ -20,7 +20,8 @@ from linear_bench import (
 from scipy.stats import chi2, f, kstest
 
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import TableSpectra, compress, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import TableSpectra, compress
 from bayeshaptic.recordings.response.local_polynomial import NODES, interpolation, window_edges
 from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
 

@@ -27,7 +27,8 @@ from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.differences import with_differences
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
 from bayeshaptic.recordings.through_reference import through_reference, too_weak, unusable
 from bayeshaptic.stability.critical import critical_stiffness

@@ -8,7 +8,8 @@ import numpy as np
 
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.between_samples import with_images
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 
 _SAME = 0.1  # the chi-square that is no difference
 

@@ -10,7 +10,7 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.feedback import Feedback, has_feedback
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.causality import causality
+from bayeshaptic.recordings.signals.causality.causality import causality
 from bayeshaptic.recordings.signals.controller import controller_reference
 from bayeshaptic.types import Floats
 

@@ -10,7 +10,8 @@ from bayeshaptic.inference import Fit, Posterior, least_squares, sample
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.rig import Bench, SimulatedRecording, simulate
 from bayeshaptic.stability import CriticalStiffness, critical_stiffness
 

@@ -22,7 +22,8 @@ from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Complexes, Floats

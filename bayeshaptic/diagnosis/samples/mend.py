@@ -24,7 +24,8 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.etfe import Etfe, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 
 
 def measurement_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tuple[Test, ...]:

@@ -26,7 +26,8 @@ from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.checks.sufficiency import SHORTEST_S
-from bayeshaptic.recordings.response.etfe import Etfe, compress, estimate_etfe
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Tick
 

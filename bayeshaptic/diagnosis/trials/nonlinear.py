@@ -32,8 +32,8 @@ from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import Model
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings.response.estimators.random_excitation import points as points_of
 from bayeshaptic.recordings.response.etfe import Etfe, compress
-from bayeshaptic.recordings.response.random_excitation import points as points_of
 from bayeshaptic.stability.critical import critical_stiffness
 
 

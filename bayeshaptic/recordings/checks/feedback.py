@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.causality import Causality, causality
+from bayeshaptic.recordings.signals.causality.causality import Causality, causality
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 
 

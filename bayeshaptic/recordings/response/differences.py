@@ -16,7 +16,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.random_excitation import estimate_random
+from bayeshaptic.recordings.response.estimators.random_excitation import estimate_random
 
 # Angles w T between which the noise is compared.
 _SLOW, _LOWER, _MIDDLE, _FAST = (0.05, 0.1), (0.2, 0.6), (0.3, 0.6), (1.3, 2.0)

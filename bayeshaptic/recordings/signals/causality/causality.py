@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.causality.news import News, news
+from bayeshaptic.recordings.signals.causality.prediction import Share, predict
 from bayeshaptic.recordings.signals.excitation import Repetition, find_repetition
-from bayeshaptic.recordings.signals.news import News, news
-from bayeshaptic.recordings.signals.prediction import Share, predict
 from bayeshaptic.recordings.signals.sweeps import is_sweep
 from bayeshaptic.recordings.signals.switching import is_switched
 from bayeshaptic.types import Bools, Floats

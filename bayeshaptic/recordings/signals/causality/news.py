@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.recordings.signals.prediction import Prediction, within_the_usual
+from bayeshaptic.recordings.signals.causality.prediction import Prediction, within_the_usual
 from bayeshaptic.types import Floats
 
 # Samples later at which the force answers: sums over wider and wider spans, fewer than the

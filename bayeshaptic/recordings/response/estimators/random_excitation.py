@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band
-from bayeshaptic.recordings.response.instrument import STRONG, InstrumentSpectra
+from bayeshaptic.recordings.response.estimators.instrument import STRONG, InstrumentSpectra
+from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.local_polynomial import (
     default_minimum_lines,
     window_edges,
 )
-from bayeshaptic.recordings.response.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra

@@ -1,0 +1,161 @@
+"""The ETFE of a recording: by periods or by windows, of one piece or of several."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bayeshaptic.arguments import at_the_door
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.read import recording_of
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.band import refuse_band
+from bayeshaptic.recordings.response.estimators.periodic_excitation import estimate_periodic
+from bayeshaptic.recordings.response.estimators.random_excitation import estimate_random
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.spectra import (
+    JoinedSpectra,
+    PeriodicSpectra,
+    RandomSpectra,
+)
+from bayeshaptic.recordings.signals.excitation import FEWEST_LINES
+from bayeshaptic.threads import single_threaded
+
+
+@at_the_door
+@single_threaded
+def estimate_etfe(
+    recording: Recording | str | Path,
+    band_hz: tuple[float, float] | None = None,
+    *,
+    minimum_lines: int | None = None,
+    fewest_tones: int = FEWEST_LINES,
+) -> Etfe:
+    """Estimate the response from commanded force to position, with its variance.
+
+    Parameters
+    ----------
+    recording : Recording or path
+        One with a `reference` is read through that.
+    band_hz : (low, high), optional
+        Frequencies to use, Hz. By default chosen from the data: where the force has power and
+        the response stands out of the noise.
+    minimum_lines : int, optional
+        DFT lines in the narrowest window of a random excitation, at least 10. By default 24, and 12
+        where the recording is shorter than 10 s.
+    fewest_tones : int
+        Excited lines that a periodic excitation must have; fewer than 5 are for looking at alone.
+
+    Returns
+    -------
+    Etfe
+        With one point a window (random excitation) or an excited line (periodic).
+
+    Raises
+    ------
+    InputError
+        When the recording is too short, the force has no power, or the band makes no sense.
+    """
+    recording = recording_of(recording)
+    if recording.joints:
+        return _joined(recording, band_hz, minimum_lines)
+    _check(recording, band_hz)
+    if minimum_lines is not None and minimum_lines < 10:
+        raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
+    found = None
+    if recording.reference is None:
+        found = estimate_periodic(recording, band_hz, fewest_tones)
+    spectra: PeriodicSpectra | RandomSpectra
+    spectra, points, notices = found or estimate_random(recording, band_hz, minimum_lines)
+    return Etfe(
+        frequency_hz=points.frequency_hz,
+        value=points.value,
+        variance=points.variance,
+        coherence=points.coherence,
+        period_s=recording.period_s,
+        band_hz=(float(spectra.frequency_hz[0]), float(spectra.frequency_hz[-1])),
+        force_unit=recording.force_unit,
+        position_unit=recording.position_unit,
+        spectra=spectra,
+        recording=recording,
+        period_lines=spectra.lines if found is not None else None,
+        notices=notices,
+    )
+
+
+def _joined(
+    recording: Recording, band_hz: tuple[float, float] | None, minimum_lines: int | None
+) -> Etfe:
+    """That of all pieces: what a person sees is the mean of those as long as the longest.
+
+    Pieces whose force excites nothing by itself are left out, and so are the few whose excitation
+    is of another kind, periodic or not, than that of the most.
+    """
+    found, left_out, why = [], [], None
+    for number, piece in enumerate(recording.pieces, start=1):
+        try:
+            found.append((number, estimate_etfe(piece, band_hz, minimum_lines=minimum_lines)))
+        except InputError as error:
+            left_out.append(number)
+            why = why or error
+    if not found:
+        raise why or InputError(f"{recording.name}: there are no pieces")
+    periodic = [isinstance(part.spectra, PeriodicSpectra) for _, part in found]
+    most = sum(periodic) > len(periodic) / 2
+    left_out += [n for (n, _), own in zip(found, periodic, strict=True) if own != most]
+    parts = [part for (_, part), own in zip(found, periodic, strict=True) if own == most]
+    band = min(p.band_hz[0] for p in parts), max(p.band_hz[1] for p in parts)
+    text = f"Band {band[0]:.3g} to {band[1]:.4g} Hz; that of each piece was chosen by itself."
+    notices = {Notice("note", "band", text): None}
+    notices |= dict.fromkeys(n for part in parts for n in part.notices if n.topic != "band")
+    if left_out:
+        named = ", ".join(str(number) for number in sorted(left_out))
+        text = (
+            f"Of {len(recording.pieces)} pieces {len(left_out)} say nothing of the response and "
+            f"are left out (number {named})."
+        )
+        notices[Notice("warning", "pieces", text)] = None
+    return replace(
+        _mean_of_longest(parts),
+        band_hz=band,
+        spectra=JoinedSpectra(tuple(part.spectra for part in parts)),
+        recording=recording,
+        notices=tuple(notices),
+    )
+
+
+def _mean_of_longest(parts: list[Etfe]) -> Etfe:
+    """The mean of those that have the frequencies of the longest, weighted by their variances."""
+    longest = max(parts, key=lambda part: len(part.frequency_hz))
+    alike = [
+        part
+        for part in parts
+        if part.frequency_hz.shape == longest.frequency_hz.shape
+        and np.allclose(part.frequency_hz, longest.frequency_hz)
+    ]
+    weight = 1 / np.array([part.variance for part in alike])
+    return replace(
+        longest,
+        value=np.sum(weight * [part.value for part in alike], axis=0) / weight.sum(axis=0),
+        variance=1 / weight.sum(axis=0),
+        coherence=np.mean([part.coherence for part in alike], axis=0),
+    )
+
+
+def _check(recording: Recording, band_hz: tuple[float, float] | None) -> None:
+    """What no estimate can be made from."""
+    for name, values in (("force", recording.force), ("position", recording.position)):
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"{recording.name}: {name} is {values[bad[0]]} in sample {bad[0] + 1} "
+                f"({len(bad)} such samples)"
+            )
+        if np.ptp(values) == 0:
+            raise InputError(
+                f"{recording.name}: the {name} is {values[0]:g} in all {len(values)} samples; "
+                "a frequency response needs a force that varies and a position that answers"
+            )
+    refuse_band(band_hz, recording.period_s)

@@ -1,0 +1,1 @@
+"""Which signal drives which: predictions of one from the other's past."""
