@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayeshaptic.diagnosis.begun import Begun, begin
+from bayeshaptic.diagnosis.base.begun import Begun, begin
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.rig import Bench
 from benchmarks.recordings.blind import CASES, recorded

@@ -10,8 +10,8 @@ import pytest
 from response_table import noisy_table
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis import base_model
-from bayeshaptic.diagnosis.base_model import traced_from_best_base
+from bayeshaptic.diagnosis.base import best_base, loops_in_turn
+from bayeshaptic.diagnosis.base.best_base import traced_from_best_base
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
 from bayeshaptic.inference import choose
@@ -109,9 +109,9 @@ def rounds_of(
             seen.append(self.name if at_length else f"{self.name}, at first sight")
             self.rounds += 1
 
-    monkeypatch.setattr(base_model, "Loop", Loop)
+    monkeypatch.setattr(loops_in_turn, "Loop", Loop)
     monkeypatch.setattr(choose, "deviance", deviance)
-    monkeypatch.setattr(base_model, "replace", lambda old, **new: _changed(old, new))
+    monkeypatch.setattr(best_base, "replace", lambda old, **new: _changed(old, new))
     fits = {name: fit(name, value) for name, value in misfits.items()}
     score = dict.fromkeys(fits, 0.0) | (scores or {})
     scored = {name: ScoredFit(f, score[name], deviance(f, 1.0)[1]) for name, f in fits.items()}

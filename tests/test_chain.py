@@ -10,7 +10,7 @@ import pytest
 from response_table import noisy_table
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.begun import base_model
+from bayeshaptic.diagnosis.base.asked import base_model
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.saved.archive import model_from_dict, model_to_dict

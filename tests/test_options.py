@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.begun import measurement_of
+from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.options import Options
 
 RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"

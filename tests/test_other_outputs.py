@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import butter, lfilter
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.begun import with_delay_of_the_loop
+from bayeshaptic.diagnosis.base.opened import with_delay_of_the_loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.response.between_samples import with_images

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.begun import begin
+from bayeshaptic.diagnosis.base.begun import begin
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.inference.least_squares import least_squares

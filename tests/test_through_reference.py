@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayeshaptic.diagnosis.begun import begin
+from bayeshaptic.diagnosis.base.begun import begin
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.feedback.other_valley import other_valley
 from bayeshaptic.diagnosis.options import Options

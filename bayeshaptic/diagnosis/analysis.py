@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.base.asked import measurement_of
+from bayeshaptic.diagnosis.base.begun import Begun, begin
+from bayeshaptic.diagnosis.base.opened import Clock
 from bayeshaptic.diagnosis.battery import residual_tests
-from bayeshaptic.diagnosis.begun import Begun, Clock, begin, measurement_of
 from bayeshaptic.diagnosis.feedback.in_loop import InLoop
 from bayeshaptic.diagnosis.hidden.hidden import Hidden
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown

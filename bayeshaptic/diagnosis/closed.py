@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.diagnosis.analysis import Analysis, finish, limit_line, without_sampling
-from bayeshaptic.diagnosis.base_model import traced_as_of_the_loop
-from bayeshaptic.diagnosis.begun import Begun, Opened, fitted, measurement_of, opened
+from bayeshaptic.diagnosis.base.asked import measurement_of
+from bayeshaptic.diagnosis.base.begun import Begun, fitted
+from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
+from bayeshaptic.diagnosis.base.opened import Opened, opened
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,

@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 
 from bayeshaptic.diagnosis.analysis import NO_WITNESS, Analysis
-from bayeshaptic.diagnosis.begun import Opened
+from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import (
     UNSEEN,

@@ -10,7 +10,7 @@ from typing import Any
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analysis import analyse
-from bayeshaptic.diagnosis.begun import device_of
+from bayeshaptic.diagnosis.base.asked import device_of
 from bayeshaptic.diagnosis.closed import close_loop
 from bayeshaptic.diagnosis.hidden.several import Together
 from bayeshaptic.diagnosis.options import Options, options_from

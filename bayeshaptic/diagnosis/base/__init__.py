@@ -1,0 +1,1 @@
+"""From a measurement to the base model that an analysis, or the loop, goes on with."""

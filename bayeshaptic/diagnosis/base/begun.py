@@ -1,0 +1,99 @@
+"""What an analysis, or the loop, begins with: a measurement with a base model fitted to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.base.asked import base_model
+from bayeshaptic.diagnosis.base.of_the_loop import as_of_the_loop, hardly_differ
+from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.inference.choose import Choice, choose_model
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import Model, build_model
+from bayeshaptic.quantities import quantity
+from bayeshaptic.recordings.checks.sufficiency import refuse_where_told
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.threads import single_threaded
+
+_MOST_ROUNDS = 8  # fits to what the last one makes of the samples
+
+
+@dataclass(frozen=True)
+class Begun(Opened):
+    """With a base model fitted to it: what an analysis, or the loop, begins with."""
+
+    fit: Fit
+    choice: Choice | None
+
+
+def begin(measurement: Recording | Etfe, model: str | Model, options: Options) -> Begun:
+    """Check the measurement, estimate its response, and fit the base model; see `analyse`."""
+    return fitted(opened(measurement, model, options), model, options)
+
+
+@single_threaded
+def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
+    """Fit the base model to what was opened, where the response says enough."""
+    refuse_where_told(found.etfe.recording, found.notices)
+    clock = Clock(dict(found.seconds))
+    with clock.stage("least squares"):
+        options.report(0.06, "fitting")
+        fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
+        begun = Begun(**{**vars(found), "seconds": clock.seconds}, fit=fit, choice=choice)
+        for _ in range(_MOST_ROUNDS):
+            etfe = as_of_the_loop(found.etfe, begun.fit)
+            if hardly_differ(etfe, begun.etfe):
+                break
+            begun = refitted(begun, etfe, model, options)
+    return begun
+
+
+def refitted(begun: Begun, etfe: Etfe, model: str | Model, options: Options) -> Begun:
+    """With the base model fitted to another estimate of the response."""
+    fit, choice = _fit(etfe, base_model(model, options), begun.device, options)
+    return replace(begun, etfe=etfe, fit=fit, choice=choice)
+
+
+def _fit(
+    etfe: Etfe,
+    model: str | Model,
+    device: Device | None,
+    options: Options,
+) -> tuple[Fit, Choice | None]:
+    """The fit of the model that was asked for, or of the chosen one."""
+    prior, seed = dict(options.prior), options.seed
+    if isinstance(model, Model):
+        return least_squares(model.with_prior(prior), etfe, seed=seed), None
+    delay = options.delay_s, options.delay_sd_s
+    if model == "auto":
+        choice = _lower_where_undecided(
+            choose_model(etfe, device, *delay, prior, options.held, seed)
+        )
+        return choice.fit, choice
+    built = build_model(model, device, *delay, etfe.period_s, prior)
+    return least_squares(built, etfe, seed=seed), None
+
+
+def _lower_where_undecided(choice: Choice) -> Choice:
+    """The choice; where it is open whether somebody holds the device, that with the lower limit."""
+    if not choice.undecided:
+        return choice
+    names = (choice.fit.model.name, *choice.undecided)
+    fits = {name: choice.candidates[name].fit for name in names}
+    limits = {
+        name: float(critical_stiffness(fit.model, fit.theta).value) for name, fit in fits.items()
+    }
+    lowest = min(names, key=lambda name: limits[name])
+    said = ", ".join(
+        f"{name} {quantity(limits[name], fits[name].model.stiffness_unit)}" for name in names
+    )
+    text = (
+        f" Whether somebody holds it, this recording does not tell ({' and '.join(names)} explain "
+        f"it alike): the one with the lower limit is taken, {lowest} ({said}). Say it with --held."
+    )
+    return replace(choice, fit=fits[lowest], reason=choice.reason + text)

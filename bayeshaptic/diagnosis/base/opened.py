@@ -1,0 +1,149 @@
+"""A measurement that was checked, with its response."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.base.asked import base_model, device_of
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.models import Model
+from bayeshaptic.recordings.checks.check import check_recording
+from bayeshaptic.recordings.checks.sufficiency import refuse_where_told, told_too_little, too_little
+from bayeshaptic.recordings.feedback import has_feedback, told
+from bayeshaptic.recordings.join import unbroken
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.differences import with_differences
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
+from bayeshaptic.recordings.through_reference import through_reference, too_weak, unusable
+from bayeshaptic.threads import single_threaded
+
+_WIDEST = 0.4  # of the sampling rate: a band's upper end
+
+
+@dataclass
+class Clock:
+    """How long each stage took."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        began = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - began
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A measurement that was checked, with its response; attributes are those of `Analysis`.
+
+    `asked` is the name of the base model that was asked for.
+    """
+
+    etfe: Etfe
+    device: Device | None
+    notices: tuple[Notice, ...]
+    seconds: dict[str, float]
+    lever_m: float | None
+    asked: str
+
+    @property
+    def one_mass(self) -> bool:
+        """Whether the device was declared to be one."""
+        return self.asked == "rigid"
+
+
+@single_threaded
+def opened(measurement: Recording | Etfe, model: str | Model, options: Options) -> Opened:
+    """Check the measurement, and estimate its response."""
+    asked = base_model(model, options)
+    name = asked.name if isinstance(asked, Model) else asked
+    one_mass = name == "rigid"
+    clock = Clock()
+    device = device_of(options, asked)
+    if isinstance(measurement, Recording):
+        measurement = with_differences(measurement)
+    measurement, notices = with_delay_of_the_loop(measurement, device, options)
+    if isinstance(measurement, Recording):
+        with clock.stage("checks"):
+            options.report(0.0, "checking the recording")
+            whole = unbroken(measurement)
+            notices += told(measurement.feedback, check_recording(whole, device))
+            if one_mass:  # followed in time instead
+                if measurement.reference is not None and has_feedback(notices):
+                    notices += (unusable("one mass is followed in time, which needs none"),)
+                measurement = replace(measurement, reference=None)
+            else:
+                measurement, notices = through_reference(measurement, notices)
+            if not any(notice.topic == "feedback" for notice in notices):
+                notices += too_little(whole)
+                if not one_mass:
+                    refuse_where_told(whole, notices)
+        with clock.stage("frequency response"):
+            options.report(0.03, "estimating the frequency response")
+            etfe, notices = _response(measurement, options.band_hz, notices)
+            notices += _not_looked_for(measurement, notices)
+    else:
+        etfe = measurement
+    lever_m = options.lever_m
+    if lever_m is None and device is not None:
+        lever_m = device.lever_m
+    return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m, name)
+
+
+def with_delay_of_the_loop(
+    measurement: Recording | Etfe, device: Device | None, options: Options
+) -> tuple[Recording | Etfe, tuple[Notice, ...]]:
+    """The measurement as of the loop: what a sensor of the force, or a hammer, saw has no delay.
+
+    Where the delay is known it is put in; otherwise whoever reads the limit is warned.
+    """
+    if not any(notice.topic == NO_LOOP for notice in measurement.notices):
+        return measurement, ()
+    delay_s = options.delay_s
+    if delay_s is None and device is not None:
+        delay_s = device.delay_s
+    if delay_s is None:
+        text = (
+            "The force was measured behind the loop's delay, and the delay is not known: the limit "
+            "is that of a loop without any, and the real one is lower. Give it with --delay-s."
+        )
+        return measurement, (Notice("warning", NO_LOOP, text),)
+    if isinstance(measurement, Recording):
+        return with_loop_delay(measurement, delay_s), ()
+    return measurement.later(delay_s), ()
+
+
+def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+    """What no test looks for in pieces: the motion of one says nothing of how the next began."""
+    if not recording.joints or has_feedback(notices) or told_too_little(notices):
+        return ()
+    text = (
+        "In several pieces taken as one neither drift nor faults of samples are looked for, and "
+        "dry friction (or any other force that is not linear) in the longest alone; it is not "
+        "taken off, and makes the limit too high: report on the longest piece by itself, too."
+    )
+    return (Notice("warning", "pieces", text),)
+
+
+def _response(
+    recording: Recording, band_hz: tuple[float, float] | None, notices: tuple[Notice, ...]
+) -> tuple[Etfe, tuple[Notice, ...]]:
+    """The response; one that nothing is read from is for comparison only, in any band."""
+    try:
+        return estimate_etfe(recording, band_hz), notices
+    except InputError as error:
+        if recording.reference is not None:
+            notices = too_weak(notices, str(error))
+        elif not (has_feedback(notices) or told_too_little(notices)) or band_hz is not None:
+            raise
+    longest = max(piece.duration_s for piece in recording.pieces)
+    widest = (1 / longest, _WIDEST / recording.period_s)
+    return estimate_etfe(replace(recording, reference=None), widest, fewest_tones=1), notices
