@@ -7,16 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.checks.check import check_recording
-from bayeshaptic.recordings.checks.sufficiency import refuse_too_little
+from bayeshaptic.recordings.checks.sufficiency import LEAST_COHERENCE, refuse_too_little
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
@@ -82,6 +84,22 @@ def test_what_says_too_little_is_refused(reason: str) -> None:
     with pytest.raises(InputError, match=reason) as caught:
         refuse_too_little(SAYS_TOO_LITTLE[reason]())
     assert "\n" not in str(caught.value)
+
+
+def test_noise_far_above_what_moves_the_device_is_no_silence() -> None:
+    """White noise of a loop at 5 kHz: the encoder shows the motion in a tenth of the lines."""
+    rng, period = np.random.default_rng(5), 2e-4
+    force = rng.normal(0, 0.002, 60000)
+    velocity = lfilter([0, period / 1e-4], [1, -(1 - 2 * period)], force)
+    count = 2 * np.pi / 90000
+    position = count * np.round(np.cumsum(velocity) * period / count)
+    signals = {"period_s": period, "force_unit": "Nm", "position_unit": "rad"}
+    recording = recording_from_arrays(force=force, position=position, **signals)
+    rough = rough_response(recording)
+    assert np.quantile(rough.coherence, 0.9) < LEAST_COHERENCE < 0.9 < rough.follows
+    refuse_too_little(recording)
+    with pytest.raises(InputError, match="hardly answers"):
+        refuse_too_little(replace(recording, force=force[::-1]))
 
 
 def levels(force: np.ndarray) -> bool:

@@ -70,8 +70,8 @@ def compare_response(
     """Whether the position answers at all, and as much as the device file says."""
     if rough.follows < LEAST_COHERENCE:
         text = (
-            f"The position hardly answers to the force: their coherence is below "
-            f"{rough.follows:.2f} on nine lines in ten. Are these the right columns?"
+            "The position hardly answers to the force: in the octave where it answers best their "
+            f"coherence is {rough.follows:.2f}. Are these the right columns?"
         )
         return [Notice("warning", "coherence", text)]
     clear = rough.clear()

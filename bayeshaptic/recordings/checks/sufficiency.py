@@ -215,9 +215,9 @@ def _unanswered(recording: Recording) -> str | None:
     if follows >= LEAST_COHERENCE:
         return None
     return (
-        f"the position hardly answers to the force: their coherence is below {follows:.2f} on nine "
-        f"lines in ten (1 is all, {LEAST_COHERENCE:g} the least to go on); check the columns, "
-        "excite the device two or three times as strongly, and record longer"
+        "the position hardly answers to the force: in the octave where it answers best their "
+        f"coherence is {follows:.2f} (1 is all, {LEAST_COHERENCE:g} the least to go on); check the "
+        "columns, excite the device two or three times as strongly, and record longer"
     )
 
 

@@ -12,6 +12,8 @@ from bayeshaptic.types import Complexes, Floats
 _LOW = 0.1  # of the sampling rate: above it a delay counts too much
 _DELAY = 2.0  # periods, hold included
 _LOWER_HALF = 0.25  # of the sampling rate
+_HALF_OCTAVE = 0.5
+_FEWEST = 6  # lines of an octave whose median chance does not lift
 
 
 class RoughResponse(NamedTuple):
@@ -28,8 +30,16 @@ class RoughResponse(NamedTuple):
 
     @property
     def follows(self) -> float:
-        """The coherence that nine lines in ten do not reach."""
-        return float(np.quantile(self.coherence, 0.9))
+        """The median coherence of the octave in which the position follows the force best.
+
+        White noise of a fast loop goes far beyond what an encoder shows of the motion, and the band
+        ends where that is; nine lines in ten may lie above.
+        """
+        octaves = np.log2(self.frequency_hz / self.frequency_hz[0])
+        count = np.floor(2 * octaves[-1]).astype(int) - 1
+        pieces = [np.abs(octaves - 0.5 * k - 0.5) <= _HALF_OCTAVE for k in range(max(count, 0))]
+        medians = [np.median(self.coherence[p]) for p in pieces if np.sum(p) >= _FEWEST]
+        return float(max(medians, default=np.median(self.coherence)))
 
     def clear(self) -> RoughResponse:
         """The lines on which the position follows the force."""

@@ -21,6 +21,7 @@ _LATEST = 1e100
 # Rows that are missing in one place, and the share of all that are, up to which they are put back:
 # of a force that nobody knows for longer than this its own past says nothing.
 LONGEST_GAP, MOST_MISSING = 8, 0.01
+_WORTH_READING = 1000  # rows, about what a response can be read from
 # From here on the stamps' jitter is worth a warning.
 NOTABLE_JITTER = 0.005
 
@@ -166,12 +167,14 @@ def _rounding(time_s: NDArray[np.float64]) -> float:
 def _gaps(time_s: NDArray[np.float64], period: float) -> NDArray[np.intp]:
     """Samples after which some are missing; a late stamp that the next step makes up for is no gap.
 
-    Where many steps are long it is uneven sampling and no gap.
+    Where many steps are long, and of no whole number of periods, it is uneven sampling and no gap.
     """
     steps = np.diff(time_s)
     pairs = np.append(time_s[2:] - time_s[:-2], np.inf)
     gaps = np.flatnonzero((steps > 1.5 * period) & (pairs > 2.5 * period))
-    return gaps if len(gaps) <= max(3, len(steps) // 100) else gaps[:0]
+    turns = steps[gaps] / period
+    whole = np.all(np.abs(turns - np.rint(turns)) < MOST_JITTER)
+    return gaps if whole or len(gaps) <= max(3, len(steps) // 100) else gaps[:0]
 
 
 def _with_gaps(
@@ -186,12 +189,17 @@ def _with_gaps(
         first = gaps[0]
         edges = np.concatenate([[0], gaps + 1, [len(time_s)]])
         longest = int(np.argmax(np.diff(edges)))
+        start, end = edges[longest] + 1, edges[longest + 1]
+        cure = (
+            f"read it alone with --rows {start}:{end}"
+            if end - start >= _WORTH_READING
+            else "too few to read, so record again with a logger that keeps up"
+        )
         raise InputError(
             f"{where}: about {steps[first] / period - 1:.0f} samples are missing after row "
             f"{first + 1} (a step of {steps[first]:.6g} s where the period is {period:.6g} s; "
-            f"{len(gaps)} such places); the longest part without a gap is rows "
-            f"{edges[longest] + 1} to {edges[longest + 1]}: read it alone with --rows "
-            f"{edges[longest] + 1}:{edges[longest + 1]}"
+            f"{len(gaps)} such places); the longest part without a gap is rows {start} to {end}: "
+            f"{cure}"
         )
     rows = np.arange(len(time_s)) + np.cumsum(lost)
     even = _from_stamps(np.interp(np.arange(rows[-1] + 1), rows, time_s), where)
