@@ -129,20 +129,7 @@ def _recommended(
             "two must agree before the model's figure is used."
         )
     details = [] if closed is None else [text for text in (in_short(closed),) if text]
-    tip = tip_limit(analysis)
-    if tip is not None and analysis.lever_m is not None:
-        lever = analysis.lever_m
-        there = rounded_down(stated.value, tip.unit, *ends, lever)
-        details.append(
-            f"At the tip, {quantity(lever, 'm')} from the axis, that is {there.with_level}."
-        )
-    details.append(_what_binds(analysis))
-    if force_is_assumed(analysis.notices):
-        unit = pretty_unit(analysis.model.force_unit)
-        details.append(
-            f"Nobody said the unit of the force: {unit} stands for whatever the command was "
-            "recorded in."
-        )
+    details += _of_the_limit(analysis, stated.value, ends)
     warnings = [n.text for n in analysis.notices if n.level == "warning"]
     unexplained = diagnosis.get("verdict") == "unexplained"
     faint = not diagnosis and misfit_is_faint(analysis)
@@ -160,6 +147,26 @@ def _recommended(
     status = "caution" if any(doubts) else "safe"
     known = risk if cap is None else None
     return Headline(status, sentence, tuple(details), stated.value, known)
+
+
+def _of_the_limit(analysis: Analysis, stated: float, ends: tuple[float, float]) -> list[str]:
+    """What the stated stiffness is at the tip, what binds, and what its force is in."""
+    details = []
+    tip = tip_limit(analysis)
+    if tip is not None and analysis.lever_m is not None:
+        lever = analysis.lever_m
+        there = rounded_down(stated, tip.unit, *ends, lever)
+        details.append(
+            f"At the tip, {quantity(lever, 'm')} from the axis, that is {there.with_level}."
+        )
+    details.append(_what_binds(analysis))
+    if force_is_assumed(analysis.notices):
+        unit = pretty_unit(analysis.model.force_unit)
+        details.append(
+            f"Nobody said the unit of the force: {unit} stands for whatever the command was "
+            "recorded in."
+        )
+    return details
 
 
 def _lower_witness(analysis: Analysis, safe: float) -> float | None:

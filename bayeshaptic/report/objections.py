@@ -56,8 +56,16 @@ def why_none(result: Result) -> tuple[str, ...]:
 
 
 def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
-    found = []
     verdict = (diagnosis or {}).get("verdict")
+    return [
+        *_of_the_misfit(analysis, verdict),
+        *_of_the_recording(analysis, diagnosis, verdict),
+        *_of_the_limit(analysis),
+    ]
+
+
+def _of_the_misfit(analysis: Analysis, verdict: str | None) -> list[str]:
+    found = []
     if verdict == "unexplained" and is_far_off(analysis) and not has_feedback(analysis.notices):
         found.append(
             f"what the model leaves over is {misfit_factor(analysis)} times the noise, and no "
@@ -73,6 +81,11 @@ def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
         found.append(
             "the residual is not noise, and the loop that would trace it was left open (--no-loop)"
         )
+    return found
+
+
+def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -> list[str]:
+    found = []
     if position_is_in_doubt(analysis.notices):
         unit = analysis.model.position_unit
         found.append(
@@ -101,6 +114,11 @@ def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
             "the floor, or a force that was not found, and dry friction beside such a motion looks "
             "like damping"
         )
+    return found
+
+
+def _of_the_limit(analysis: Analysis) -> list[str]:
+    found = []
     if analysis.sampled and (far := unstated(analysis)) is not None:
         found.append(far)
     if not analysis.posterior.converged:

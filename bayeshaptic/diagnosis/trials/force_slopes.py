@@ -12,13 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.state import share
+from bayeshaptic.diagnosis.state import Change, share
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
+from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
 NUDGE = 0.1  # relative, of strength and shape for the slopes
@@ -165,12 +167,37 @@ def linearised(
     motions: list[Floats] | None = None,
     along: Along | None = None,
 ) -> tuple[Callable[[Floats], Floats], Floats, Along]:
-    """Residuals around forces, which go on along their slopes, and where they begin, (1, P + J).
+    """Residuals around forces, linear in everything but the linear parameters, and their start.
 
-    From coordinates, changes of the logarithms, which have moved by `moved` so far, and sizes of
-    further `motions`.  `near` is the share of the usual distances to take each logarithm's slope
-    over (those over the linear parameters go with the strengths'), `parts` which windows there are,
-    and `along` the slopes over the linear parameters that were used last: those used come last.
+    Parameters
+    ----------
+    bench : ForceBench
+    form : Form
+    logs : ndarray, shape (J,)
+        Logarithms of strengths and shapes, where the slopes are taken.
+    theta : ndarray, shape (P,)
+        The linear parameters there.
+    moved : ndarray, shape (J,)
+        How far the logarithms have come since the fit began.
+    nudges : ndarray, shape (P,)
+        Usual distances for slopes over the linear parameters: `nudges_of`.
+    near : ndarray, shape (J,)
+        Share of the usual distance to take each logarithm's slope over; those over the linear
+        parameters go with the strengths'.
+    parts : tuple of int
+        Which of the windows are fitted.
+    motions : list of ndarray, optional
+        Further motions, whose sizes are fitted, too.
+    along : Along, optional
+        The slopes over the linear parameters that were used last.
+
+    Returns
+    -------
+    residuals : callable
+        Of coordinates, changes of the logarithms and sizes of the further motions.
+    start : ndarray, shape (1, P + J + M)
+    along : Along
+        The slopes over the linear parameters that were used.
     """
 
     def motion(logs: Floats, theta: Floats) -> Floats:
@@ -189,35 +216,63 @@ def linearised(
     here, _, _ = search_box(bench.model)
     phi = here.coordinate(theta[None])[0]
     strengths = ~form.shape
-    at, share_of = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
-    if along is None or not along.holds(at, share_of):
+    at, nearest = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
+    if along is None or not along.holds(at, nearest):
         # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
         linear = forces and not (bench.held and all(o.effect.place == MOTOR for o in forces))
-        around = here.natural(phi + np.diag(share_of * nudges)) if linear else ()
+        around = here.natural(phi + np.diag(nearest * nudges)) if linear else ()
         moves = [
-            (bench.added_motions(forces, vector).sum(axis=0) - inner) / (share_of * nudge)
+            (bench.added_motions(forces, vector).sum(axis=0) - inner) / (nearest * nudge)
             for vector, nudge in zip(around, nudges, strict=False)
         ]
-        along = Along(moves, at, share_of)
+        along = Along(moves, at, nearest)
     bench.remember(inner)  # not before: what is compared has the slow motion in common
     slopes += along.slopes
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
     slopes += further
-    etfe = bench.without(bench.changes(forces, added))
+    windows, weight = _weighed_windows(bench, bench.changes(forces, added), theta, slopes, parts)
+    start = np.concatenate([phi, np.zeros(len(logs) + len(further))])[None]
+    return _residuals(bench.model, windows, weight, form.shape, moved, start, along), start, along
+
+
+def _weighed_windows(
+    bench: ForceBench,
+    changes: tuple[Change, ...],
+    theta: Floats,
+    slopes: list[Floats],
+    parts: tuple[int, ...],
+) -> tuple[Windows, Floats]:
+    """Windows without what forces changed, with slopes as inputs; and roots of their weights."""
+    etfe = bench.without(changes)
     windows = bench.windows(etfe, theta, slopes)
     # The many slopes leave too little of a window to read its noise from.
     noise = Likelihood(bench.model, bench.windows(etfe, theta)).noise_variance
     chosen = share(windows, parts)
-    windows, weight = windows.part(chosen), np.sqrt(2 / noise[chosen])[:, None]
-    nodes, size = windows.frequency_hz.shape[1], bench.model.size
+    return windows.part(chosen), np.sqrt(2 / noise[chosen])[:, None]
+
+
+def _residuals(
+    model: Model,
+    windows: Windows,
+    weight: Floats,
+    shape: NDArray[np.bool_],
+    moved: Floats,
+    start: Floats,
+    along: Along,
+) -> Callable[[Floats], Floats]:
+    """From coordinates, changes of the logarithms and sizes of further motions to what is left.
+
+    `shape` says which logarithms are of a shape, and `moved` how far all of them have come.
+    """
+    here, _, _ = search_box(model)
+    nodes, size = windows.frequency_hz.shape[1], model.size
     columns = windows.design[:, :, nodes:]
-    own = Likelihood(bench.model, replace(windows, design=windows.design[:, :, :nodes]))
-    start = np.concatenate([phi, np.zeros(len(logs) + len(further))])[None]
+    own = Likelihood(model, replace(windows, design=windows.design[:, :, :nodes]))
     shape_sd = 1.0  # log; how far a shape may be from the grid's
 
     def residuals(phi: Floats) -> Floats:
-        steps, sizes = np.split(phi[:, size:], [len(logs)], axis=1)
-        far = (moved + steps)[:, form.shape] / shape_sd
+        steps, sizes = np.split(phi[:, size:], [len(moved)], axis=1)
+        far = (moved + steps)[:, shape] / shape_sd
         if along.slopes:
             steps = np.concatenate([steps, phi[:, :size] - start[:, :size]], axis=1)
         steps = np.concatenate([steps, sizes], axis=1)
@@ -226,4 +281,4 @@ def linearised(
         flat = left.reshape(len(phi), -1)
         return np.concatenate([flat.real, flat.imag, far], axis=1)
 
-    return residuals, start, along
+    return residuals

@@ -75,50 +75,46 @@ def next_steps(
         return (Step(f"{cure}. Then:", new),)
     if analysis.etfe.through_reference:
         return _after_reference(result, command, new)
+    return (_after_fit(result, command, new),)
+
+
+def _after_fit(result: Result, command: str, new: str) -> Step:
+    """Where the recording will do, and what came of it will not."""
+    analysis = result.analysis
     if not analysis.posterior.converged:
-        return (
-            Step(
-                "Let the sampler begin elsewhere, and tell it what is known of the device "
-                "(--device, --delay-s):",
-                f"{command} --seed {analysis.posterior.seed + 1}",
-            ),
+        return Step(
+            "Let the sampler begin elsewhere, and tell it what is known of the device "
+            "(--device, --delay-s):",
+            f"{command} --seed {analysis.posterior.seed + 1}",
         )
     if is_open(analysis):
-        return (
-            Step(
-                "Let the force be larger and slower, or record longer, so that the device moves as "
-                "far as it will in use; or say what is known of its dampers in a device file, "
-                "--device. Then:",
-                new,
-            ),
+        return Step(
+            "Let the force be larger and slower, or record longer, so that the device moves as "
+            "far as it will in use; or say what is known of its dampers in a device file, "
+            "--device. Then:",
+            new,
         )
     if result.closed is None:
-        return (Step("Let the loop look for what the model lacks (leave out --no-loop):", command),)
+        return Step("Let the loop look for what the model lacks (leave out --no-loop):", command)
     if changes(result.closed):
         grip = ", hold it alike all the time" if analysis.model.held else ""
-        return (
-            Step(
-                f"Let the device warm up{grip}, and record at least "
-                f"{pure(PARTS * SHORTEST_S)} s of a force that does not repeat: in that a change "
-                "can be followed. Then:",
-                new,
-            ),
+        return Step(
+            f"Let the device warm up{grip}, and record at least "
+            f"{pure(PARTS * SHORTEST_S)} s of a force that does not repeat: in that a change "
+            "can be followed. Then:",
+            new,
         )
     if is_unexplained(result):
         alone = ", and with nobody holding the device" if may_be_held(analysis) else ""
-        return (
-            Step(
-                f"Record at half and at twice the force{alone}. What changes tells which part of "
-                "it the model lacks. Compare the reports:",
-                "bayeshaptic batch FOLDER -o reports",
-            ),
+        return Step(
+            f"Record at half and at twice the force{alone}. What changes tells which part of "
+            "it the model lacks. Compare the reports:",
+            "bayeshaptic batch FOLDER -o reports",
         )
-    return (
-        Step(
-            "Try another base model (--model free, --model grasped) or another band (--band "
-            "LOW,HIGH), and see whether the misfit goes:",
-            f"{command} --model free",
-        ),
+    return Step(
+        "Try another base model (--model free, --model grasped) or another band (--band "
+        "LOW,HIGH), and see whether the misfit goes:",
+        f"{command} --model free",
     )
 
 
@@ -138,7 +134,7 @@ def _after_feedback(result: Result, command: str, new: str, bare: str) -> tuple[
 
 
 def _after_reference(result: Result, command: str, new: str) -> tuple[Step, ...]:
-    """Where a controller's reference was followed."""
+    """Where the response was read through what a controller followed."""
     analysis = result.analysis
     if analysis.model.held:
         return (Step("Record in open loop: a force that comes from a table. Then:", new),)
