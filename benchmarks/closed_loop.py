@@ -19,9 +19,9 @@ import numpy as np
 
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.loop import Loop
+from bayeshaptic.inference.time_domain.loop import NAMES, Loop
 from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG
 from bayeshaptic.inference.time_domain.uneven import Way
 from bayeshaptic.inference.time_domain.widths import FREEDOM

@@ -14,9 +14,9 @@ from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
+from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.loop import Hum
+from bayeshaptic.inference.time_domain.loop import NAMES, Hum
 from bayeshaptic.inference.time_domain.scores import scores
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording

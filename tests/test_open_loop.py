@@ -11,7 +11,8 @@ from one_truth import check_page, numbers_of, page_of, words_only
 from bayeshaptic.diagnosis.analysis import analyse
 from bayeshaptic.diagnosis.closed import Closed, close_loop
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
+from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
+from bayeshaptic.inference.time_domain.loop import NAMES
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report import write_report

@@ -10,10 +10,10 @@ import pytest
 from one_truth import check_page, page_of, words_only
 
 from bayeshaptic.diagnosis.closed import close_loop
-from bayeshaptic.inference.time_domain.fit import NAMES, fit_motion
+from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood
-from bayeshaptic.inference.time_domain.loop import Loop
+from bayeshaptic.inference.time_domain.loop import NAMES, Loop
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, ridge
 from bayeshaptic.inference.time_domain.widths import covariance

@@ -17,6 +17,7 @@ from bayeshaptic.commands.options import (
 if TYPE_CHECKING:
     from bayeshaptic.jobs.manifest import ManifestEntry
     from bayeshaptic.report.reported import Reported
+    from bayeshaptic.types import Executor
 
 NAME = "batch"
 SUMMARY = "report on many studies or recordings, side by side"
@@ -84,15 +85,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     leave_unread()  # before what loads SciPy
     from bayeshaptic.commands.talk import Talk
-    from bayeshaptic.jobs import executors
     from bayeshaptic.jobs.batch import run_batch
 
-    if arguments.dask is not None:
-        execute = executors.dask(arguments.dask)
-    elif arguments.workers == 1:
-        execute = executors.serial
-    else:
-        execute = executors.processes(arguments.workers or executors.usable_cores())
     as_json = arguments.log == "json"
     before = 0  # done by an earlier run, which says nothing of how long the others take
     with Talk(arguments.quiet or as_json) as talk:
@@ -120,10 +114,21 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.sources,
             arguments.output,
             settings_from(arguments),
-            execute,
+            _executor(arguments),
             resume=not arguments.again,
             command=command_line(),
             tell=tell,
         )
         talk.say(f"reports: {arguments.output.absolute() / 'index.html'}")
     return 1 if any(entry.state != "done" for entry in entries) else 0
+
+
+def _executor(arguments: argparse.Namespace) -> Executor:
+    """Where the jobs run."""
+    from bayeshaptic.jobs import executors
+
+    if arguments.dask is not None:
+        return executors.dask(arguments.dask)
+    if arguments.workers == 1:
+        return executors.serial
+    return executors.processes(arguments.workers or executors.usable_cores())

@@ -9,8 +9,8 @@ import numpy as np
 
 from bayeshaptic.diagnosis.samples.tone import Tone
 from bayeshaptic.diagnosis.samples.tones import find_tones
-from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit
-from bayeshaptic.inference.time_domain.loop import Hum
+from bayeshaptic.inference.time_domain.fit import MotionFit
+from bayeshaptic.inference.time_domain.loop import NAMES, Hum
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Complexes, Floats

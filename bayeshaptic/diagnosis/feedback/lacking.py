@@ -29,9 +29,9 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import Usual
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.fit import NAMES, MotionFit, fit_motion
+from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.loop import Hum
+from bayeshaptic.inference.time_domain.loop import NAMES, Hum
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
 from bayeshaptic.inference.time_domain.scores import Score, scores
 from bayeshaptic.recordings.join import unbroken

@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 
 from bayeshaptic.diagnosis.hidden.evidence import Evidence
 from bayeshaptic.diagnosis.hidden.regression import Around, log_limits
-from bayeshaptic.diagnosis.hidden.sizes import sizes_of
+from bayeshaptic.diagnosis.hidden.sizes import Sizes, sizes_of
 from bayeshaptic.diagnosis.hidden.suspects import Suspect
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.numerics.pareto import pareto_k
@@ -116,33 +116,54 @@ def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
     excluded = not np.isfinite(top)  # no draw is possible
     factor = np.zeros(KEPT) if excluded else _log_factor(suspect, known, vectors, theta, kept)
     size = sizes.strength * suspect.unit_size
-    log = guess + said - np.log(sizes.weight)
-    log = log - (float(logsumexp(said + guess)) - evidence)
+    others = None
+    if suspect.shared and not excluded:
+        log = guess + said - np.log(sizes.weight)
+        log = log - (float(logsumexp(said + guess)) - evidence)
+        others = _of_every_size(sizes, size, log, known, there)
+    return Weighed(
+        name=suspect.name,
+        title=suspect.title,
+        family=suspect.family,
+        told_apart_by=suspect.told_apart_by,
+        what=suspect.unseen.title,
+        unit=unit_of(suspect.unseen.dimension, suspect.base.force_unit, suspect.base.position_unit),
+        place=suspect.place,
+        shared=suspect.shared,
+        share=suspect.share,
+        log_evidence=evidence,
+        pareto_k=pareto_k(log_weight[possible]) if possible.sum() > 50 else np.inf,
+        strength=sizes.strength[cells][kept],
+        log_factor=factor,
+        changes=changes[cells[kept[::PAIRED]]],
+        size=size[cells][kept],
+        shape=sizes.shape[cells][kept],
+        evidence=others,
+    )
+
+
+def _of_every_size(
+    sizes: Sizes, size: Floats, log: Floats, known: Around, there: Floats
+) -> Evidence:
+    """The evidence of every size, for other recordings of the device.
+
+    Parameters
+    ----------
+    sizes : Sizes
+    size : ndarray, shape (C,)
+        As other recordings know them.
+    log : ndarray, shape (C,)
+        The log evidence of each.
+    known : Around
+    there : ndarray, shape (C, P)
+        Where the parameters go with each.
+    """
     least_log = -1e3  # log evidence: less is as impossible
     before = known.log_prior(known.centre[None])
     with np.errstate(invalid="ignore"):  # outside of the support
         data = np.where(np.isfinite(log), log - known.log_prior(there) + before, -np.inf)
     log, data = np.maximum(log, least_log), np.maximum(data, least_log)
-    told = Evidence(size, sizes.shape, sizes.weight, log, data)
-    return Weighed(
-        suspect.name,
-        suspect.title,
-        suspect.family,
-        suspect.told_apart_by,
-        suspect.unseen.title,
-        unit_of(suspect.unseen.dimension, suspect.base.force_unit, suspect.base.position_unit),
-        suspect.place,
-        suspect.shared,
-        suspect.share,
-        evidence,
-        pareto_k(log_weight[possible]) if possible.sum() > 50 else np.inf,
-        sizes.strength[cells][kept],
-        factor,
-        changes[cells[kept[::PAIRED]]],
-        size[cells][kept],
-        sizes.shape[cells][kept],
-        None if excluded or not suspect.shared else told,
-    )
+    return Evidence(size, sizes.shape, sizes.weight, log, data)
 
 
 def _followed(suspect: Suspect, known: Around, own: Floats) -> tuple[Floats, Floats]:

@@ -13,8 +13,10 @@ from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats, Ints
 
-SHARED = 5  # mass, damping, dry friction, constant force, delay: the same in all pieces
-FORCES = [2, 3]  # of these dry friction and constant force
+# Mass, damping, dry friction, constant force, delay: the same in all pieces.
+NAMES = ("m", "b", "coulomb", "offset", "delay_s")
+SHARED = len(NAMES)
+FORCES = [NAMES.index("coulomb"), NAMES.index("offset")]
 _LARGEST = 10.0  # of the command's rms: no friction, and no constant force, is larger
 _LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.samples.tone import in_words
-from bayeshaptic.inference.time_domain.fit import NAMES
+from bayeshaptic.inference.time_domain.loop import NAMES
 from bayeshaptic.quantities import pure, quantity, scale
 from bayeshaptic.report.loop.motion_words import motion_words
 
