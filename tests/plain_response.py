@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.models.response.filtered import Filters, filtered
+from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_and_residues
 from bayeshaptic.models.response.sampled import from_poles, from_polynomials

@@ -9,7 +9,8 @@ from scipy.signal import chirp
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
-from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Following, one_period
+from bayeshaptic.diagnosis.periodic.period import one_period
+from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Following
 from bayeshaptic.numerics.extrapolation import Approach
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, Multisine, simulate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.models.response.filter import Filter
+from bayeshaptic.models.response.filters import Filter
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.types import Floats
 

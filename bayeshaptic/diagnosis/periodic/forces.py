@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from bayeshaptic.diagnosis.periodic.harmonic_balance import Basis
-from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Floats
+from bayeshaptic.diagnosis.periodic.joint import Basis
+from bayeshaptic.diagnosis.periodic.steady_motion import LOAD
 from bayeshaptic.effects.laws import fitted
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
 from bayeshaptic.models import Model
+from bayeshaptic.types import Floats
 
 _WHERE = {MOTOR: "at the motor", LOAD: "on the body", CONNECTION: "in the connection"}
 

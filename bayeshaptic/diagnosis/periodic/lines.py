@@ -17,8 +17,9 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.acceptance import needless
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
-from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, Basis, balance, promise
-from bayeshaptic.diagnosis.periodic.steady_motion import one_period, with_floor
+from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance, promise
+from bayeshaptic.diagnosis.periodic.joint import Basis
+from bayeshaptic.diagnosis.periodic.period import one_period, with_floor
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import (
     FIT,

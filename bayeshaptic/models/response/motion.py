@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.models.response.filtered import filtered
+from bayeshaptic.models.response.filters import filtered
 from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
@@ -87,7 +87,7 @@ def modal_motion(
     ndarray, shape (R, N * substeps)
         Real parts.
     """
-    from bayeshaptic.models.response.motion_kernel import driven_modes
+    from bayeshaptic.models.response.kernels.motion import driven_modes
 
     # After some steps of a period a mode is what is left of it, and what the two forces gave it.
     left, of_new, of_old = [np.ones_like(decay)], [np.zeros_like(new)], [np.zeros_like(old)]

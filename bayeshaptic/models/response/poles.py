@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink
-from bayeshaptic.models.response.filtered import Filters, filtered
+from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.transfer import transfer, transfer_with_link
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues

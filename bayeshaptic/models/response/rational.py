@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink
-from bayeshaptic.models.response.filtered import Filters, filtered
+from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.kernels.arrays import RationalArrays
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_of

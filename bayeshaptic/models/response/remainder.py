@@ -27,7 +27,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
-from bayeshaptic.models.response.filter import Filter
+from bayeshaptic.models.response.filters import Filter
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.rational import fastest_of
 from bayeshaptic.models.response.sampled import nodes_at

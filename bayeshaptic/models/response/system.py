@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
-from bayeshaptic.models.response.filter import Filter
-from bayeshaptic.models.response.filtered import filtered
+from bayeshaptic.models.response.filters import Filter, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_and_residues
 from bayeshaptic.models.response.rational import RationalArrays, rational_form, sampled_response

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.models.response.filtered import filtered
+from bayeshaptic.models.response.filters import filtered
 from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.models.response.transfer import transfer, transfer_with_link

@@ -1,9 +1,24 @@
-"""Rational factors in the loop."""
+"""Rational factors in the loop: actuators, sensors."""
 
 from __future__ import annotations
 
-from bayeshaptic.models.response.filter import Filter
+from dataclasses import dataclass
+
+from bayeshaptic.models.response.dynamic_link import Index
 from bayeshaptic.numerics.polynomial import Polynomial, multiply
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A rational factor in the loop: actuator, sensor.  Polynomials of shape (degree + 1, B)."""
+
+    numerator: Polynomial
+    denominator: Polynomial
+
+    def rows(self, index: Index) -> Filter:
+        """A part of the batch."""
+        return Filter(self.numerator[:, index], self.denominator[:, index])
+
 
 Filters = tuple[Filter, ...]
 
