@@ -10,17 +10,13 @@ from .devices import (
 from .devices import (
     load_device as load_device,
 )
+from .diagnosis.analyse import analyse as analyse
 from .diagnosis.analysis import (
     Analysis as Analysis,
 )
-from .diagnosis.analysis import (
-    analyse as analyse,
-)
+from .diagnosis.close_loop import close_loop as close_loop
 from .diagnosis.closed import (
     Closed as Closed,
-)
-from .diagnosis.closed import (
-    close_loop as close_loop,
 )
 from .diagnosis.options import (
     Options as Options,

@@ -26,7 +26,8 @@ from functools import partial
 
 import numpy as np
 
-from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig import Bench

@@ -32,7 +32,8 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from bayeshaptic.diagnosis.analysis import Analysis  # noqa: E402
-from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average  # noqa: E402
+from bayeshaptic.diagnosis.close_loop import close_loop, with_average  # noqa: E402
+from bayeshaptic.diagnosis.closed import Closed  # noqa: E402
 from bayeshaptic.diagnosis.hidden.average import Average  # noqa: E402
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior  # noqa: E402
 from bayeshaptic.diagnosis.hidden.weighed import Weighed  # noqa: E402

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.recording import Recording

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.numerics.spending import metered
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.rig import Bench, WhiteNoise, simulate

@@ -10,7 +10,8 @@ import pytest
 from fake_analysis import fake_analysis
 from linear_bench import RIGID, Device
 
-from bayeshaptic.diagnosis.closed import Closed, close_loop, with_average
+from bayeshaptic.diagnosis.close_loop import close_loop, with_average
+from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.hidden.average import average, looked_at
 from bayeshaptic.diagnosis.hidden.evidence import Evidence
 from bayeshaptic.diagnosis.hidden.forces import force_suspects, slope_of
@@ -254,7 +255,7 @@ def test_a_report_survives_its_average(
     def fail(*_: object) -> None:
         raise FloatingPointError("a draw is nowhere")
 
-    monkeypatch.setattr("bayeshaptic.diagnosis.closed.with_hidden", fail)
+    monkeypatch.setattr("bayeshaptic.diagnosis.close_loop.with_hidden", fail)
     found = with_average(replace(closed, analysis=exact), HiddenPrior(), Options())
     assert found.analysis.limit is exact.limit and found.analysis.hidden is None
     assert "a draw is nowhere" in found.analysis.notices[-1].text

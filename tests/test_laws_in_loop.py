@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_time_domain import GAINS, TRUTH, declared, in_loop, stepped
 
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop
 from bayeshaptic.diagnosis.feedback.lacking import with_laws

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from one_truth import check_page, numbers_of, page_of, words_only
 
-from bayeshaptic.diagnosis.analysis import analyse
-from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.analyse import analyse
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.loop import NAMES

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.base.begun import begin
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.feedback.other_valley import other_valley
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice

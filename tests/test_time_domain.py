@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from one_truth import check_page, page_of, words_only
 
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from bayeshaptic.diagnosis.analysis import NO_WITNESS, Analysis
+from bayeshaptic.diagnosis.analyse import NO_WITNESS
+from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import (

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.devices import Device, load_device
-from bayeshaptic.diagnosis.analysis import analyse
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.analyse import analyse
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.faq import explained
 from bayeshaptic.inference.saved.checkpoint import kept_until_done

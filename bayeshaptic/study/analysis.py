@@ -9,9 +9,9 @@ from typing import Any
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
-from bayeshaptic.diagnosis.analysis import analyse
+from bayeshaptic.diagnosis.analyse import analyse
 from bayeshaptic.diagnosis.base.asked import device_of
-from bayeshaptic.diagnosis.closed import close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.hidden.several import Together
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.result import Result

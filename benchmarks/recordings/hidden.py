@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.hidden.forces import force_suspects
 from bayeshaptic.diagnosis.hidden.regression import around
 from bayeshaptic.diagnosis.hidden.sizes import seen_of

@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.closed import Closed, close_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.headline import headline
 from benchmarks.strangers.draw import Case

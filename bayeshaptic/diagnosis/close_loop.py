@@ -1,0 +1,237 @@
+"""Closing the loop on one measurement: what the model lacks is found, added, and analysed again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayeshaptic.diagnosis.analyse import finish, without_sampling
+from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.diagnosis.base.asked import measurement_of
+from bayeshaptic.diagnosis.base.begun import Begun, fitted
+from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
+from bayeshaptic.diagnosis.base.opened import Opened, opened
+from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.feedback.explain import (
+    ForceExplained,
+    explain_force,
+    left_alone,
+    trace_force,
+)
+from bayeshaptic.diagnosis.feedback.other_valley import other_valley
+from bayeshaptic.diagnosis.hidden.hidden import with_hidden
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
+from bayeshaptic.diagnosis.options import Options, options_from
+from bayeshaptic.diagnosis.state import held_out_rms
+from bayeshaptic.diagnosis.traced import UNEXPLAINED
+from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
+from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.widening.law_error import with_law_error
+from bayeshaptic.diagnosis.widening.rest import with_rest
+from bayeshaptic.diagnosis.widening.rivals import with_rivals
+from bayeshaptic.errors import Notice
+from bayeshaptic.models import Model
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
+from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.threads import single_threaded
+
+
+@single_threaded
+def close_loop(
+    measurement: Recording | Etfe | str | Path,
+    model: str | Model = "auto",
+    options: Options | None = None,
+    **changes: Any,
+) -> Closed:
+    """Find what the model lacks, add it, and analyse again.
+
+    Parameters
+    ----------
+    measurement : Recording, Etfe or path
+    model : {"auto", "rigid", "free", "grasped"} or Model
+        With the option `modes` a chain of masses.
+    options : Options, optional
+    **changes
+        Single options by name, as in `bayeshaptic.analyse`.
+
+    Returns
+    -------
+    Closed
+
+    Raises
+    ------
+    InputError
+        Where the measurement cannot be used.
+    """
+    chosen = options_from(options, changes)
+    prior = HiddenPrior.from_table(chosen.effects)
+    found = opened(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
+    in_time = has_feedback(found.notices) or told_too_little(found.notices)
+    force = explain_force(found.etfe.recording) if in_time else None
+    if force is not None and (followed := _in_loop(found, force, chosen)) is not None:
+        return followed
+    begun = fitted(found, model, chosen.within(0.0, 0.5))
+    if force is not None or is_certain(begun.notices):
+        return _refused(begun, force, chosen)
+    began = time.perf_counter()
+    begun, traced = traced_as_of_the_loop(found, begun, model, chosen.within(0.05, 0.4))
+    tracing = time.perf_counter() - began
+    if traced.verdict == UNEXPLAINED and begun.etfe.through_reference:
+        one_mass = _one_mass_instead(measurement, begun, model, chosen)
+        if one_mass is not None:
+            return one_mass
+    changed = bool(traced.state.accepted)
+    state = traced.state
+    base = finish(
+        begun,
+        begun.etfe,
+        begun.fit,
+        chosen.within(0.4, 0.6),
+        small_risks=not changed,
+    )
+    analysis = base
+    if changed:
+        analysis = finish(
+            begun,
+            state.etfe,
+            state.fit,
+            chosen.within(0.6, 0.9),
+            witness=base.etfe_limit if state.etfe is begun.etfe else None,
+        )
+    limit, traced = with_rivals(analysis.limit, traced, chosen.seed)
+    limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
+    notices = analysis.notices + traced.notices
+    if state.etfe.through_reference:
+        notices += other_valley(state.fit, state.etfe, analysis.limit)
+    seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
+    wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
+    stated, louder = wide or analysis.posterior, analysis.noise_scale
+    wide = with_rest(stated, state.fit, traced, louder, chosen.seed) or wide
+    analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)
+    closed = Closed(base, analysis, traced, _error(base), _error(analysis))
+    return with_average(closed, prior, chosen) if chosen.hidden else closed
+
+
+def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:
+    """By the motion in its loop; None where it cannot be followed."""
+    analysis = analyse_in_loop(found, options.within(0.3, 0.95))
+    if analysis is None:
+        return None
+    traced = in_the_loop(trace_force(analysis.etfe, analysis.fit, force), analysis)
+    error = _limit_alone(analysis)
+    return Closed(analysis, analysis, traced, error, error, force)
+
+
+def _one_mass_instead(
+    measurement: Recording | Etfe | str | Path, begun: Begun, model: str | Model, options: Options
+) -> Closed | None:
+    """By the motion in its loop, where one mass and no linear effect is what a reference shows.
+
+    Through a reference the response is linear, and dry friction comes out as damping.  A mass that
+    is followed in time rubs; the result stands only where nothing speaks against it.
+    """
+    if begun.fit.model.name != "rigid":
+        return None
+    found = opened(measurement_of(measurement, model, options), "rigid", options)
+    force = explain_force(found.etfe.recording)
+    closed = None if force is None else _in_loop(found, force, options)
+    return None if closed is None or closed.verdict == UNEXPLAINED else closed
+
+
+def _refused(begun: Begun, force: ForceExplained | None, options: Options) -> Closed:
+    """Where feedback biases the response, and no motion can be followed: nothing is sampled.
+
+    Nothing is traced in the response either: whatever is found may be the controller.
+    """
+    analysis = without_sampling(begun, options)
+    traced = left_alone(begun.etfe, begun.fit, force)
+    error = _error(analysis)
+    return Closed(analysis, analysis, traced, error, error, force)
+
+
+def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed:
+    """With a limit that allows for what tests cannot see; as it is where nothing can be said.
+
+    Parameters
+    ----------
+    closed : Closed
+        Without.
+    prior : HiddenPrior
+    options : Options
+    """
+    analysis, traced = closed.analysis, closed.traced
+    if closed.force is not None or traced.verdict == UNEXPLAINED:
+        return closed
+    if not analysis.posterior.converged or analysis.noise_scale > 1:
+        return closed
+    began = time.perf_counter()
+    try:
+        found = with_hidden(
+            analysis.limit,
+            analysis.posterior,
+            analysis.etfe,
+            traced.after,
+            [effect.name for effect in traced.state.accepted],
+            prior,
+            options.seed,
+        )
+    except Exception as error:  # the declared limit stands, whatever happens to what is beside it
+        return replace(closed, analysis=_declared_alone(analysis, error))
+    if found is None:
+        return closed
+    seconds = {**analysis.seconds, "what could hide": time.perf_counter() - began}
+    analysis = replace(analysis, limit=found[0], hidden=found[1], seconds=seconds)
+    return replace(closed, analysis=analysis, after=_error(analysis))
+
+
+def _declared_alone(analysis: Analysis, error: Exception) -> Analysis:
+    text = (
+        f"What could hide was not found out ({type(error).__name__}: {error}): the limit is that "
+        "of the model if it is exact, with no allowance for effects too small to be seen. Please "
+        "report this with the recording."
+    )
+    return replace(analysis, notices=(*analysis.notices, Notice("warning", "hidden", text)))
+
+
+def _stages(
+    begun: Mapping[str, float],
+    tracing: float,
+    base: Mapping[str, float],
+    after: Mapping[str, float],
+) -> dict[str, float]:
+    """Every stage in its order with its time; of two samplings the declared model's comes first."""
+    stages = {**begun, "closing the loop": tracing}
+    if after is not base:
+        stages["the model as declared"] = sum(base.values()) - sum(begun.values())
+    return stages | {name: spent for name, spent in after.items() if name not in begun}
+
+
+def _error(analysis: Analysis) -> dict[str, Any]:
+    """How far the model is from the measurement."""
+    fit, etfe = analysis.fit, analysis.etfe
+    ratio = fit.response(etfe.frequency_hz) / etfe.value
+    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
+    own = analysis.etfe_limit.q50
+    with np.errstate(divide="ignore", invalid="ignore"):
+        db = 20 * np.log10(q50 / own) if own else None
+    return {
+        "weighted_rms": float(np.sqrt(fit.reduced_chi_square)),
+        "held_out_weighted_rms": held_out_rms(fit),
+        "gain_db_rms": float(np.sqrt(np.mean((20 * np.log10(np.abs(ratio))) ** 2))),
+        "phase_deg_rms": float(np.sqrt(np.mean(np.degrees(np.angle(ratio)) ** 2))),
+        "critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)},
+        "critical_stiffness_db": float(db) if db is not None and np.isfinite(db) else None,
+    }
+
+
+def _limit_alone(analysis: Analysis) -> dict[str, Any]:
+    """Of an analysis that is not of the response, the limit; the rest is missing."""
+    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
+    return {"critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)}}
