@@ -28,7 +28,7 @@ from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.state import held_out_rms
-from bayeshaptic.diagnosis.traced import UNEXPLAINED
+from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
@@ -87,36 +87,35 @@ def close_loop(
         one_mass = _one_mass_instead(measurement, begun, model, chosen)
         if one_mass is not None:
             return one_mass
-    changed = bool(traced.state.accepted)
-    state = traced.state
-    base = finish(
-        begun,
-        begun.etfe,
-        begun.fit,
-        chosen.within(0.4, 0.6),
-        small_risks=not changed,
-    )
+    closed = _before_and_after(begun, traced, tracing, chosen)
+    return with_average(closed, prior, chosen) if chosen.hidden else closed
+
+
+def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: Options) -> Closed:
+    """The base model analysed, and with what was found, widened by what that leaves open."""
+    state, seed = traced.state, options.seed
+    changed = bool(state.accepted)
+    base = finish(begun, begun.etfe, begun.fit, options.within(0.4, 0.6), small_risks=not changed)
     analysis = base
     if changed:
         analysis = finish(
             begun,
             state.etfe,
             state.fit,
-            chosen.within(0.6, 0.9),
+            options.within(0.6, 0.9),
             witness=base.etfe_limit if state.etfe is begun.etfe else None,
         )
-    limit, traced = with_rivals(analysis.limit, traced, chosen.seed)
-    limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
+    limit, traced = with_rivals(analysis.limit, traced, seed)
+    limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, seed)
     notices = analysis.notices + traced.notices
     if state.etfe.through_reference:
         notices += other_valley(state.fit, state.etfe, analysis.limit)
-    seconds = _stages(begun.seconds, tracing, base.seconds, analysis.seconds)
-    wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, chosen.seed)
+    seconds = _stages(begun.seconds, tracing_s, base.seconds, analysis.seconds)
+    wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, seed)
     stated, louder = wide or analysis.posterior, analysis.noise_scale
-    wide = with_rest(stated, state.fit, traced, louder, chosen.seed) or wide
+    wide = with_rest(stated, state.fit, traced, louder, seed) or wide
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)
-    closed = Closed(base, analysis, traced, _error(base), _error(analysis))
-    return with_average(closed, prior, chosen) if chosen.hidden else closed
+    return Closed(base, analysis, traced, _error(base), _error(analysis))
 
 
 def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:

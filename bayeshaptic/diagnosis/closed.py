@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bayeshaptic.diagnosis.analysis import Analysis, limit_line
-from bayeshaptic.diagnosis.feedback.explain import (
-    ForceExplained,
-)
+from bayeshaptic.diagnosis.feedback.explain import ForceExplained
 from bayeshaptic.diagnosis.state import Accepted
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.models import Model

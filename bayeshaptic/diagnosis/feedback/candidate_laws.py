@@ -11,11 +11,7 @@ import numpy as np
 from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
 from bayeshaptic.effects.laws import corrections
 from bayeshaptic.effects.nonlinear.drag import CubicDamping, Drag
-from bayeshaptic.effects.nonlinear.friction import (
-    DahlFriction,
-    RisingFriction,
-    StribeckFriction,
-)
+from bayeshaptic.effects.nonlinear.friction import DahlFriction, RisingFriction, StribeckFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.shapes import Usual
 from bayeshaptic.inference.time_domain.mass_forces import MassForces

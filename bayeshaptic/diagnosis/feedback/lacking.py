@@ -20,11 +20,7 @@ from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
 from bayeshaptic.diagnosis.feedback.unlike_one_mass import unlike_one_mass
 from bayeshaptic.effects.nonlinear.drag import Drag
-from bayeshaptic.effects.nonlinear.friction import (
-    DahlFriction,
-    RisingFriction,
-    StribeckFriction,
-)
+from bayeshaptic.effects.nonlinear.friction import DahlFriction, RisingFriction, StribeckFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import Usual

@@ -10,12 +10,7 @@ import numpy as np
 from bayeshaptic.effects.nonlinear.friction import FAINT_TO_STRONG, bodies, force_scale
 from bayeshaptic.effects.nonlinear.internal_force import Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
-from bayeshaptic.effects.nonlinear.shapes import (
-    LOAD_VELOCITY,
-    VELOCITY,
-    Shape,
-    Usual,
-)
+from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY, Shape, Usual
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
 

@@ -15,11 +15,7 @@ from bayeshaptic.recordings.response.band import refuse_band
 from bayeshaptic.recordings.response.estimators.periodic_excitation import estimate_periodic
 from bayeshaptic.recordings.response.estimators.random_excitation import estimate_random
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.spectra import (
-    JoinedSpectra,
-    PeriodicSpectra,
-    RandomSpectra,
-)
+from bayeshaptic.recordings.response.spectra import JoinedSpectra, PeriodicSpectra, RandomSpectra
 from bayeshaptic.recordings.signals.excitation import FEWEST_LINES
 from bayeshaptic.threads import single_threaded
 

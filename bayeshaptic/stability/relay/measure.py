@@ -30,10 +30,7 @@ from bayeshaptic.recordings.signals.switching import stretches
 from bayeshaptic.stability.relay.estimate import estimate, jackknife, oscillation_share
 from bayeshaptic.stability.relay.measurement import RelayMeasurement, relative_db
 from bayeshaptic.stability.relay.notices import LEAST_STEADY_S, notices_of, one_of_several
-from bayeshaptic.stability.relay.spectra import (
-    spectra_of,
-    steady_from,
-)
+from bayeshaptic.stability.relay.spectra import spectra_of, steady_from
 from bayeshaptic.types import Floats
 
 SEGMENT = 2048  # samples, where the recording is long enough

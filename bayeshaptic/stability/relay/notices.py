@@ -8,11 +8,7 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.stability.relay.measurement import RelayMeasurement
-from bayeshaptic.stability.relay.spectra import (
-    STEADY_DB,
-    STEADY_SHARE,
-    pieces,
-)
+from bayeshaptic.stability.relay.spectra import STEADY_DB, STEADY_SHARE, pieces
 from bayeshaptic.types import Floats
 
 SINUSOIDAL = 0.8  # share of the motion's variance that the oscillation has
