@@ -125,7 +125,7 @@ def is_unit(text: str) -> bool:
 
 
 def is_of_another_role(role: str, unit: str) -> bool:
-    """Whether a unit is known, and not one of this role: m/s is no position's, V anybody's."""
+    """Whether a unit is known, and is none of this role's: m/s is no position's, V no role's."""
     plain = _plain(unit)
     return plain not in _BY_ROLE[role] and any(plain in known for known in _BY_ROLE.values())
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
-_WORTH_NAMING = 0.001
+_WORTH_NAMING = 0.001  # probability from which a crossing that binds is named
 
 
 @dataclass(frozen=True)

@@ -152,7 +152,7 @@ def is_open(analysis: Analysis) -> bool:
     """Whether the limit's 90 % interval reaches below a tenth of its median.
 
     A rare crossing far below is no such case: its share of the draws is a probability.  So open was
-    one of 103 limits of strangers' recordings (docs/door.md).
+    one of 103 limits of recordings from another simulator (docs/door.md).
     """
     low, middle = (analysis.limit.quantile(p) for p in (0.05, 0.5))
     return bool(low * _OPEN < middle < math.inf)

@@ -17,11 +17,11 @@ from bayeshaptic.types import Complexes, Floats, Ints
 
 LOWEST = 1e-9  # as in `responses/grid.py`
 TOP = math.pi * (1 - 1e-7)
+# Points around a resonance: tangents of the angles that its phase has there.
 TANGENTS = tuple(math.tan(math.radians(a)) for a in (-88, -80, -60, -30, -8, 8, 30, 60, 80, 88))
-SHARPEST = 1e-8
-PER_TURN = 16
-DIP_POINTS = 17
-DIP_ROUNDS = 5
+SHARPEST = 1e-8  # half width of the sharpest resonance, over its frequency
+PER_TURN = 16  # points in a turn that the delay makes of the phase
+DIP_POINTS, DIP_ROUNDS = 17, 5  # of the search for two crossings between two points
 
 
 class Poles(NamedTuple):

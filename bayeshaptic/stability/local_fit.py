@@ -11,7 +11,7 @@ from scipy.special import digamma
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.types import Complexes, Floats
 
-_RICHER = 5
+_RICHER = 5  # degree of the polynomial that tells whether a window is too wide
 _SPANS = np.geomspace(0.6, 0.02, 14)  # half widths over the centre frequency, widest first
 _OUTLIER = 1.6  # share of its own noise variance that a window keeps at least: a tremor is a peak
 

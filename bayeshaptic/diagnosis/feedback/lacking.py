@@ -36,7 +36,7 @@ from bayeshaptic.types import Floats
 
 # Student's t of eight degrees of freedom: 1 in 1,000 for each of some twenty forces.  With `_WORTH`
 # a law joins in 3 of 200 loops with a force along the way that is no law, something speaks against
-# a limit in 4 (benchmarks/closed_loop.py); neither in any of 20 clean ones of strangers.
+# a limit in 4 (benchmarks/closed_loop.py); neither in any of 20 clean ones of benchmarks/strangers.
 _SEEN = 5.04
 # Of the error's power, that a force must take away: steps of a sample leave up to 0.08 of an error
 # as small as the encoder's to a law that has joined.
@@ -108,7 +108,7 @@ def with_laws(
 def _with_drag(
     recording: Recording, follower: Follower | None, alone: MotionFit
 ) -> list[tuple[MotionFit, str, Score]]:
-    """Begun with drag, where the inverse dynamics see it: far from it no score would."""
+    """A fit that begins with drag, where the inverse dynamics see it: its score alone would not."""
     name = "drag_2"
     try:
         found = inverse_dynamics(unbroken(recording), terms=("coulomb", name))

@@ -11,7 +11,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 
-_KNOTS = 6
+_KNOTS = 6  # of the change over log frequency
 SHAPES = {"a steady change": lambda t: t, "a change and back": lambda t: 1.5 * t**2 - 0.5}
 
 

@@ -17,8 +17,8 @@ from bayeshaptic.recordings.response.local_polynomial import leakage_terms
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
-_LINES, _FEWEST = 60, 5
-_TOGETHER = 3
+_LINES, _FEWEST = 60, 5  # lines in a stretch above the band, and stretches that tell a floor
+_TOGETHER = 3  # windows whose noise is averaged
 
 
 def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:

@@ -18,7 +18,7 @@ from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 
-_KNOTS = 16
+_KNOTS = 16  # of a smooth effect over log frequency
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from bayeshaptic.types import Bools, Floats
 _FROM_REST = 0.35
 # Of the runs of a position that was cut off; of noise up to 60 Hz half begin or end slowly.
 _MOST_RESTS = 0.75
-_QUIET = 0.5
+_QUIET = 0.5  # of the usual change from sample to sample: what a run on an extreme stays below
 
 
 def clipped(samples: Samples) -> tuple[Bools, float]:

@@ -12,7 +12,7 @@ from bayeshaptic.diagnosis.samples.prediction import Samples
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
 from bayeshaptic.types import Floats
 
-_BLOCK = 100
+_BLOCK = 100  # samples whose errors may be alike
 _FILTERS = (np.array([1.0]), np.array([1.0, 1.0]), np.array([1.0, -1.0]))
 
 

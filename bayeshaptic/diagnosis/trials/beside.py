@@ -5,7 +5,7 @@ without forces: they see little of a drag under friction, or of one that is as s
 frequency as a sweep makes it.  Here the motion is that with the forces, and everything that was
 fitted moves along.  Of fourteen free devices with one force none was given another; two held ones
 with a gap, of which part stays unexplained, both were given a friction.  Of 52 recordings of
-strangers without an internal force, eight of which stay unexplained, none is given one.
+benchmarks/strangers without one, eight of which stay unexplained, none is given one.
 """
 
 from __future__ import annotations

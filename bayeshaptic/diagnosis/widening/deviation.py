@@ -41,9 +41,9 @@ class Deviation:
         value, variance = self.value[order], self.variance[order]
         apart = np.abs(value[1:-1] - (value[:-2] + value[2:]) / 2) ** 2
         noise = variance[1:-1] + (variance[:-2] + variance[2:]) / 4
-        each, found = 1.5, 0.0  # of a variance of 1, in that difference
-        enough = 5  # rounds of weights
-        for _ in range(enough if len(apart) else 0):
+        each = 1.5  # what a variance of 1 in every window makes of that difference's: 1 + 2 / 4
+        found, rounds = 0.0, 5
+        for _ in range(rounds if len(apart) else 0):
             weight = 1 / (noise + each * found) ** 2
             found = max(float(np.average(apart - noise, weights=weight)) / each, 0.0)
         return found

@@ -16,8 +16,8 @@ from bayeshaptic.models.response.dynamic_link import Complexes, DynamicLink
 from bayeshaptic.recordings.response.etfe import Etfe
 
 _ENDS = (MASSES[MOTOR], MASSES[BODY])
-_SPECTRUM = 100.0
-_MOST = 0.33
+# The rates of relaxation span so much on either side of the usual one; the largest loss factor.
+_SPECTRUM, _MOST = 100.0, 0.33
 
 
 def lossy_stiffness(

@@ -21,7 +21,7 @@ _WARM_UP = (2, 2, 4, 4, 6, 6, 6, 6)  # steps a parameter in each round
 _IDLE = 2  # rounds without a gain
 _WARM, _FROZEN = 0.6, 0.75  # of the moves that are independent proposals; the others differences
 _MISSED = 2.0  # log of density over proposal, above the median, from which a place is missed
-_ARCHIVE = 4000
+_ARCHIVE = 4000  # places between which differences are taken
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.numerics.straightening import Straightening
 from bayeshaptic.types import Floats, LogDensity, Progress
 
-_FIRST_STEPS = 32
+_FIRST_STEPS = 32  # before chains are looked at for the first time
 _MIXED = 0.06  # effective draws a draw, an autocorrelation of 16 steps: below, a proposal is refit
 
 

@@ -19,7 +19,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Bools, Floats
 
 _LAGS = 3  # an integrator, a filter, and a difference
-_ROUNDS = 40
+_ROUNDS = 40  # of weights, the second half of them sharper
 _FITTED = 8000  # samples
 # Left over, relative to the command's second differences, where nothing changes: rounding.
 _EXACT = 1e-5

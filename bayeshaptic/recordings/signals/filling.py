@@ -15,7 +15,7 @@ from scipy.linalg import solveh_banded
 
 from bayeshaptic.types import Bools, Floats
 
-ORDER = 48
+ORDER = 48  # samples of the past
 
 
 @dataclass(frozen=True)

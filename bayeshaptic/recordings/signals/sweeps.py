@@ -9,8 +9,8 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
 # Counts of the encoder that a tone must move the device by: below, what rounding does to a motion
-# is as large as the motion, and no noise. Of 40 strangers' sweeps 31 of 32 intervals hold with it;
-# with ten counts, tried on thirteen, no more do.
+# is as large as the motion, and no noise. Of 40 sweeps of benchmarks/strangers 31 of 32 intervals
+# hold; with ten counts, tried on thirteen, no more do.
 FEWEST_COUNTS = 4
 _STRETCH_S = 0.1
 _FEWEST = 20  # samples of a stretch

@@ -9,7 +9,7 @@ from bayeshaptic.rig.dynamics.laws import Dahl, DryFriction
 from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
 from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 
-SHARE = 0.15
+SHARE = 0.15  # of the rms force: the friction of a usual case
 
 
 @register

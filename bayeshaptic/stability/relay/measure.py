@@ -9,7 +9,7 @@ period late, where a held stiffness is late by half a period, so it may settle a
 
     |phase + 180 degrees| <= 180 degrees * f T.
 
-Where the oscillation wanders in frequency (a hand sees to that), the dynamic stiffness U/Y around
+Where the oscillation wanders in frequency (as it does in a hand), the dynamic stiffness U/Y around
 it can be followed to the crossing; where it is locked to whole samples, it cannot, and the
 measurement says so.
 """

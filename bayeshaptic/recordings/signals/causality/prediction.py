@@ -17,14 +17,14 @@ from bayeshaptic.types import Bools, Floats, Ints
 # The other signal by differences over wider and wider spans: each coefficient more costs a share of
 # 1/samples of what can be seen.
 _SPANS = (1, 2, 3, 5, 8, 13, 21, 34, 55, 89)
-_BLOCKS = 40
+_BLOCKS = 40  # of samples, each a vote in the z of what is removed
 # Relative ridge, far below the floor, which keeps the normal equations of such signals solvable.
 _RIDGE = 1e-9
-_USUAL = 0.95
-_CUT = 2.0
+# What is larger than so many times the 95 % quantile of its size is cut off, or set to zero.
+_USUAL, _CUT = 0.95, 2.0
 # What is new in a signal that is predicted to the last digit is rounding.
 _DUST = 1e-12
-_LEADS = (0, 1, 3, 6)
+_LEADS = (0, 1, 3, 6)  # samples by which the other signal may be ahead
 _TINY = float(np.finfo(float).tiny)
 
 
