@@ -20,11 +20,11 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
-from bayeshaptic.alone import look_rarely
 from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.talk import complain
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import explained
+from bayeshaptic.own_process import collect_garbage_rarely
 from bayeshaptic.threads import one_thread_from_the_start
 from bayeshaptic.version import __version__
 
@@ -80,7 +80,7 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; never a traceback unless asked for."""
     one_thread_from_the_start()
-    look_rarely()
+    collect_garbage_rarely()
     parser = build_parser()
     arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
     if not hasattr(arguments, "run"):

@@ -81,9 +81,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the reports; 0 where all came out, else 1."""
     import json
 
-    from bayeshaptic.alone import leave_unread
+    from bayeshaptic.own_process import lighten_imports
 
-    leave_unread()  # before what loads SciPy
+    lighten_imports()  # before what loads SciPy
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.jobs.batch import run_batch
 

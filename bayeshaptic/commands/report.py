@@ -58,9 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; 0, or 1 where a recording of a study failed."""
-    from bayeshaptic.alone import leave_unread
+    from bayeshaptic.own_process import lighten_imports
 
-    leave_unread()  # before what loads SciPy
+    lighten_imports()  # before what loads SciPy
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.jobs.batch import report_source
     from bayeshaptic.jobs.job import Job

@@ -26,9 +26,9 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
-from bayeshaptic.alone import leave_unread, look_rarely
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import entry, explained
+from bayeshaptic.own_process import collect_garbage_rarely, lighten_imports
 from bayeshaptic.threads import THREADS
 from bayeshaptic.types import Executor, Work
 
@@ -235,7 +235,7 @@ def _local_dask(job: Work, items: Sequence[Any]) -> Iterator[Outcome]:
                 cluster.scale(usable_cores())
                 with distributed.Client(cluster, set_as_default=False) as client:
                     client.wait_for_workers(usable_cores())
-                    client.run(look_rarely)
+                    client.run(collect_garbage_rarely)
                 yield from _on_dask(cluster.scheduler_address, job, items)
             except BaseException:
                 log.disabled = True  # closing would wait for what they do, and tell who dies
@@ -275,8 +275,8 @@ def _attempt(job: Work, item: Any) -> Outcome:
 
 def _start_worker(parent: int) -> None:
     """Leave interrupts to the parent, and end with it however it ends."""
-    look_rarely()
-    leave_unread()
+    collect_garbage_rarely()
+    lighten_imports()
     warnings.showwarning = _in_one_line
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

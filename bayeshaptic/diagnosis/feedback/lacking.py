@@ -84,7 +84,7 @@ def with_laws(
     motion = fit_motion(recording, follower)
 
     def humming(hums: tuple[Hum, ...]) -> MotionFit | None:
-        return _again(recording, follower, motion.forces, motion.inside, hums)
+        return _refitted(recording, follower, motion.forces, motion.inside, hums)
 
     motion = with_tones(motion, recording, _WORTH, humming)
     seen: dict[str, Score] = {}
@@ -96,13 +96,13 @@ def with_laws(
         better = further + [
             (more, candidate.name, score)
             for candidate, score in _best_of_each(motion, recording, asked)
-            if (more := _with(motion, candidate, score, recording, follower)) is not None
+            if (more := _with_law(motion, candidate, score, recording, follower)) is not None
         ]
         if not better:
             break
         motion, name, seen[name] = min(better, key=lambda one: one[0].error_rms)
         further = []
-    return motion, _found(motion, seen), _against(motion, recording, path)
+    return motion, _found(motion, seen), _speaks_against(motion, recording, path)
 
 
 def _with_drag(
@@ -122,14 +122,14 @@ def _with_drag(
     start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[_DELAY]])
     start[_DELAY] = min(start[_DELAY], recording.period_s)
     dragged = MassForces(others=(Drag(MOTOR),), strengths=(strength,))
-    more = _again(recording, follower, dragged, start, alone.hums)
+    more = _refitted(recording, follower, dragged, start, alone.hums)
     if more is None:
         return []
     left = (more.error_rms / alone.error_rms) ** 2
     return [(more, Drag.name, Score(strength, sd, left))] if left < 1 - _WORTH else []
 
 
-def _with(
+def _with_law(
     motion: MotionFit,
     candidate: Candidate,
     score: Score,
@@ -139,14 +139,14 @@ def _with(
     """Fitted again with a law; None where that does not do what its score promised."""
     acting, dry = motion.forces.at(motion.numbers), float(motion.inside[_COULOMB])
     forces = candidate.joined(acting, dry, score.strength)
-    more = _again(recording, follower, forces, motion.inside, motion.hums)
+    more = _refitted(recording, follower, forces, motion.inside, motion.hums)
     if more is None or (more.error_rms / motion.error_rms) ** 2 > 1 - _WORTH:
         return None
     rubs = more.inside[_COULOMB] > np.sqrt(more.covariance[_COULOMB, _COULOMB])
     return more if rubs or candidate.name not in _DRY else None
 
 
-def _again(
+def _refitted(
     recording: Recording,
     follower: Follower | None,
     forces: MassForces,
@@ -183,7 +183,7 @@ def _best_of_each(
     return list(found.values())
 
 
-def _against(motion: MotionFit, recording: Recording, path: SmoothMotion) -> tuple[str, ...]:
+def _speaks_against(motion: MotionFit, recording: Recording, path: SmoothMotion) -> tuple[str, ...]:
     """What no limit of one mass goes with, where it is seen."""
     asked = list(unlike_one_mass(recording, path))
     scored = scores(motion, recording, [force for _, force in asked])

@@ -45,7 +45,7 @@ def held(samples: Samples) -> tuple[Bools, float]:
 
 
 def _obvious(position: Floats, fast: float) -> Bools:
-    """Runs of equal samples in the middle of a fast motion that goes on as if nothing had been."""
+    """Runs of equal samples in the middle of a fast motion that goes on as before."""
     steps = np.diff(position)
     still = np.concatenate([[False], steps == 0, [False]])
     edges = np.flatnonzero(np.diff(still.astype(np.int8)))

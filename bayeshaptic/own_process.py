@@ -1,6 +1,7 @@
-"""What processes that are ours alone leave undone: looking for garbage, rewriting docstrings.
+"""What the command line and its workers do without, in processes that nobody else uses.
 
-And importing what nobody asks for: SciPy's filters bring its statistics, splines and trees along.
+Frequent garbage collection, docstrings that libraries rewrite, and modules that they import for
+functions which no report calls.
 """
 
 from __future__ import annotations
@@ -16,16 +17,16 @@ from typing import Any
 _LATER = ("scipy.stats", "scipy.interpolate", "scipy.spatial", "scipy.optimize")
 
 
-def look_rarely() -> None:
-    """Look for objects that refer to each other in circles once in 50,000, and not in 700.
+def collect_garbage_rarely() -> None:
+    """Collect objects that refer to each other in circles every 50,000 objects, and not every 700.
 
-    A figure is thousands of them: the looking takes a fourteenth of a report.
+    A figure is thousands of objects: collecting takes a fourteenth of a report.
     """
     gc.set_threshold(50_000, 20, 20)
 
 
 @cache
-def leave_unread() -> None:
+def lighten_imports() -> None:
     """Have SciPy and matplotlib not rewrite their docstrings while they are imported.
 
     They do so for some 900 functions and classes, a sixteenth of a report.  What SciPy does without
