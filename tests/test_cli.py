@@ -11,7 +11,6 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,17 +25,16 @@ from bayeshaptic.commands import COMMANDS
 from bayeshaptic.commands.simulate import parse_effect
 from bayeshaptic.commands.talk import Talk
 from bayeshaptic.devices import device_names
-from bayeshaptic.diagnosis import analysis
+from bayeshaptic.diagnosis.analyse import analyse
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
-from bayeshaptic.jobs import batch, executors
+from bayeshaptic.jobs import batch
 from bayeshaptic.jobs import recording as recording_job
 from bayeshaptic.report import summary_json
 from bayeshaptic.report.headline import Headline
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.walls.section import table_of
 from bayeshaptic.study import analysis as study_analysis
-from bayeshaptic.types import Executor
 
 Run = Callable[..., tuple[int, str, str]]
 # The quickest analysis: two parameters, below the first mode.
@@ -78,10 +76,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         (folder / "report.html").write_text("<!DOCTYPE html>")
         return folder / "report.html"
 
-    monkeypatch.setattr(recording_job, "analyse", partial(analysis.analyse, ess=50))
-    monkeypatch.setattr(
-        study_analysis, "analyse", lambda *a, **b: analysis.analyse(*a, **b | {"ess": 50})
-    )
+    monkeypatch.setattr(recording_job, "analyse", partial(analyse, ess=50))
+    monkeypatch.setattr(study_analysis, "analyse", lambda *a, **b: analyse(*a, **b | {"ess": 50}))
     monkeypatch.setattr(
         "bayeshaptic.report.study.write.table_of",
         partial(table_of, draws=60),
@@ -600,64 +596,7 @@ def test_what_is_said_of_each_recording(capsys: pytest.CaptureFixture[str]) -> N
     ]
 
 
-# --- batch: executors ---------------------------------------------------------------------------
-
-
-def double_or_fail(number: int) -> int:
-    if number < 0:
-        raise InputError(f"{number} is negative")
-    return 2 * number
-
-
-def die_at_first(mark: Path) -> str:
-    if mark.name == "1" and not mark.exists():
-        mark.touch()
-        os._exit(1)
-    return "done"
-
-
-def die(_: int) -> None:
-    os._exit(3)
-
-
-def outcomes(executor: Executor, job: Any, items: list[int]) -> dict[int, Any]:
-    return {one.item: (one.result, one.error) for one in executor(job, items)}
-
-
-EXPECTED = {1: (2, None), -2: (None, "-2 is negative"), 3: (6, None)}
-
-
-def test_jobs_in_this_process() -> None:
-    assert outcomes(executors.serial, double_or_fail, [1, -2, 3]) == EXPECTED
-
-
-def test_jobs_in_processes() -> None:
-    assert outcomes(executors.processes(2), double_or_fail, [1, -2, 3]) == EXPECTED
-
-
-def test_a_worker_that_dies_is_a_failure_and_not_a_hang() -> None:
-    ended = outcomes(executors.processes(2), die, [1, 2])
-    assert set(ended) == {1, 2}
-    assert all(result is None and "died" in error for result, error in ended.values())
-
-
-def test_a_worker_that_dies_takes_nobody_with_it(tmp_path: Path) -> None:
-    ended = outcomes(executors.processes(2), die_at_first, [tmp_path / str(i) for i in range(5)])
-    assert {result for result, _ in ended.values()} == {"done"}
-
-
-def test_jobs_in_a_pool_of_ones_own() -> None:
-    with ThreadPoolExecutor(2) as pool:
-        assert outcomes(executors.futures(pool), double_or_fail, [1, -2, 3]) == EXPECTED
-
-
-def test_jobs_on_a_dask_cluster() -> None:
-    distributed = pytest.importorskip("distributed", reason="the dask extra is not installed")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
-    ) as cluster:
-        executor = executors.dask(cluster.scheduler_address)
-        assert outcomes(executor, double_or_fail, [1, -2, 3]) == EXPECTED
+# --- batch -------------------------------------------------------------------------------------
 
 
 def test_no_dask_scheduler_is_one_line(run: Run, tmp_path: Path) -> None:

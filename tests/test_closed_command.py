@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from bayeshaptic import cli
-from bayeshaptic.diagnosis import closed
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.jobs import recording as recording_job
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
@@ -20,7 +20,7 @@ FRICTION = {"coulomb_friction", "stribeck_friction", "dahl_friction"}
 @pytest.fixture
 def report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """`bayeshaptic report` with few draws; the page's text and the summary."""
-    monkeypatch.setattr(recording_job, "close_loop", partial(closed.close_loop, ess=300))
+    monkeypatch.setattr(recording_job, "close_loop", partial(close_loop, ess=300))
 
     def call(name: str, *options: str) -> tuple[str, dict[str, Any]]:
         out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""The report: numbers as people write them, the sentence, the figures, the page, the files."""
+"""The report: the sentence, the words, the page, the files."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import hashlib
 import html
 import json
 import re
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,15 +18,11 @@ from fake_analysis import CASES, FEEDBACK, fake_analysis, fake_closed
 
 import bayeshaptic
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.quantities import estimate, interval, percent, quantity, scale
 from bayeshaptic.report import write, write_report
 from bayeshaptic.report.figures import PICTURES, draw_pictures
-from bayeshaptic.report.figures.pairs import correlation, strongest
-from bayeshaptic.report.figures.sampler import rank_histogram
-from bayeshaptic.report.figures.style import Drawn, drawn
+from bayeshaptic.report.figures.style import Drawn
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import least_squares_limit, witnesses
-from bayeshaptic.report.numbers.octaves import third_octaves
 from bayeshaptic.report.page.answer import FARED, FARED_HIDDEN
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.methods import bibtex, methods
@@ -40,61 +34,6 @@ WALLS = ("limits_curve", "limits_kb", "guidance_shares", "guidance_sweeps")
 NAMES = (*(picture.name for picture in PICTURES), *WALLS)
 TABLES = {"summary.json", "limits.json", "limits.csv"}
 FILES = {"report.html", "posterior.nc", *TABLES, *(f"{name}.png" for name in NAMES)}
-
-
-# ---- quantities
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "sd", "text"),
-    [
-        (22_145.0, "N/m", 130.0, "22.14 kN/m"),
-        (22_145.0, "N/m", None, "22.1 kN/m"),
-        (8.5e-4, "kg m^2", 3e-6, "0.8500 g m²"),
-        (0.19, "kg", 4e-4, "0.19000 kg"),
-        (200e-6, "s", 1e-6, "200.0 µs"),
-        (0.0084, "N m s/rad", 0.001, "8.4 mN m s/rad"),
-        (999.7, "N/m", None, "1.00 kN/m"),
-        (13.2, "A/rad", 0.3, "13.20 A/rad"),
-        (-3.0, "dB", 0.1, "−3.00 dB"),
-        (102.84, "Hz", 0.2, "102.84 Hz"),
-        (0.09998, "N m", None, "0.100 N m"),
-        (0.0, "N s/m", 0.3, "0.00 N s/m"),
-        (1.0, "", None, "1.00"),
-        (float("inf"), "N/m", None, "–"),
-        (None, "N/m", None, "–"),
-    ],
-)
-def test_a_quantity_reads_well(value: float | None, unit: str, sd: float | None, text: str) -> None:
-    assert quantity(value, unit, sd) == text
-
-
-def test_an_interval_has_one_unit_and_no_more_digits_than_it_can_bear() -> None:
-    assert interval(21_912.3, 22_391.9, "N/m") == "21.91 to 22.39 kN/m"
-    assert interval(22_246.11, 22_246.13, "N/m") == "22.246 to 22.246 kN/m"
-    assert estimate(22_330.0, 21_910.0, 22_690.0, "N/m") == "22.33 (21.91 to 22.69) kN/m"
-    assert interval(None, 1.0, "N/m") == "–"
-
-
-def test_percentages_are_never_rounded_to_certainty() -> None:
-    assert [percent(p) for p in (0.05, 0.01, 0.001, 0.34, 0.9996, 1e-5)] == [
-        "5 %",
-        "1 %",
-        "0.1 %",
-        "34 %",
-        "over 99 %",
-        "under 0.1 %",
-    ]
-
-
-def test_a_zero_without_an_error_is_a_zero() -> None:
-    """A damper at its bound, in what a fit prints."""
-    assert scale(0.0, "N s/m").with_error(0.0, float("nan")) == "0"
-
-
-def test_a_row_has_one_scale() -> None:
-    row = scale([950.0, 12_000.0], "N/m")
-    assert [row.number(v, 30.0) for v in (950.0, 12_000.0)] == ["0.950", "12.000"]
 
 
 # ---- the sentence
@@ -253,99 +192,6 @@ def test_witnesses_stand_side_by_side() -> None:
     silent = fake_analysis("rigid", etfe_limit=False)
     assert "etfe" not in {witness.key for witness in witnesses(silent)}
     assert "does not reach" in agreement(silent)
-
-
-# ---- what the figures compute
-
-
-def test_third_octaves_hold_pure_noise() -> None:
-    rng = np.random.default_rng(1)
-    frequency = np.geomspace(1.0, 300.0, 20_000)
-    residual = (rng.normal(size=20_000) + 1j * rng.normal(size=20_000)) / np.sqrt(2)
-    bands = third_octaves(frequency, residual)
-    outside = np.mean((bands.rms < bands.low) | (bands.rms > bands.high))
-    assert len(bands.rms) == 25
-    assert outside <= 2 / 25  # 1 % expected
-    assert np.all(np.diff(bands.frequency_hz) > 0)
-    doubled = third_octaves(frequency, 2 * residual)
-    np.testing.assert_allclose(doubled.rms, 2 * bands.rms)
-
-
-def test_ranks_are_flat_for_ensembles_of_one_density_only() -> None:
-    rng = np.random.default_rng(2)
-    chains = rng.normal(size=(4, 500, 32))
-    flat = rank_histogram(chains)
-    np.testing.assert_allclose(flat.mean(axis=1), 1.0)
-    assert np.abs(flat - 1).max() < 5 * np.sqrt(20 / 16_000)  # 5 sd of a share of 1/20
-    chains[0] += 1.0
-    assert rank_histogram(chains)[0, -1] > 1.5
-
-
-def test_the_strongest_pairs_are_shown() -> None:
-    rng = np.random.default_rng(3)
-    draws = rng.normal(size=(4000, 9))
-    draws[:, 7] = draws[:, 2] + 0.1 * rng.normal(size=4000)
-    draws[:, 4] = np.exp(-draws[:, 8]) * (1 + 0.01 * rng.normal(size=4000))
-    matrix = correlation(draws)
-    assert matrix[2, 7] > 0.98 and matrix[4, 8] < -0.98
-    assert strongest(matrix, 4) == [2, 4, 7, 8]
-    assert strongest(correlation(draws[:, :2])) == [0, 1]
-
-
-# ---- the figures as pictures
-
-
-@pytest.fixture
-def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
-    """Place and words of every text that matplotlib draws, as it is drawn."""
-    from matplotlib.text import Text
-
-    drawn: list[Any] = []
-    original = Text.draw
-
-    def draw(self: Any, renderer: Any, *rest: Any, **named: Any) -> Any:
-        if self.get_visible() and self.get_text().strip():
-            drawn.append((self.get_window_extent(), self.get_text()))
-        return original(self, renderer, *rest, **named)
-
-    monkeypatch.setattr(Text, "draw", draw)
-    yield drawn
-
-
-@pytest.mark.parametrize("case", ["grasped", "wide", "amperes", "table"])
-def test_no_text_of_a_figure_covers_another_or_is_cut_off(
-    case: str, drawn_texts: list[Any]
-) -> None:
-    analysis = fake_analysis(**CASES[case])
-    for picture in (picture for picture in PICTURES if picture.shown(analysis)):
-        figure = picture.draw(analysis)
-        drawn_texts.clear()
-        figure.canvas.draw()
-        boxes = list(drawn_texts)
-        assert sum(1 + text.count("\n") for _, text in boxes) > 10, picture.name
-        canvas = figure.bbox
-        for index, (box, text) in enumerate(boxes):
-            inside = (
-                box.x0 > canvas.x0 - 1
-                and box.y0 > canvas.y0 - 1
-                and box.x1 < canvas.x1 + 1
-                and box.y1 < canvas.y1 + 1
-            )
-            assert inside, (picture.name, text)
-            for other, words in boxes[index + 1 :]:
-                wide = min(box.x1, other.x1) - max(box.x0, other.x0)
-                high = min(box.y1, other.y1) - max(box.y0, other.y0)
-                assert wide < 1.5 or high < 1.5, (picture.name, text, words)
-
-
-def test_figures_are_the_same_in_threads_and_need_no_display() -> None:
-    analysis = fake_analysis("rigid")
-    few = [picture for picture in PICTURES if picture.name in ("stiffness", "response", "pairs")]
-    alone = [drawn(picture.draw(analysis), picture.name) for picture in few]
-    with ThreadPoolExecutor(2) as pool:
-        together = list(pool.map(lambda p: drawn(p.draw(analysis), p.name), 2 * few))
-    assert alone + alone == together
-    assert all(picture.png.startswith(b"\x89PNG") for picture in alone)
 
 
 # ---- the files

@@ -128,7 +128,7 @@ def test_no_test_reads_rounding_where_a_force_has_two_levels() -> None:
     assert cubed.force is not None and cubed.force.sd == 0.0
 
 
-def test_what_says_enough_is_not() -> None:
+def test_what_says_enough_is_not_refused() -> None:
     multisine = Multisine(0.1, 1.0, 100.0, 1.0, 2)
     for excitation in (noise(3.0), multisine, np.sign(noise())):
         refuse_too_little(recorded(excitation))

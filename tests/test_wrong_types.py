@@ -138,5 +138,5 @@ def test_the_line_says_what_to_give(call: Callable[[], Any], words: str) -> None
         partial(bh.recording_from_arrays, [1, 2] * 9, [3, 4] * 9, 1e-3),
     ],
 )
-def test_what_is_alike_will_do(call: Callable[[], Any]) -> None:
-    call()
+def test_numbers_and_lists_of_like_types_are_taken(call: Callable[[], Any]) -> None:
+    assert call() is not None

@@ -1,0 +1,153 @@
+"""Which columns of a file are read, and in which units."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from csv_signals import FORCE, MAPPING, POSITION, SIGNALS, write_csv
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.recordings import read_recording
+from bayeshaptic.recordings.columns import parse_columns
+
+
+def test_a_force_that_is_called_volts(tmp_path: Path) -> None:
+    write_csv(tmp_path / "a.csv", "t,u_V,q")
+    mapping = "time=t,force=u_V{},position=q"
+    notices = read_recording(tmp_path / "a.csv", mapping.format("")).notices
+    assert [n.level for n in notices if "'u_V', says volts" in n.text] == ["warning"]
+    for term in ("*0.3[N]", "*0.3", "[N]"):
+        notices = read_recording(tmp_path / "a.csv", mapping.format(term)).notices
+        assert not any(n.level == "warning" for n in notices)
+
+
+COLUMN_TERMS = {
+    "u": ("u", 1.0, None),
+    "u*35.15[N]": ("u", 35.15, "N"),
+    "u * -1": ("u", -1.0, None),
+    "u/1e3 [mm]": ("u", 1e-3, "mm"),
+    "u[rad]": ("u", 1.0, "rad"),
+    "a b*2": ("a b", 2.0, None),
+    "a/b*.5": ("a/b", 0.5, None),
+}
+
+
+@pytest.mark.parametrize("term", COLUMN_TERMS)
+def test_terms_of_the_mapping(term: str) -> None:
+    column = parse_columns(f"force={term}")["force"]
+    name, factor, unit = COLUMN_TERMS[term]
+    assert (column.names[-1], column.unit) == (name, unit)
+    assert column.factors[-1] == pytest.approx(factor)
+
+
+WRONG_COLUMNS = {
+    "forse=u": r"'forse' is none of time, force.*did you mean 'force'",
+    "u": "'u' is none of",
+    "force": "'force' has no name",
+    "force=u,force=v": "'force' is given twice",
+    "force=u*0": "other than zero",
+    "force=u,position=q[inch],time=t": "'inch' is no unit of position: use m, mm",
+    "force=u[V],position=q,time=t": "multiply other units by the force constant",
+    "force=u,position=qq,time=t": "did you mean 'q'",
+}
+
+
+@pytest.mark.parametrize("columns", WRONG_COLUMNS)
+def test_wrong_mappings(tmp_path: Path, columns: str) -> None:
+    write_csv(tmp_path / "a.csv")
+    with pytest.raises(InputError, match=WRONG_COLUMNS[columns]):
+        read_recording(tmp_path / "a.csv", columns)
+
+
+def test_units_and_what_they_are_taken_to_be(tmp_path: Path) -> None:
+    write_csv(tmp_path / "a.csv")
+
+    def units(columns: str, kind: str | None = None) -> tuple[str, str]:
+        recording = read_recording(tmp_path / "a.csv", columns, kind=kind)
+        return recording.force_unit, recording.position_unit
+
+    assert units(MAPPING) == ("N", "m")
+    assert units(MAPPING, "rotational") == ("Nm", "rad")
+    assert units("time=t,force=u,position=q[deg]") == ("Nm", "rad")
+    assert units("time=t,force=u[N m],position=q") == ("Nm", "rad")
+    assert units("time=t,force=u[A],position=q") == ("A", "m")
+    write_csv(tmp_path / "a.csv", "t,tau_cmd,theta")
+    assert units("time=t,force=tau_cmd,position=theta") == ("Nm", "rad")
+    assert units("time=t,force=tau_cmd,position=theta", "translational") == ("N", "m")
+    write_csv(tmp_path / "a.csv", "t,force,theta")  # they contradict each other
+    assert units("time=t,force=force,position=theta") == ("N", "m")
+    write_csv(tmp_path / "a.csv")
+    (note,) = read_recording(tmp_path / "a.csv", MAPPING).notices
+    assert note.level == "note"
+    assert "taken to be in N, the position in m" in note.text
+    turned = read_recording(tmp_path / "a.csv", {"time": "t", "force": "u", "position": "q[deg]"})
+    np.testing.assert_allclose(turned.position, POSITION * math.pi / 180)
+
+
+@pytest.mark.parametrize(
+    ("time", "force", "position", "factors", "units"),
+    [
+        ("t_ms", "cmd_mNm", "theta_deg", (1e-3, 1e-3, np.pi / 180), ("Nm", "rad")),
+        ("t", "u", "Angle_Deg", (1, 1, np.pi / 180), ("Nm", "rad")),
+        ("t_s", "force_n", "x_um", (1, 1, 1e-6), ("N", "m")),
+        ("t", "iq_A", "pos mm", (1, 1, 1e-3), ("A", "m")),
+        ("t_us*1e-6", "iq_A*2", "x_mm*0.001", (1e-6, 2, 1e-3), ("N", "m")),
+        ("t", "tau_m", "theta_m", (1, 1, 1), ("Nm", "rad")),  # of the motor
+        ("t", "u_a", "Channel A", (1, 1, 1), ("N", "m")),
+        ("t", "u", "theta_deg[mrad]", (1, 1, 1e-3), ("Nm", "rad")),
+    ],
+)
+def test_a_name_that_ends_in_a_unit_is_read_in_it(
+    tmp_path: Path,
+    time: str,
+    force: str,
+    position: str,
+    factors: tuple[float, ...],
+    units: tuple[str, str],
+) -> None:
+    path = tmp_path / "a.csv"
+    names = [name.split("*")[0].split("[")[0] for name in (time, force, position)]
+    columns = np.column_stack([SIGNALS["t"] / factors[0], FORCE, POSITION])
+    np.savetxt(path, columns, header=",".join(names), comments="", delimiter=",")
+    recording = read_recording(path, f"time={time},force={force},position={position}")
+    assert recording.period_s == pytest.approx(SIGNALS["t"][1] - SIGNALS["t"][0])
+    np.testing.assert_allclose(recording.force, factors[1] * FORCE)
+    np.testing.assert_allclose(recording.position, factors[2] * POSITION)
+    assert (recording.force_unit, recording.position_unit) == units
+
+
+def test_the_note_says_that_a_unit_is_by_the_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_csv(path, "t,u,theta_deg")
+    (note,) = read_recording(path, "time=t,force=u,position=theta_deg").notices
+    assert "the position 'theta_deg' in deg" in note.text
+    assert "the force, which is taken to be in Nm" in note.text
+    assert not read_recording(path, "time=t,force=u[Nm],position=theta_deg[deg]").notices
+    with pytest.raises(InputError, match=r"multiplied by 2; .* position=...\*2\[deg\]"):
+        read_recording(path, "time=t,force=u,position=theta_deg*2")
+
+
+def test_units_in_headers(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    np.savetxt(
+        path,
+        np.column_stack(list(SIGNALS.values())),
+        header="t,Force (kN),Position (mm)",
+        comments="",
+        delimiter=",",
+    )
+    for force in ("Force", "Force (kN)", "Force[kN]"):
+        recording = read_recording(path, f"time=t,force={force},position=Position (mm)")
+        np.testing.assert_allclose(recording.force, 1e3 * FORCE)
+        np.testing.assert_allclose(recording.position, 1e-3 * POSITION)
+    turned = read_recording(path, "time=t,force=Force*-1,position=Position[m]")
+    np.testing.assert_allclose(turned.force, -1e3 * FORCE)
+    np.testing.assert_allclose(turned.position, POSITION)
+    with pytest.raises(InputError, match=r"multiplied by 2; write which unit that gives"):
+        read_recording(path, "time=t,force=Force*2,position=Position")
+    write_csv(path, "Time (s),Force (V),Position (mm)")
+    with pytest.raises(InputError, match="'V' is no unit of force.*multiply"):
+        read_recording(path)

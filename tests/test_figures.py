@@ -1,0 +1,104 @@
+"""The figures of a report: what they compute, and that their texts can be read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_analysis import CASES, fake_analysis
+
+from bayeshaptic.report.figures import PICTURES
+from bayeshaptic.report.figures.pairs import correlation, strongest
+from bayeshaptic.report.figures.sampler import rank_histogram
+from bayeshaptic.report.figures.style import drawn
+from bayeshaptic.report.numbers.octaves import third_octaves
+
+
+def test_third_octaves_hold_pure_noise() -> None:
+    rng = np.random.default_rng(1)
+    frequency = np.geomspace(1.0, 300.0, 20_000)
+    residual = (rng.normal(size=20_000) + 1j * rng.normal(size=20_000)) / np.sqrt(2)
+    bands = third_octaves(frequency, residual)
+    outside = np.mean((bands.rms < bands.low) | (bands.rms > bands.high))
+    assert len(bands.rms) == 25
+    assert outside <= 2 / 25  # 1 % expected
+    assert np.all(np.diff(bands.frequency_hz) > 0)
+    doubled = third_octaves(frequency, 2 * residual)
+    np.testing.assert_allclose(doubled.rms, 2 * bands.rms)
+
+
+def test_ranks_are_flat_for_ensembles_of_one_density_only() -> None:
+    rng = np.random.default_rng(2)
+    chains = rng.normal(size=(4, 500, 32))
+    flat = rank_histogram(chains)
+    np.testing.assert_allclose(flat.mean(axis=1), 1.0)
+    assert np.abs(flat - 1).max() < 5 * np.sqrt(20 / 16_000)  # 5 sd of a share of 1/20
+    chains[0] += 1.0
+    assert rank_histogram(chains)[0, -1] > 1.5
+
+
+def test_the_strongest_pairs_are_shown() -> None:
+    rng = np.random.default_rng(3)
+    draws = rng.normal(size=(4000, 9))
+    draws[:, 7] = draws[:, 2] + 0.1 * rng.normal(size=4000)
+    draws[:, 4] = np.exp(-draws[:, 8]) * (1 + 0.01 * rng.normal(size=4000))
+    matrix = correlation(draws)
+    assert matrix[2, 7] > 0.98 and matrix[4, 8] < -0.98
+    assert strongest(matrix, 4) == [2, 4, 7, 8]
+    assert strongest(correlation(draws[:, :2])) == [0, 1]
+
+
+@pytest.fixture
+def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
+    """Place and words of every text that matplotlib draws, as it is drawn."""
+    from matplotlib.text import Text
+
+    drawn: list[Any] = []
+    original = Text.draw
+
+    def draw(self: Any, renderer: Any, *rest: Any, **named: Any) -> Any:
+        if self.get_visible() and self.get_text().strip():
+            drawn.append((self.get_window_extent(), self.get_text()))
+        return original(self, renderer, *rest, **named)
+
+    monkeypatch.setattr(Text, "draw", draw)
+    yield drawn
+
+
+@pytest.mark.parametrize("case", ["grasped", "wide", "amperes", "table"])
+def test_no_text_of_a_figure_covers_another_or_is_cut_off(
+    case: str, drawn_texts: list[Any]
+) -> None:
+    analysis = fake_analysis(**CASES[case])
+    for picture in (picture for picture in PICTURES if picture.shown(analysis)):
+        figure = picture.draw(analysis)
+        drawn_texts.clear()
+        figure.canvas.draw()
+        boxes = list(drawn_texts)
+        assert sum(1 + text.count("\n") for _, text in boxes) > 10, picture.name
+        canvas = figure.bbox
+        for index, (box, text) in enumerate(boxes):
+            inside = (
+                box.x0 > canvas.x0 - 1
+                and box.y0 > canvas.y0 - 1
+                and box.x1 < canvas.x1 + 1
+                and box.y1 < canvas.y1 + 1
+            )
+            assert inside, (picture.name, text)
+            for other, words in boxes[index + 1 :]:
+                wide = min(box.x1, other.x1) - max(box.x0, other.x0)
+                high = min(box.y1, other.y1) - max(box.y0, other.y0)
+                assert wide < 1.5 or high < 1.5, (picture.name, text, words)
+
+
+def test_figures_are_the_same_in_threads_and_need_no_display() -> None:
+    analysis = fake_analysis("rigid")
+    few = [picture for picture in PICTURES if picture.name in ("stiffness", "response", "pairs")]
+    alone = [drawn(picture.draw(analysis), picture.name) for picture in few]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(lambda p: drawn(p.draw(analysis), p.name), 2 * few))
+    assert alone + alone == together
+    assert all(picture.png.startswith(b"\x89PNG") for picture in alone)
