@@ -20,7 +20,7 @@ print(float(stats.skew(x)), float(special.logsumexp(x)), linalg.expm(np.diag(x[:
 print(interpolate.CubicSpline(np.arange(60.0), x)(7.5).tolist(), fft.rfft(x)[3])
 print(elementwise.find_root(lambda t: t * t - 2, (0.0, 2.0)).x)
 """
-LEAVE = "from bayeshaptic.own_process import lighten_imports\nleave_unread()\n"
+LEAVE = "from bayeshaptic.own_process import lighten_imports\nlighten_imports()\n"
 ASK = """
 print("nperseg" in signal.welch.__doc__, "facecolor" in matplotlib.figure.Figure.set.__doc__)
 """
