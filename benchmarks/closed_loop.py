@@ -106,6 +106,29 @@ def gains(kind: str, mass: float, rng: np.random.Generator) -> tuple[float, ...]
     return mass * rate, spring, derivative, integral, keep
 
 
+@dataclass(frozen=True)
+class Along:
+    """Forces along the way, each a sum of waves: 0 as such, 1 and 2 of friction, both ways."""
+
+    number: Floats
+    phase: Floats
+    height: Floats
+
+    @classmethod
+    def drawn(cls, uneven: float, dry: float, stroke: float, rng: np.random.Generator) -> Along:
+        """Of size `uneven`, those of friction a quarter of `dry`; waves as long as the stroke."""
+        phase = rng.uniform(0, 2 * np.pi, (3, WAVES))
+        height = rng.standard_normal((3, WAVES)) / np.sqrt(np.arange(1, WAVES + 1))
+        height /= np.sqrt(np.sum(height**2, axis=1) / 2)[:, None]
+        rubs = 0.25 * dry * bool(uneven)
+        height *= np.array([uneven, rubs, rubs])[:, None]
+        return cls(0.7 * np.pi * np.arange(1, WAVES + 1) / stroke, phase, height)
+
+    def force(self, which: int, position: Floats | float) -> Floats:
+        at = np.asarray(position)[..., None] * self.number + self.phase[which]
+        return np.asarray(np.sum(self.height[which] * np.sin(at), axis=-1))
+
+
 def make(seed: int, noise: float | None = None) -> Case:
     """One recording; controllers and references in turn.
 
@@ -129,18 +152,8 @@ def make(seed: int, noise: float | None = None) -> Case:
     offset = rng.uniform(-0.1, 0.1) * size
     apart = rng.uniform(-0.3, 0.3) * dry if uneven else 0.0
     delay = rng.uniform(0, 2) * PERIOD_S
-    phase = rng.uniform(0, 2 * np.pi, (3, WAVES))
-    height = rng.standard_normal((3, WAVES)) / np.sqrt(np.arange(1, WAVES + 1))
-    height /= np.sqrt(np.sum(height**2, axis=1) / 2)[:, None]
-    height *= np.array([uneven, 0.25 * dry * bool(uneven), 0.25 * dry * bool(uneven)])[:, None]
-    number = 0.7 * np.pi * np.arange(1, WAVES + 1) / stroke
+    along = Along.drawn(uneven, dry, stroke, rng)
     slow = 0.02 * stroke * np.sqrt(spring / mass)
-
-    def along(which: int, position: Floats | float) -> Floats:
-        """Force along the way; 0: as such, 1 and 2: of friction, forward and backward."""
-        at = np.asarray(position)[..., None] * number + phase[which]
-        return np.asarray(np.sum(height[which] * np.sin(at), axis=-1))
-
     force = [offset]
     now = dict.fromkeys(("position", "velocity", "sum", "smooth"), 0.0)
 
@@ -151,8 +164,10 @@ def make(seed: int, noise: float | None = None) -> Case:
         now["sum"] += (wanted[k] - position) * PERIOD_S
         now["smooth"] = 0.8 * now["smooth"] + 0.2 * rate
         moving = float(np.clip(now["smooth"] / slow, -1, 1))
-        friction = float(along(1 if moving > 0 else 2, position))
-        force[0] = offset + float(along(0, position)) - moving * friction - abs(moving) * apart
+        friction = float(along.force(1 if moving > 0 else 2, position))
+        force[0] = (
+            offset + float(along.force(0, position)) - moving * friction - abs(moving) * apart
+        )
         force[0] += white[k]
         follow = spring * (wanted[k] - position)
         return float(follow - derivative * now["velocity"] + integral * now["sum"])
@@ -167,7 +182,7 @@ def make(seed: int, noise: float | None = None) -> Case:
         bench = bench.with_effect("coulomb_friction", force=dry)
     done = run_loop(bench, control, seconds, seed=seed, give_up=100 * stroke)
     way = np.linspace(done.position.min(), done.position.max(), 400)
-    mean, forward, backward = (float(along(which, way).mean()) for which in range(3))
+    mean, forward, backward = (float(along.force(which, way).mean()) for which in range(3))
     truth = np.array(
         [
             mass,

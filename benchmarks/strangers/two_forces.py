@@ -41,6 +41,36 @@ _SIZES = {
 }
 
 
+def numbers_of(
+    sizes: dict[str, float], scales: dict[str, float], rng: np.random.Generator
+) -> dict[str, float]:
+    """Numbers of the `Forces`, from the drawn sizes.
+
+    Parameters
+    ----------
+    sizes : dict
+        Of every part that was drawn.
+    scales : dict
+        Rms of the command, "force", and of the load's way and velocity, "far" and "speed"; and of
+        the device its "mass", "damping" and "stretch" under that force.
+    """
+    force, far, speed = scales["force"], scales["far"], scales["speed"]
+    units = {
+        "friction": ("friction", force),
+        "weak": ("friction", force),
+        "stribeck": ("friction", force),
+        "drag": ("drag", scales["damping"] / speed),
+        "cubed": ("cubed", scales["damping"] / speed**2),
+        "hardening": ("cubic", 1 / scales["stretch"] ** 2),
+        "grounded": ("grounded", scales["mass"] * (2 * np.pi) ** 2 / far**2),
+        "gap": ("gap", scales["stretch"]),
+    }
+    found = {units[part][0]: size * units[part][1] for part, size in sizes.items() if part in units}
+    if "stribeck" in sizes:
+        found |= {"sticking": float(rng.uniform(1.2, 2)), "stribeck_speed": 0.1 * speed}
+    return found
+
+
 def make(kind: str, seed: int) -> Case | None:
     """The recording of a seed; none where the device runs away."""
     rng = np.random.default_rng([78, seed])
@@ -81,22 +111,8 @@ def make(kind: str, seed: int) -> Case | None:
     if linear is None:
         return None
     far, speed, rms = linear.std(), np.diff(linear).std() / _PERIOD_S, force.std()
-    stretch = rms / kc
-    scales = {
-        "friction": ("friction", rms),
-        "weak": ("friction", rms),
-        "stribeck": ("friction", rms),
-        "drag": ("drag", (b1 + b2) / speed),
-        "cubed": ("cubed", (b1 + b2) / speed**2),
-        "hardening": ("cubic", 1 / stretch**2),
-        "grounded": ("grounded", m.sum() * (2 * np.pi) ** 2 / far**2),
-        "gap": ("gap", stretch),
-    }
-    numbers = {
-        scales[part][0]: size * scales[part][1] for part, size in sizes.items() if part in scales
-    }
-    if "stribeck" in sizes:
-        numbers |= {"sticking": float(rng.uniform(1.2, 2)), "stribeck_speed": 0.1 * speed}
+    own = {"mass": m.sum(), "damping": b1 + b2, "stretch": rms / kc}
+    numbers = numbers_of(sizes, {"force": rms, "far": far, "speed": speed, **own}, rng)
     made = motion.under(force, np.zeros(samples), Forces(spring=float(kc), **numbers))
     if made is None or np.abs(made).max() > 100 * far:
         return None
