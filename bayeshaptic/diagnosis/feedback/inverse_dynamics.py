@@ -217,7 +217,7 @@ def _moving(recording: Recording, low: _LowPass) -> Bools:
 def _asked_for(
     columns: Mapping[str, Floats], start: list[str], force: Floats, terms: tuple[str, ...]
 ) -> tuple[list[str], list[Addition], list[Addition]]:
-    """Exactly these beside the linear ones."""
+    """Exactly the terms that were asked for, beside the linear ones."""
     unknown = sorted(set(terms) - set(columns))
     if unknown:
         raise InputError(f"no term {', '.join(unknown)}; there are {', '.join(columns)}")

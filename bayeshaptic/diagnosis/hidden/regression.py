@@ -47,8 +47,8 @@ class Around:
     slope : ndarray, shape (N, P)
         Of the residuals there.
     root : ndarray, shape (F, P)
-        A root of the covariance, root' root, without the parameters that lean on a wall: these
-        stay where they are, so that no draw is pushed through the wall.
+        A root of the covariance, root' root, without the parameters close to an end of their
+        support: these stay where they are, so that no draw is pushed beyond it.
     pull : ndarray, shape (F, N)
         root J'.
     """
@@ -156,20 +156,20 @@ def around(posterior: Posterior, count: int, rng: np.random.Generator) -> Around
     left = residuals(centre[None])[0]
     slope = jacobian(residuals, centre[None])[0]
     curvature = _curvature(model, here, centre, phi.std(axis=0))
-    root = _root(slope, curvature, ~_leaning(model, here, phi))
+    root = _root(slope, curvature, ~_near_an_end(model, here, phi))
     nothing = np.zeros(len(draws))
     known = here, draws, phi, nothing, centre, left, slope, root, root @ slope.T
     found = Around(model, windows, *known)
     return replace(found, log_density=found.density(model, draws, phi))
 
 
-def _leaning(model: Model, here: Coordinates, phi: Floats) -> NDArray[np.bool_]:
-    """Which parameters lean on a wall, shape (P,)."""
+def _near_an_end(model: Model, here: Coordinates, phi: Floats) -> NDArray[np.bool_]:
+    """Which parameters lie close to the lower end of their support, shape (P,)."""
     ends = here.walls | np.array([isinstance(model.prior(n), NearZero) for n in model.names])
     with np.errstate(invalid="ignore"):
         room = phi.mean(axis=0) - here.low
-    leans = 3.0  # standard deviations from its wall, from where a parameter may be moved
-    return ends & (room < leans * phi.std(axis=0))
+    close = 3.0  # standard deviations from the end: further away a parameter may be moved
+    return ends & (room < close * phi.std(axis=0))
 
 
 def _root(slope: Floats, curvature: Floats, free: NDArray[np.bool_]) -> Floats:

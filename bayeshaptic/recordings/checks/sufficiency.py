@@ -36,8 +36,8 @@ FEWEST_TONES = 5
 # the force ever idle; the position stood still for 9 % at most, of a weak chirp for 23 %.
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
-# Where the motion usually goes so many counts sooner, a standstill is one that lasts no longer: one
-# of 20 samples at least, as a steady force that dry friction holds takes from steps of 50 ms. Of
+# A standstill lasts for 0.1 s, or for as long as the motion usually takes for so many counts where
+# that is shorter, 20 samples at least: dry friction holds a device at the end of steps of 50 ms. Of
 # 300 open loops under noise, multisines, sweeps and binary sequences none rests for over 22 % so;
 # of 60 under steps five are refused (two with 0.1 s alone), one of them without friction.
 _USUAL_COUNTS = 30.0
