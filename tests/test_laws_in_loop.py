@@ -10,9 +10,9 @@ import pytest
 from test_time_domain import GAINS, TRUTH, declared, in_loop, stepped
 
 from bayeshaptic.diagnosis.close_loop import close_loop
-from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
+from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower

@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.time_domain.days import between_pieces
+from bayeshaptic.inference.time_domain.between_pieces import between_pieces
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.loop import NAMES
 from bayeshaptic.inference.time_domain.uneven import Ridge

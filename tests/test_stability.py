@@ -24,7 +24,7 @@ from bayeshaptic.stability import (
 )
 from bayeshaptic.stability.binding import MODE, NEVER, RIGID, group_crossings
 from bayeshaptic.stability.crossings import search
-from bayeshaptic.stability.effective import effective_draws
+from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.responses.evaluated import EvaluatedResponse
 from bayeshaptic.stability.responses.response import pole_response
 

@@ -11,7 +11,7 @@ import pytest
 
 from bayeshaptic.diagnosis.base.begun import begin
 from bayeshaptic.diagnosis.close_loop import close_loop
-from bayeshaptic.diagnosis.feedback.other_valley import other_valley
+from bayeshaptic.diagnosis.feedback.mode_above_band import mode_above_band
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import summarise
@@ -217,7 +217,7 @@ def test_a_mode_among_few_windows_is_doubted_where_one_above_them_explains_as_mu
         windows = compress(etfe, partial(model.response, truth))
         fit = summarise(model, windows, polish(model, windows, theta))
         limit = critical_stiffness(fit.model, fit.theta * np.linspace(0.99, 1.01, 50)[:, None])
-        return other_valley(fit, etfe, limit)
+        return mode_above_band(fit, etfe, limit)
 
     assert not doubts(estimate_etfe(recording), truth)  # with the mode itself among 80 windows
     slow = estimate_etfe(recording, (1.0, 12.0))

@@ -23,7 +23,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import TableSpectra, compress
 from bayeshaptic.recordings.response.local_polynomial import NODES, interpolation, window_edges
-from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
+from bayeshaptic.recordings.response.window_reference import fit_local_rational, unit_mass
 
 PERIOD = 1e-3
 HIGHEST_HZ = 200.0

@@ -23,7 +23,7 @@ from bayeshaptic.diagnosis.feedback.explain import (
     left_alone,
     trace_force,
 )
-from bayeshaptic.diagnosis.feedback.other_valley import other_valley
+from bayeshaptic.diagnosis.feedback.mode_above_band import mode_above_band
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.options import Options, options_from
@@ -109,7 +109,7 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
     limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, seed)
     notices = analysis.notices + traced.notices
     if state.etfe.through_reference:
-        notices += other_valley(state.fit, state.etfe, analysis.limit)
+        notices += mode_above_band(state.fit, state.etfe, analysis.limit)
     seconds = _stages(begun.seconds, tracing_s, base.seconds, analysis.seconds)
     wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, seed)
     stated, louder = wide or analysis.posterior, analysis.noise_scale

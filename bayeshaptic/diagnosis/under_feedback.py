@@ -8,7 +8,6 @@ from dataclasses import replace
 from bayeshaptic.diagnosis.analyse import NO_WITNESS
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.opened import Opened
-from bayeshaptic.diagnosis.feedback.humming import tones_of
 from bayeshaptic.diagnosis.feedback.in_loop import (
     UNSEEN,
     contradictions,
@@ -16,9 +15,10 @@ from bayeshaptic.diagnosis.feedback.in_loop import (
     open_questions,
 )
 from bayeshaptic.diagnosis.feedback.lacking import Lacking
+from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.diagnosis.samples.tone import in_words
+from bayeshaptic.diagnosis.samples.sinusoids import in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.effects.measurement import MainsTone

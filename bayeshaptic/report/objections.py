@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
-from bayeshaptic.diagnosis.feedback.other_valley import VALLEY
+from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
 from bayeshaptic.diagnosis.residuals.columns import moved_besides
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables

@@ -15,7 +15,7 @@ from bayeshaptic.models.model import Model
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.draws import MOST_DRAWS
-from bayeshaptic.stability.effective import effective_draws
+from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.tail import low_quantile, quantiles
 from bayeshaptic.types import Floats, Ints
 

@@ -17,7 +17,7 @@ from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
 from bayeshaptic.stability.crossings import find_crossings, rational
 from bayeshaptic.stability.draws import vectors_of
-from bayeshaptic.stability.effective import effective_draws
+from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
 from bayeshaptic.stability.tail import LowQuantile, low_quantile, quantiles
 from bayeshaptic.threads import single_threaded

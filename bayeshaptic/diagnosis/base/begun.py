@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.base.asked import base_model
-from bayeshaptic.diagnosis.base.of_the_loop import as_of_the_loop, hardly_differ
+from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.choose import Choice, choose_model

@@ -12,8 +12,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from bayeshaptic.diagnosis.base.begun import Begun, refitted
+from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.loops_in_turn import Loops
-from bayeshaptic.diagnosis.base.of_the_loop import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced

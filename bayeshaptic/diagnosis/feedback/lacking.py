@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.diagnosis.feedback.candidate_laws import Candidate, candidate_laws
-from bayeshaptic.diagnosis.feedback.humming import with_tones
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
+from bayeshaptic.diagnosis.feedback.tones_in_motion import with_tones
 from bayeshaptic.diagnosis.feedback.unlike_one_mass import unlike_one_mass
 from bayeshaptic.effects.nonlinear.drag import Drag
 from bayeshaptic.effects.nonlinear.friction import DahlFriction, RisingFriction, StribeckFriction

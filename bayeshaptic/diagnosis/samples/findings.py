@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.samples.faults import Faults
 from bayeshaptic.diagnosis.samples.jitter import Jitter
 from bayeshaptic.diagnosis.samples.prediction import Bools
 from bayeshaptic.diagnosis.samples.resolution import Resolution
-from bayeshaptic.diagnosis.samples.tone import Tones, in_words
+from bayeshaptic.diagnosis.samples.sinusoids import Tones, in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.effects.measurement import (
     DroppedSamples,

@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.special import fdtrc
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.diagnosis.samples.tone import Tone, Tones
+from bayeshaptic.diagnosis.samples.sinusoids import Tone, Tones
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.local_polynomial import leakage_terms
 from bayeshaptic.recordings.response.windows import Reference

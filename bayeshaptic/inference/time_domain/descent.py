@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.days import between_pieces
+from bayeshaptic.inference.time_domain.between_pieces import between_pieces
 from bayeshaptic.inference.time_domain.loop import NAMES, Loop
 from bayeshaptic.inference.time_domain.one_way import one_way
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, ridge

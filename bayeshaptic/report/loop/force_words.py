@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.diagnosis.feedback.humming import tones_of
-from bayeshaptic.diagnosis.samples.tone import in_words
+from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
+from bayeshaptic.diagnosis.samples.sinusoids import in_words
 from bayeshaptic.inference.time_domain.loop import NAMES
 from bayeshaptic.quantities import pure, quantity, scale
 from bayeshaptic.report.loop.motion_words import motion_words

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
-from bayeshaptic.stability.effective import effective_draws
+from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.types import Floats
 
 

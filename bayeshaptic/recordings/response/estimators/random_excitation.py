@@ -18,8 +18,8 @@ from bayeshaptic.recordings.response.local_polynomial import (
     window_edges,
 )
 from bayeshaptic.recordings.response.points import Points
-from bayeshaptic.recordings.response.reference import fit_local_rational, unit_mass
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
+from bayeshaptic.recordings.response.window_reference import fit_local_rational, unit_mass
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.recordings.signals.raw_signals import clipping
 from bayeshaptic.recordings.signals.sweeps import FEWEST_COUNTS, moves_until

@@ -25,7 +25,7 @@ _LOADS = (0.15, 0.4)  # shares of the mass behind the connection
 _CHANCE = 0.999
 
 
-def other_valley(fit: Fit, etfe: Etfe, limit: CriticalStiffness) -> tuple[Notice, ...]:
+def mode_above_band(fit: Fit, etfe: Etfe, limit: CriticalStiffness) -> tuple[Notice, ...]:
     """A warning where a mode above the band explains as much, and the limit is another then.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.samples.tone import Tone
+from bayeshaptic.diagnosis.samples.sinusoids import Tone
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.loop import NAMES, Hum
