@@ -30,6 +30,9 @@ from bayeshaptic.types import Floats
 # reach the deepest need more than 15 steps: with 24 starts of 15 steps, one fit in 20 of a held
 # Phantom without a device file ended in another valley.
 _KEPT_STARTS, _STEPS_TO_A_VALLEY = 48, 40
+# Starts that creep reach no better valley: of those of 126 fits 44.5 % reach the deepest that any
+# found, 45.4 % without this at a third more responses, 41.4 % with 1e-3.
+CREEPS = 1e-4
 # Sets of starting points: where a model misfits its valleys are many, and one set of a held LHIfAM
 # with a second mode ended in a worse one for one to two seeds in six.
 _SETS = 4
@@ -156,7 +159,7 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
     elsewhere = here.natural(_other_valleys(phi, cost))
     refined = 6  # of them converged to the end
     phi = phi[np.argsort(cost + penalty(phi))[:refined]]
-    phi, cost = minimise(residuals, phi, low, high, steps=100, tolerance=1e-6)
+    phi, cost = minimise(residuals, phi, low, high, steps=100, tolerance=1e-3)
     best = np.argmin(cost + penalty(phi))
     agreeing = int(np.sum(cost < cost[best] + 0.5))
     left = float(cost[best] / windows.target.size)
@@ -200,7 +203,7 @@ def _valleys(
         cost = np.einsum("bn,bn->b", *(2 * [residuals(phi)]))
     order = np.argsort(np.where(np.isfinite(cost), cost, np.inf))
     phi = phi[order[:_KEPT_STARTS]]
-    return minimise(residuals, phi, low, high, _STEPS_TO_A_VALLEY, tolerance=1e-2)
+    return minimise(residuals, phi, low, high, _STEPS_TO_A_VALLEY, 1e-2, CREEPS)
 
 
 def _other_valleys(phi: Floats, cost: Floats) -> Floats:

@@ -27,7 +27,7 @@ from bayeshaptic.diagnosis.state import (
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.fit import MISFIT, search_box, weighted_residuals
-from bayeshaptic.inference.least_squares import Optimum, anew, least_squares, refine
+from bayeshaptic.inference.least_squares import CREEPS, Optimum, anew, least_squares, refine
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.screening import promising_starts, starting_bases
 from bayeshaptic.models import Model
@@ -189,7 +189,7 @@ def sieve(model: Model, etfe: Etfe, windows: Windows, bases: Floats) -> list[Sie
         here, low, high = search_box(full)
         residuals = weighted_residuals(Likelihood(full, windows), here)
         phi = np.clip(here.coordinate(starts), low, high)
-        phi, cost = minimise(residuals, phi, low, high, steps=_STEPS, tolerance=1e-2)
+        phi, cost = minimise(residuals, phi, low, high, _STEPS, 1e-2, CREEPS)
         order = np.argsort(cost)
         # What is left acts as noise of its size.
         left = max(float(cost[order[0]]), float(size))
