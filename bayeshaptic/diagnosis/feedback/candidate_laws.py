@@ -25,7 +25,7 @@ _SLOW = "stribeck_"  # before the share of the usual velocity, in the name of a 
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateLaw:
     """A force to ask for.
 
     Attributes
@@ -42,19 +42,21 @@ class Candidate:
     joined: Joining = field(repr=False)
 
 
-def candidate_laws(recording: Recording, path: SmoothMotion, usual: Usual) -> Iterator[Candidate]:
+def candidate_laws(
+    recording: Recording, path: SmoothMotion, usual: Usual
+) -> Iterator[CandidateLaw]:
     """Other laws of dry friction, and resistances that grow with a power of the velocity."""
     for shape in corrections(usual):
         part = float(shape.name.removeprefix(_SLOW)) * usual.velocity
         force = shape.force(path.velocity)
-        yield Candidate(StribeckFriction.name, force, _stribeck(StribeckFriction, part))
-        yield Candidate(RisingFriction.name, -force, _stribeck(RisingFriction, part))
+        yield CandidateLaw(StribeckFriction.name, force, _stribeck(StribeckFriction, part))
+        yield CandidateLaw(RisingFriction.name, -force, _stribeck(RisingFriction, part))
     for share in (0.01, 0.03, 0.1):  # of the way, in which friction begins as a spring
         length = share * float(np.ptp(path.position))
-        yield Candidate(DahlFriction.name, _presliding(recording, length), _dahl(length))
+        yield CandidateLaw(DahlFriction.name, _presliding(recording, length), _dahl(length))
     for kind in (Drag, CubicDamping):
         (shape, *_) = kind.shapes(MOTOR, usual)
-        yield Candidate(kind.name, shape.force(path.velocity), _beside(kind))
+        yield CandidateLaw(kind.name, shape.force(path.velocity), _beside(kind))
 
 
 def _stribeck(kind: type[StribeckFriction] | type[RisingFriction], slow: float) -> Joining:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.feedback.candidate_laws import Candidate, candidate_laws
+from bayeshaptic.diagnosis.feedback.candidate_laws import CandidateLaw, candidate_laws
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
 from bayeshaptic.diagnosis.feedback.tones_in_motion import with_tones
@@ -131,7 +131,7 @@ def _with_drag(
 
 def _with_law(
     motion: MotionFit,
-    candidate: Candidate,
+    candidate: CandidateLaw,
     score: Score,
     recording: Recording,
     follower: Follower | None,
@@ -170,11 +170,11 @@ def _found(motion: MotionFit, seen: Mapping[str, Score]) -> tuple[Lacking, ...]:
 
 
 def _best_of_each(
-    motion: MotionFit, recording: Recording, asked: Sequence[Candidate]
-) -> list[tuple[Candidate, Score]]:
+    motion: MotionFit, recording: Recording, asked: Sequence[CandidateLaw]
+) -> list[tuple[CandidateLaw, Score]]:
     """Of each law that is seen and makes sense the candidate that leaves least."""
     scored = scores(motion, recording, [one.force for one in asked])
-    found: dict[str, tuple[Candidate, Score]] = {}
+    found: dict[str, tuple[CandidateLaw, Score]] = {}
     for one, score in zip(asked, scored, strict=True):
         if score is None or score.t < _SEEN or score.left > 1 - _WORTH:
             continue
