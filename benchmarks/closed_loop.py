@@ -21,7 +21,7 @@ from bayeshaptic.diagnosis.feedback.lacking import with_laws
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.loop import NAMES, Loop
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG
 from bayeshaptic.inference.time_domain.uneven import Way
 from bayeshaptic.inference.time_domain.widths import FREEDOM
@@ -220,7 +220,7 @@ def bound(case: Case) -> Floats:
     """
     recording = case.recording
     alone = Follower(np.zeros(1), np.ones(1))
-    loop = replace(Loop.of(recording, 1.0, Way.of(recording.position)), follower=alone)
+    loop = replace(MassInLoop.of(recording, 1.0, Way.of(recording.position)), follower=alone)
     values = loop.begun(case.truth)
     waves = np.zeros(2 * ALONG)
     columns = loop.columns(values, waves, loop.error(values, waves))[:, : loop.plain]

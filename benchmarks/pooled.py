@@ -18,7 +18,7 @@ import numpy as np
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.fit import fit_motion
-from bayeshaptic.inference.time_domain.loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.widths import FREEDOM
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import join_recordings, recording_from_arrays

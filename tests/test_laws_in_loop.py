@@ -16,7 +16,7 @@ from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.loop import NAMES, Hum
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, Hum
 from bayeshaptic.inference.time_domain.scores import scores
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording

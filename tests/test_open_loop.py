@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
-from bayeshaptic.inference.time_domain.loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report import write_report

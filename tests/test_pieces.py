@@ -15,7 +15,7 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.between_pieces import between_pieces
 from bayeshaptic.inference.time_domain.fit import fit_motion
-from bayeshaptic.inference.time_domain.loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.uneven import Ridge
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays

@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood
-from bayeshaptic.inference.time_domain.loop import NAMES, Loop
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, ridge
 from bayeshaptic.inference.time_domain.widths import covariance
@@ -73,7 +73,7 @@ def declared(recording: Recording) -> Recording:
 
 def test_the_simulated_motion_is_the_benchs() -> None:
     recording = in_loop(1.0, friction=0.0, resolution=0.0)
-    loop = Loop.of(recording, 10.0, Way.of(recording.position))
+    loop = MassInLoop.of(recording, 10.0, Way.of(recording.position))
     loop = replace(loop, follower=Follower(*Feedback(*GAINS).law(1e-3)))
     values = np.array([TRUTH["m"], TRUTH["b"], 0.0, 0.0, TRUTH["delay_s"], 0.0, 0.0])
     error = loop.error(values, np.zeros(2 * WAVES))
@@ -82,7 +82,7 @@ def test_the_simulated_motion_is_the_benchs() -> None:
 
 def test_dry_friction_sticks_and_slips_as_on_the_bench() -> None:
     recording = in_loop(1.0, friction=TRUTH["coulomb"], resolution=0.0)
-    loop = Loop.of(recording, 10.0, Way.of(recording.position))
+    loop = MassInLoop.of(recording, 10.0, Way.of(recording.position))
     loop = replace(loop, follower=Follower(*Feedback(*GAINS).law(1e-3)))
     values = np.array([*TRUTH.values(), 0.0, 0.0])
     values[3] = 0.0

@@ -25,7 +25,7 @@ from bayeshaptic.effects.measurement import MainsTone
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
-from bayeshaptic.inference.time_domain.loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import percent

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from bayeshaptic.diagnosis.base.begun import Begun, refitted
 from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
-from bayeshaptic.diagnosis.base.loops_in_turn import Loops
+from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn
 from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
@@ -70,7 +70,7 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
     """
     rivals, doubted = _rivals(begun), _hardly_worse(begun)
     share = _OWN if rivals or doubted else 1.0
-    loops = Loops(begun, options)
+    loops = LoopsInTurn(begun, options)
     own = loops.begin(begun.fit.model.name, share * options.budget_s)
     loops.glance(rivals)
     own.go_on(loops.patient)

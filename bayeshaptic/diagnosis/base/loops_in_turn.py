@@ -12,7 +12,7 @@ from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.numerics.spending import RATE
 
 
-class Loops:
+class LoopsInTurn:
     """The loops on all base models in question, a round of each at a time.
 
     What explains with few parameters ends the search on what would need more.

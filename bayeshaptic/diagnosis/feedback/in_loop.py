@@ -12,7 +12,7 @@ from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.models import HalfNormal
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import pure, quantity

@@ -27,8 +27,8 @@ from bayeshaptic.effects.nonlinear.shapes import Usual
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.loop import NAMES, Hum
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, Hum
 from bayeshaptic.inference.time_domain.scores import Score, scores
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording

@@ -10,7 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.samples.sinusoids import Tone
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.inference.time_domain.fit import MotionFit
-from bayeshaptic.inference.time_domain.loop import NAMES, Hum
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, Hum
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Complexes, Floats

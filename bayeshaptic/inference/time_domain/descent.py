@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.between_pieces import between_pieces
-from bayeshaptic.inference.time_domain.loop import NAMES, Loop
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.one_way import one_way
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, ridge
 from bayeshaptic.inference.time_domain.widths import covariance
@@ -25,7 +25,7 @@ class Descended:
     Attributes
     ----------
     values, inside : ndarray, shape (V,)
-        Of the `Loop`: where the data put them, and the best that are possible.
+        Of the `MassInLoop`: where the data put them, and the best that are possible.
     uneven : ndarray, shape (2 WAVES,)
         The force that changes along the way.
     covariance : ndarray, shape (V, V)
@@ -45,7 +45,7 @@ class Descended:
     converged: bool
 
 
-def descend(loop: Loop, start: Floats, name: str) -> Descended:
+def descend(loop: MassInLoop, start: Floats, name: str) -> Descended:
     """Gauss-Newton steps, first without the uneven force, then with it."""
     values, uneven = start, np.zeros(2 * WAVES)
     plain = loop.plain
@@ -73,7 +73,7 @@ def descend(loop: Loop, start: Floats, name: str) -> Descended:
 
 
 def _spread(
-    loop: Loop, values: Floats, uneven: Floats, columns: Floats, left: Floats, solved: Ridge
+    loop: MassInLoop, values: Floats, uneven: Floats, columns: Floats, left: Floats, solved: Ridge
 ) -> Floats:
     """Covariance of the values, (V, V): within pieces, between them, and of what goes one way."""
     plain = loop.plain
@@ -89,7 +89,7 @@ def _spread(
 
 
 def _linearised(
-    loop: Loop, values: Floats, uneven: Floats, with_waves: bool, name: str
+    loop: MassInLoop, values: Floats, uneven: Floats, with_waves: bool, name: str
 ) -> tuple[Floats, Floats, Ridge]:
     """The error, its slopes, and the linear problem's solution for the step and all waves."""
     plain = loop.plain
@@ -105,7 +105,7 @@ def _linearised(
 
 
 def _step(
-    loop: Loop, values: Floats, uneven: Floats, error: Floats, solved: Ridge
+    loop: MassInLoop, values: Floats, uneven: Floats, error: Floats, solved: Ridge
 ) -> tuple[Floats, Floats, float] | None:
     """As much of the step as lowers the penalised error, and by which share; None where none."""
     plain, lowest, highest = loop.plain, loop.lowest, loop.highest
@@ -124,7 +124,7 @@ def _step(
     return None
 
 
-def _within(loop: Loop, values: Floats, solved: Ridge) -> Floats:
+def _within(loop: MassInLoop, values: Floats, solved: Ridge) -> Floats:
     """The solution where no value leaves what is possible: the others make up for those held."""
     plain = loop.plain
     low, high = loop.lowest - values, loop.highest - values

@@ -20,8 +20,8 @@ import numpy as np
 
 from bayeshaptic.inference.time_domain.descent import descend
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
-from bayeshaptic.inference.time_domain.loop import FORCES, NAMES, Hum, Loop
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
+from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, NAMES, Hum, MassInLoop
 from bayeshaptic.inference.time_domain.start import by_inverse_dynamics
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way
 from bayeshaptic.inference.time_domain.widths import mean_of_uneven
@@ -56,7 +56,7 @@ class MotionFit:
     way : Way
     follower : Follower
     whole : ndarray
-        All values of the `Loop`: `inside`, where pieces begin, numbers of the laws.
+        All values of the `MassInLoop`: `inside`, where pieces begin, numbers of the laws.
     forces : MassForces
         Dry friction's law, and further ones.
     whole_sd : ndarray
@@ -91,10 +91,10 @@ class MotionFit:
         """Of `numbers`."""
         return self.whole_sd[len(self.whole) - len(self.forces.names) :]
 
-    def loop(self, recording: Recording, later_s: float = 0.0) -> Loop:
+    def loop(self, recording: Recording, later_s: float = 0.0) -> MassInLoop:
         """The loop that was followed, or that of another recording, begun so much later."""
         hums = tuple(hum.later(later_s) for hum in self.hums)
-        loop = Loop.of(recording, self.bandwidth_hz, self.way, self.forces, hums)
+        loop = MassInLoop.of(recording, self.bandwidth_hz, self.way, self.forces, hums)
         return replace(loop, follower=self.follower)
 
     @property
@@ -144,7 +144,7 @@ def fit_motion(
     """
     width = bandwidth_hz(recording.force, recording.period_s)
     way = Way.of(recording.position)
-    loop = Loop.of(recording, width, way, forces, hums)
+    loop = MassInLoop.of(recording, width, way, forces, hums)
     begun = loop.begun(by_inverse_dynamics(recording) if start is None else start)
     loop = loop.led(feedback, begun)
     first = descend(loop, begun, recording.name)

@@ -10,7 +10,7 @@ import numpy as np
 from bayeshaptic.inference.fit import AT_BOUND, CONVERGED, Fit
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.fit import MotionFit
-from bayeshaptic.inference.time_domain.loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.widths import FREEDOM
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.response.etfe import Etfe, compress

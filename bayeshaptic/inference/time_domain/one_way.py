@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.loop import FORCES, Loop
+from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import Ridge
 from bayeshaptic.types import Floats
 
@@ -13,7 +13,7 @@ _CLEAR = 100.0  # times its noise, by which an error grows that other values mak
 
 
 def one_way(
-    loop: Loop,
+    loop: MassInLoop,
     values: Floats,
     uneven: Floats,
     columns: Floats,
@@ -29,7 +29,7 @@ def one_way(
 
     Parameters
     ----------
-    loop : Loop
+    loop : MassInLoop
     values, uneven : ndarray
         Fitted.
     columns : ndarray, shape (N, C)

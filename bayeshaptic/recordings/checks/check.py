@@ -7,9 +7,9 @@ import numpy as np
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.against_device import compare_resolution, compare_response
-from bayeshaptic.recordings.checks.feedback import what_drives_what
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
 from bayeshaptic.recordings.checks.units_in_doubt import degrees, mixed_units, whole_numbers
+from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.diagnosis.samples.sinusoids import in_words
-from bayeshaptic.inference.time_domain.loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.quantities import pure, quantity, scale
 from bayeshaptic.report.loop.motion_words import motion_words
 

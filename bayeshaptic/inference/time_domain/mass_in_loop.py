@@ -38,7 +38,7 @@ class Hum:
 
 
 @dataclass(frozen=True)
-class Loop:
+class MassInLoop:
     """A recording with a follower, and the motion of one mass beside it.
 
     Values are the `SHARED` ones, then those of every piece: position and velocity at its
@@ -77,7 +77,7 @@ class Loop:
         way: Way,
         forces: MassForces = COULOMB,
         hums: tuple[Hum, ...] = (),
-    ) -> Loop:
+    ) -> MassInLoop:
         """Of a recording, with the waves of a way."""
         force, position = np.array(recording.force), np.array(recording.position)
         return cls(
@@ -162,7 +162,7 @@ class Loop:
         fewest = 20  # independent samples
         return max(independent * self.bandwidth_hz * seconds, fewest)
 
-    def led(self, feedback: Follower | None, start: Floats, share: float = 1.0) -> Loop:
+    def led(self, feedback: Follower | None, start: Floats, share: float = 1.0) -> MassInLoop:
         """With the declared follower, or one of `share` times the bandwidth that is stable."""
         width = share * self.bandwidth_hz
         trials = 10
