@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.residuals.columns import moved_besides
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.diagnosis.traced import Candidate, Traced
@@ -51,6 +52,7 @@ class FakeAnalysis(SimpleNamespace):
     analysis = measured = property(lambda self: self)
     declared = property(lambda self: self.limit)
     stated = property(lambda self: self.posterior)
+    moved_besides = property(lambda self: moved_besides(self.fit, self.etfe.unbroken))
     widened, sampled = None, True
 
 

@@ -13,6 +13,7 @@ from scipy.linalg import expm
 from scipy.signal import butter, chirp, lfilter
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.samples.clipped import clipped
 from bayeshaptic.diagnosis.samples.faults import faults
 from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
@@ -84,6 +85,16 @@ def test_coarse_counts_are_measured_and_nothing_is_changed() -> None:
     assert finding.estimates["resolution"].mean == pytest.approx(8 * COUNT, rel=1e-6)
     assert look.mended.encoder_resolution == pytest.approx(8 * COUNT, rel=1e-6)
     assert np.array_equal(look.mended.position, recording.position)
+
+
+def test_coarser_counts_than_said_leave_the_posterior_as_it_was() -> None:
+    recording = looked_at("quantisation", count=8 * COUNT)[0]
+    closed = close_loop(recording, "free", device=PHANTOM.device, ess=100, hidden=False)
+    assert closed.effect_names == ("quantisation",)
+    assert closed.analysis.posterior is closed.base.posterior
+    recorded_with = [one.etfe.recording for one in (closed.base, closed.analysis)]
+    said, found = (one.encoder_resolution for one in recorded_with if one is not None)
+    assert (said, found) == (COUNT, pytest.approx(8 * COUNT))
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.feedback.in_loop import InLoop
 from bayeshaptic.diagnosis.hidden.hidden import Hidden
+from bayeshaptic.diagnosis.residuals.columns import moved_besides
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.choose import Choice
 from bayeshaptic.inference.fit import Fit
@@ -88,6 +90,12 @@ class Analysis(Shown):
     def declared(self) -> CriticalStiffness:
         """The limit if the model is exact, with what was found; `limit` allows for more."""
         return self.limit if self.hidden is None else self.hidden.declared
+
+    @cached_property
+    def moved_besides(self) -> float:
+        """See `bayeshaptic.diagnosis.residuals.columns`; kept: every headline of a page asks."""
+        assert self.etfe.unbroken is not None
+        return moved_besides(self.fit, self.etfe.unbroken)
 
     # What a report asks of any result, closed loop or not: see `bayeshaptic.diagnosis.result`.
     @property

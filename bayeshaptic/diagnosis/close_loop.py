@@ -94,10 +94,11 @@ def close_loop(
 def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: Options) -> Closed:
     """The base model analysed, and with what was found, widened by what that leaves open."""
     state, seed = traced.state, options.seed
-    changed = bool(state.accepted)
-    base = finish(begun, begun.etfe, begun.fit, options.within(0.4, 0.6), small_risks=not changed)
-    analysis = base
-    if changed:
+    # Of coarser counts than were said the fit knows nothing: what was sampled once holds for both.
+    alike = not state.accepted or state.fit is begun.fit
+    base = finish(begun, begun.etfe, begun.fit, options.within(0.4, 0.6), small_risks=alike)
+    analysis = replace(base, recording=state.etfe.recording, etfe=state.etfe)
+    if not alike:
         analysis = finish(
             begun,
             state.etfe,

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
-from bayeshaptic.diagnosis.residuals.columns import moved_besides
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
@@ -145,7 +144,7 @@ def _is_moved(analysis: Analysis) -> bool:
         return False
     if recording is None or analysis.in_loop is not None or has_feedback(analysis.notices):
         return False
-    return moved_besides(analysis.fit, recording) > _BESIDES
+    return analysis.moved_besides > _BESIDES
 
 
 def is_open(analysis: Analysis) -> bool:
