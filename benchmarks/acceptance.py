@@ -43,7 +43,6 @@ LEFT_OUT = {
     "TIE": 0.0,
     "LAW_TIE": 0.0,
     "MENDED": 1.0,
-    "LAW_ERROR": 0.0,
 }
 """Every rule, and the value with which it decides nothing."""
 
@@ -74,7 +73,7 @@ def decided(job: Job) -> dict[str, Decided]:
 
     def left(trial: Trial) -> tuple[Test, ...]:
         tests = tests_of(next(i for i, one in enumerate(trials) if one is trial))
-        return acceptance.remaining(tests, trial.state.accepted, before)
+        return acceptance.remaining(tests, trial.state.accepted)
 
     def first_round() -> Decided:
         open_ = [

@@ -13,7 +13,7 @@ from scipy.signal import chirp
 from bayeshaptic.diagnosis.loop import Loop, trace
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
 from bayeshaptic.diagnosis.residuals.residual import smooth_columns
-from bayeshaptic.diagnosis.state import Accepted, State, compared_errors, held_out_rms
+from bayeshaptic.diagnosis.state import Accepted, State, Trial, compared_errors, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.trials import linear, windows
 from bayeshaptic.effects.laws import BESIDE
@@ -279,6 +279,39 @@ def test_a_drag_under_sweeps_is_no_other_linear_device() -> None:
     assert [c.name for c in traced.candidates if c.taken_out][0] == "second_mode"
     limit = critical_stiffness(traced.state.model, traced.state.fit.theta).value
     assert limit == pytest.approx(bench.true_critical_stiffness(), rel=0.05)
+
+
+class NothingConvinces:
+    """Trials of a state that a linear test and one for another force are raised by, in vain."""
+
+    def __init__(self, first: State) -> None:
+        self.first, self.asked = first, []
+
+    def tests(self, state: State) -> tuple[ResidualTest, ...]:
+        return (ResidualTest("smooth change", "linear", 6.0, 5.0, None, ""),)
+
+    def mended(self, state: State) -> State:
+        return state
+
+    def trials(self, state: State, tests: tuple[ResidualTest, ...], *rest: Any) -> list[Trial]:
+        self.asked.append({test.name for test in tests})
+        return []
+
+    def beside(self, state: State) -> tuple[ResidualTest, ...]:
+        return (
+            ResidualTest("velocity beside", "nonlinear", 8.0, 4.4, None, ""),
+            ResidualTest("position beside", "nonlinear", 2.0, 4.4, None, ""),
+        )
+
+
+def test_a_force_that_is_seen_and_that_no_law_explains_is_left() -> None:
+    """Friction under a sweep had half of its limit's damping, and a limit 19 times too high."""
+    _, etfe, fit = fitted(False, 5.0, ())
+    kind: Any = NothingConvinces(State(etfe, fit))
+    traced = trace(etfe, fit, trials=kind)
+    assert kind.asked == [{"smooth change"}, {"velocity beside"}]
+    assert [test.name for test in traced.after] == ["smooth change", "velocity beside"]
+    assert traced.verdict == "unexplained" and all(test.flagged for test in traced.after)
 
 
 def _of_shapes(test: ResidualTest) -> bool:

@@ -89,34 +89,24 @@ def with_ties(chosen: Trial, trials: Sequence[Trial]) -> State:
     return replace(chosen.state, accepted=(*earlier, own))
 
 
-def remaining(
-    tests: Iterable[Test], accepted: Sequence[Accepted], seen: Iterable[Test]
-) -> tuple[Test, ...]:
-    """The tests of what is left, and how much of it counts, after those `seen` so far.
+def remaining(tests: Iterable[Test], accepted: Sequence[Accepted]) -> tuple[Test, ...]:
+    """The tests of what is left, and how much of it counts.
 
     Where the response drifts the limit is that of the worst part; that the part drifts a little
-    too is no news.  A law of friction is an approximation: a share of what it explained may
-    remain; and a recording that was mended, or goes on in part, is not as good as a sound one.
-    What was wrong with the measurement is where an excess of noise comes from.  That positions are
-    rounded takes nothing off: of 19 such recordings in which no force acts none is flagged.
+    too is no news.  A recording that was mended, that a force was taken off, or that goes on in
+    part, is not as good as a sound one.  What was wrong with the measurement is where an excess of
+    noise comes from.  That positions are rounded takes nothing off: of 19 such recordings in which
+    no force acts none is flagged.
     """
-    families = {effect.family for effect in accepted}
-    no_news = families & {"measurement", "time-varying"}
+    no_news = {effect.family for effect in accepted} & {"measurement", "time-varying"}
     tests = tuple(test for test in tests if test.family not in no_news)
     taken_off = {effect.family for effect in accepted if effect.name != Quantisation.name}
     if not taken_off & _OF_THE_DATA:
         return tests
-    explained = 0.0
-    if "nonlinear" in families:
-        explained = max((t.statistic for t in seen if t.family == "nonlinear"), default=0.0)
-    return tuple(_allowing(test, explained) for test in tests)
-
-
-def _allowing(test: Test, explained: float) -> Test:
-    """`test` with the threshold that it has after something was taken off the recording."""
-    least = thresholds.LAW_ERROR * explained if test.family == "nonlinear" else 0.0
-    allowed = max(thresholds.MENDED * test.threshold, least)
-    return replace(test, threshold=allowed, usual=test.threshold)
+    return tuple(
+        replace(test, threshold=thresholds.MENDED * test.threshold, usual=test.threshold)
+        for test in tests
+    )
 
 
 def force_acts(accepted: Sequence[Accepted]) -> bool:
@@ -127,8 +117,8 @@ def force_acts(accepted: Sequence[Accepted]) -> bool:
 def wanted(tests: Sequence[Test], accepted: Sequence[Accepted]) -> tuple[Test, ...]:
     """The tests that call for one more effect.
 
-    An allowance for what a law of a force may leave is for the verdict: what is left may be another
-    force beside it, which is tried.
+    That thresholds are higher after a force was taken off is for the verdict: what is left may be
+    another force beside it, which is tried.
     """
     if any(test.flagged for test in tests):
         return tuple(tests)

@@ -138,7 +138,6 @@ class Loop:
         self._path: list[State] = []
         self._before: tuple[Test, ...] = ()
         self._tests: tuple[Test, ...] = ()  # of what is left
-        self._seen: tuple[Test, ...] = ()
         self._candidates: list[Candidate] = []
         self._rejected: tuple[Trial, ...] = ()
         self._number = 0
@@ -205,7 +204,7 @@ class Loop:
     def _begin(self) -> None:
         self.state = self._kind.first
         self._path = [self.state]
-        self._before = self._tests = self._seen = self._kind.tests(self.state)
+        self._before = self._tests = self._kind.tests(self.state)
         self._mend()
 
     def _mend(self) -> None:
@@ -263,23 +262,23 @@ class Loop:
         """Tests for a force in what tests of the residual take for linear, where they see one.
 
         Under a sweep each frequency comes at one speed, and drag looks like another response.
+        Where no law convinces, what they see is left.
         """
         if acceptance.force_acts(self.state.accepted):
             return ()
         found = tuple(test for test in self._kind.beside(self.state) if test.flagged)
-        self._before, self._seen = (*self._before, *found), (*self._seen, *found)
+        self._before, self._tests = (*self._before, *found), (*self._tests, *found)
         return found
 
     def _accept(self, state: State, tests: tuple[Test, ...]) -> None:
         if acceptance.force_acts(state.accepted) and not any(test.flagged for test in tests):
             beside = self._kind.beside(state)
-            tests = (*tests, *acceptance.remaining(beside, state.accepted, self._seen))
-        self._seen = (*self._seen, *tests)
+            tests = (*tests, *acceptance.remaining(beside, state.accepted))
         self._path.append(state)
         self.state, self._tests = state, tests
 
     def _remaining(self, state: State) -> tuple[Test, ...]:
-        return acceptance.remaining(self._kind.tests(state), state.accepted, self._seen)
+        return acceptance.remaining(self._kind.tests(state), state.accepted)
 
     def _tick(self, what: str) -> None:
         if self._progress:

@@ -90,11 +90,6 @@ changes."""
 
 # ---------------------------------------------------------------- what an effect may leave
 
-LAW_ERROR = 0.2
-"""Of the statistic that raised a force: a law of friction is an approximation.
-
-Without it 29 of 34 effects explained the residual in one round, with it 32, while forces were
-fitted less far; now 32 do with and without."""
 MENDED = 1.5
 """Factor on the thresholds of a recording that something was taken off, or a part of one.
 

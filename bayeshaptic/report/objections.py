@@ -179,9 +179,9 @@ def changes(closed: Closed) -> bool:
 def _rubs_otherwise(closed: Closed) -> bool:
     """Whether a force over the velocity stays unexplained: such a damping ends in small motions.
 
-    A law may leave a share of what it explained.  Where nobody holds the device that may be another
-    force beside it, which was looked for and not found: so it is of none of 17 recordings with one
-    force or none, and of one of 18 with two.
+    After a force was taken off a test's threshold is higher.  Where nobody holds the device what is
+    below it may be another force, which was looked for and not found: so it is of none of 17
+    recordings with one force or none, and of one of 18 with two.
     """
     left = _left(closed)
     acts = any(effect.family == "nonlinear" for effect in closed.effects)

@@ -16,6 +16,7 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.acceptance import needless
 from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.periodic.force_tests import force_tests
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance, promise
 from bayeshaptic.diagnosis.periodic.joint import Basis
@@ -90,7 +91,8 @@ class LineTrials:
 
     def tests(self, state: State) -> tuple[Test, ...]:
         """The tests of its residual."""
-        return residual_tests(state.fit, state.etfe)
+        forces = force_tests(state.fit, state.etfe, self.period)
+        return (*residual_tests(state.fit, state.etfe), *forces)
 
     def mended(self, state: State) -> State:
         """As it is: samples are averaged over the periods."""

@@ -32,6 +32,8 @@ class Period:
         Of sampling.
     creep : float
         Mean velocity: a constant force, or one that a law makes, drives a free device on.
+    kept : slice
+        The samples of the recording that are averaged.
     """
 
     force: Floats = field(repr=False)
@@ -41,6 +43,7 @@ class Period:
     scale: Floats = field(repr=False)
     period_s: float
     creep: float
+    kept: slice
 
     @property
     def samples(self) -> int:
@@ -55,6 +58,10 @@ class Period:
     def free(self) -> NDArray[np.bool_]:
         """Harmonics below all excited ones: no force there, what moves is taken as measured."""
         return self.harmonics < self.excited[0]
+
+    def average(self, signal: Floats) -> Floats:
+        """A signal of the recording, over its kept periods, shape (N,)."""
+        return signal[self.kept].reshape(-1, self.samples).mean(axis=0)
 
     def transform(self, signal: Floats) -> Complexes:
         """DFT of signals (..., N) at the harmonics, (..., H)."""
@@ -108,6 +115,7 @@ def one_period(etfe: Etfe, witness: Floats | None = None) -> Period:
         scale=np.abs(spectra.force) / np.abs(np.fft.rfft(force)[excited]),
         period_s=recording.period_s,
         creep=creep / recording.period_s,
+        kept=slice(first, stop),
     )
 
 

@@ -8,6 +8,8 @@ outputs; S. F. Masri and T. K. Caughey, J. Appl. Mech. 46, 1979, for the force s
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.special import ndtri, stdtr
@@ -53,14 +55,20 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     if recording is None or etfe.period_lines is not None:
         return ()
     tests = []
-    for name, (inputs, rms) in columns(fit, etfe, recording).items():
+    frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
+    at_lines = line_transform(etfe, recording)
+    for name, (inputs, rms) in columns(fit, recording, frequency_hz, at_lines).items():
         windows = etfe.spectra.windows(fit.response, inputs)
         strength, sd, freedom = common_coefficient(windows, len(inputs))
         score = as_normal(abs(strength / sd), freedom) if sd > 0 else 0.0
-        text = f"a force like {name} stands {score:.1f} standard deviations out of the noise"
-        seen = ForceSeen(strength, sd, rms)
-        tests.append(Test(name, "nonlinear", score, thresholds.two_sided(), None, text, seen))
+        tests.append(force_test(name, score, ForceSeen(strength, sd, rms)))
     return tuple(tests)
+
+
+def force_test(name: str, score: float, seen: ForceSeen) -> Test:
+    """The test for a force of a shape by its score."""
+    text = f"a force like {name} stands {score:.1f} standard deviations out of the noise"
+    return Test(name, "nonlinear", score, thresholds.two_sided(), None, text, seen)
 
 
 def common_coefficient(windows: Windows, inputs: int = 1) -> tuple[float, float, float]:
@@ -98,15 +106,27 @@ def as_normal(score: float, freedom: float) -> float:
     return float(-ndtri(chance)) if chance > 1e-300 else score
 
 
-def columns(fit: Fit, etfe: Etfe, recording: Recording) -> dict[str, tuple[Complexes, float]]:
-    """Motions that nonlinear forces would add, at the lines of the spectra, (1 or 2, L); by name.
+def columns(
+    fit: Fit,
+    recording: Recording,
+    frequency_hz: Floats,
+    at_lines: Callable[[Floats], Complexes],
+) -> dict[str, tuple[Complexes, float]]:
+    """Motions that nonlinear forces would add, at lines, (1 or 2, L); by name.
 
     Each with the rms of the motion that the force is a function of.  Where a hand moves the device,
     too, its own motion is in such a force and in what no response explains: what the command alone
     would make of the force comes first, as an instrument.
+
+    Parameters
+    ----------
+    fit : Fit
+    recording : Recording
+    frequency_hz : ndarray, shape (L,)
+    at_lines : callable
+        A signal, shape (N,), to its DFT there.
     """
-    s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    at_lines = line_transform(etfe, recording)
+    s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
     found = {}
     for over, motion in motions(fit, recording).items():
         response = response_to(fit, over, s)

@@ -16,7 +16,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.numerics.gauss_newton import jacobian
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Complexes, Floats
 
 _KNOTS = 16  # of a smooth effect over log frequency
 
@@ -155,27 +155,36 @@ def smooth_columns(fit: Fit) -> tuple[Floats, Floats, Floats]:
     frequency_hz : ndarray, shape (N,)
         Of every row.
     """
-    windows, here = fit.windows, coordinates(fit.model)
-    residuals = weighted_residuals(fit.likelihood, here)
-    phi = here.coordinate(fit.theta[None])
-    residual = residuals(phi)
-    slope = jacobian(residuals, phi, residual)[0]
+    windows = fit.windows
+    own, residual = beside_parameters(fit)
     g = fit.response(windows.frequency_hz.ravel()).reshape(windows.frequency_hz.shape)
     log_f = np.log10(windows.frequency_hz)
     knots = np.linspace(log_f.min(), log_f.max(), _KNOTS)
     hats = np.stack([np.interp(log_f, knots, row) for row in np.eye(_KNOTS)], axis=-1)
-    scale = np.sqrt(2 / fit.likelihood.noise_variance)[:, None, None]
-    effect = scale * (windows.design @ (g[..., None] * hats))  # (W, k, knots)
-    effect = effect.reshape(-1, _KNOTS)
-    both = np.concatenate([effect, 1j * effect], axis=1)
-    # Real and imaginary parts in turn, as `weighted_residuals` has them.
-    stacked = np.stack([both.real, both.imag], axis=1).reshape(2 * len(both), -1)
-    own = np.linalg.qr(slope)[0]
+    effect = windows.design @ (g[..., None] * hats)  # (W, k, knots)
+    stacked = as_rows(fit, np.concatenate([effect, 1j * effect], axis=-1))
     stacked = stacked - own @ (own.T @ stacked)
     basis, sizes, _ = np.linalg.svd(stacked, full_matrices=False)
     basis = basis[:, sizes > 1e-6 * sizes[0]]
     rows = np.repeat(windows.frequency_hz.ravel(), 2)
-    return basis, residual[0], rows
+    return basis, residual, rows
+
+
+def beside_parameters(fit: Fit) -> tuple[Floats, Floats]:
+    """An orthonormal basis of what the parameters can do, (N, P), and the residual, (N,)."""
+    here = coordinates(fit.model)
+    residuals = weighted_residuals(fit.likelihood, here)
+    phi = here.coordinate(fit.theta[None])
+    residual = residuals(phi)
+    return np.linalg.qr(jacobian(residuals, phi, residual)[0])[0], residual[0]
+
+
+def as_rows(fit: Fit, effect: Complexes) -> Floats:
+    """Changes of the windows' targets, (W, k, C), over the noise: real, as the residual, (N, C)."""
+    scale = np.sqrt(2 / fit.likelihood.noise_variance)[:, None, None]
+    weighed = (scale * effect).reshape(-1, effect.shape[-1])
+    # Real and imaginary parts in turn, as `weighted_residuals` has them.
+    return np.stack([weighed.real, weighed.imag], axis=1).reshape(2 * len(weighed), -1)
 
 
 def chi_square_score(value: float, freedom: int) -> float:
