@@ -59,7 +59,7 @@ class FakeAnalysis(SimpleNamespace):
 class FakeClosed(SimpleNamespace):
     """The parts of a `Closed`, each of which may be changed."""
 
-    effects, force = (), None
+    effects, force, changing_at_limit = (), None, 0.0
     closed = property(lambda self: self)
     verdict = property(lambda self: self.diagnosis["verdict"])
     measured = property(lambda self: self.base)

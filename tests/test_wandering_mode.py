@@ -11,6 +11,8 @@ from bayeshaptic.diagnosis.residuals import excess
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.read import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.objections import why_none
 
 T, N = 1e-3, 20_000
 M1, M2, BC, KC, B1, B2 = 0.1, 0.4, 0.5, 40e3, 0.1, 5.0  # a mode at 112 Hz
@@ -89,3 +91,6 @@ def test_the_limit_goes_as_far_down_as_the_mean_hides() -> None:
     assert result.verdict == "unexplained"
     limit = result.analysis.limit
     assert limit.quantile(0.05) < truth < limit.quantile(0.95)
+    head = headline(result)
+    assert head.status == "untrusted" and head.stiffness is None
+    assert any("from moment to moment" in reason for reason in why_none(result))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from bayeshaptic.diagnosis.analysis import Analysis, limit_line
 from bayeshaptic.diagnosis.feedback.explain import ForceExplained
 from bayeshaptic.diagnosis.state import Accepted
 from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.diagnosis.widening.discrepancy import changing_at_limit
 from bayeshaptic.models import Model
 from bayeshaptic.shown import Shown
 
@@ -52,6 +54,11 @@ class Closed(Shown):
     def effect_names(self) -> tuple[str, ...]:
         """Names of the effects that were accepted."""
         return tuple(effect.name for effect in self.effects)
+
+    @cached_property
+    def changing_at_limit(self) -> float:
+        """See `bayeshaptic.diagnosis.widening`; kept: every headline of a page asks."""
+        return changing_at_limit(self.analysis.limit, self.traced.state.fit, self.traced)
 
     @property
     def model(self) -> Model:

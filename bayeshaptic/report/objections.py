@@ -32,6 +32,8 @@ _OPEN = 10.0  # times the lower end of the limit's 90 % interval: a median beyon
 # Of the speed that the command makes: 46 clean devices that nobody holds, of two simulations, stay
 # below 0.03 (0.13 for a sweep of 2 s).
 _BESIDES = 0.25
+# Of the power of the response at the limit: from 0.28 on friction may be all of the damping there.
+_CHANGES = 0.25
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 
 
@@ -45,6 +47,12 @@ def why_none(result: Result) -> tuple[str, ...]:
         found.append(
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part"
+        )
+    if closed and closed.changing_at_limit > _CHANGES:
+        found.append(
+            "what the device does at the frequency of the limit is not the same from moment to "
+            "moment, by as much as it answers there (a mode that wanders, a cable that slips, "
+            "friction): the limit of the mean is not that of the device"
         )
     if closed and changes(closed):
         found.append(

@@ -70,11 +70,33 @@ def with_discrepancy(
             low, high = -1.0, 1.0
             width = max(_rest(base, fit, traced, family), _LEAST[family] * (family in left))
         else:
-            width = max(_downwards(fit, traced, family), _blurred(limit, fit, traced))
+            width = _downwards(fit, traced, family)
             low, high = -1.0, _upwards(limit, width) + up * _LEAST[family] / width
         factor = np.exp(width * rng.uniform(low, high, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
+    if (changing := changing_at_limit(limit, fit, traced)) > 0:
+        factor = np.exp(-_blurred(changing) * rng.random(len(limit.samples)))
+        limit = replace(limit, samples=limit.samples * factor)
     return limit
+
+
+def changing_at_limit(limit: CriticalStiffness, fit: Fit, traced: Traced) -> float:
+    """Share of the response's power that changes from moment to moment where the limit is.
+
+    Zero where no noise of the device is left.
+
+    Parameters
+    ----------
+    limit : CriticalStiffness
+    fit : Fit
+    traced : Traced
+    """
+    if traced.verdict != UNEXPLAINED:
+        return 0.0
+    if not any(test.flagged and test.name == EXCESS_NOISE for test in traced.after):
+        return 0.0
+    at = [c.frequency_hz for c in limit.crossings if c.frequency_hz]
+    return max((changing_share(fit, traced.state.etfe, frequency) for frequency in at), default=0.0)
 
 
 def _upwards(limit: CriticalStiffness, width: float) -> float:
@@ -130,20 +152,21 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
     return max(_LEAST[family], float(np.log(here / max(lowest, 1e-3 * here))))
 
 
-def _blurred(limit: CriticalStiffness, fit: Fit, traced: Traced) -> float:
-    """How far down, in log stiffness, a response that changes while it is recorded may hide.
+def _blurred(share: float) -> float:
+    """How far down, in log stiffness, the limit may be where this share of the response changes.
 
     Of a mode that wanders a recording has the mean, which is flatter and wider than the mode ever
     is.  Over a mode 1 / (1 + j d) at its top, d its distance from there, the means of its real part
     and of its power are one number; so the limit of the mean is too high by the factor by which the
     mean power is above the power of the mean: by one and the share that changes.
+
+    Friction in it, a cable that slips, damps it and ends in small motions.  Of the power of a sign
+    of normal numbers 2 / pi are linear and the rest is noise, half of which stays about a mode: the
+    share that changes is 0.28 times the square of friction's share of the damping.
     """
-    if not any(test.flagged and test.name == EXCESS_NOISE for test in traced.after):
-        return 0.0
-    beyond = 1.25  # where the share is known from the fit, and so roughly
-    at = [c.frequency_hz for c in limit.crossings if c.frequency_hz]
-    shares = [changing_share(fit, traced.state.etfe, frequency) for frequency in at]
-    return beyond * float(np.log1p(max(shares, default=0.0)))
+    beyond, of_friction, least = 1.25, 0.28, 0.05
+    rubs = float(np.sqrt(share / of_friction))
+    return max(beyond * float(np.log1p(share)), -float(np.log(max(1 - rubs, least))))
 
 
 def _draws_of_deviation(
