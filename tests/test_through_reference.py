@@ -24,6 +24,7 @@ from bayeshaptic.recordings.feedback import Feedback, has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.recordings.signals.controller import controller_reference
 from bayeshaptic.recordings.through_reference import through_reference
 from bayeshaptic.report.headline import headline
@@ -213,15 +214,18 @@ def test_a_mode_among_few_windows_is_doubted_where_one_above_them_explains_as_mu
     model = least_squares(bare, estimate_etfe(recording)).model  # whose priors are set
     truth = np.array([max(bench.values[name], 1e-9) for name in model.names])
 
-    def doubts(etfe: Etfe, theta: Floats) -> tuple[Notice, ...]:
+    def doubts(etfe: Etfe, *theta: float) -> tuple[Notice, ...]:
         windows = compress(etfe, partial(model.response, truth))
-        fit = summarise(model, windows, polish(model, windows, theta))
+        fit = summarise(model, windows, np.array(theta) if theta else polished(windows))
         limit = critical_stiffness(fit.model, fit.theta * np.linspace(0.99, 1.01, 50)[:, None])
         return mode_above_band(fit, etfe, limit)
 
-    assert not doubts(estimate_etfe(recording), truth)  # with the mode itself among 80 windows
+    def polished(windows: Windows) -> Floats:
+        return polish(model, windows, truth)
+
+    assert not doubts(estimate_etfe(recording))  # with the mode itself among 80 windows
+    # Where a fit came to rest from a mode of 5 Hz: it follows nine windows nearly as well as the
+    # device does, six in log likelihood apart.
     slow = estimate_etfe(recording, (1.0, 12.0))
-    inside = dict(zip(model.names, truth, strict=True))
-    inside |= {"kc": inside["m2"] * (2 * np.pi * 5.0) ** 2, "bc": 0.3 * inside["m2"] * 10 * np.pi}
-    found = doubts(slow, np.array([inside[name] for name in model.names]))
+    found = doubts(slow, 1.0395e-3, 8.5e-3, 5.41e-5, 0.12333, 1.063e-5, 0.0)
     assert [notice.topic for notice in found] == ["valley"]
