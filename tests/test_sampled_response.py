@@ -294,4 +294,5 @@ def test_poles_at_one_place_are_no_error(lag_s):
     found = system.sampled_response(FREQUENCY, T)
     slow = FREQUENCY < 1
     assert np.isfinite(found).all()
-    assert relative(found[1, slow], found[0, slow]) < 0.1  # both are one mass of 2 kg there, nearly
+    # Both are one mass of 2 kg there, but for what the softer spring gives: omega^2 m / (2 k).
+    assert relative(found[1, slow], found[0, slow]) < 1.05 * (2 * np.pi) ** 2 / 2e3

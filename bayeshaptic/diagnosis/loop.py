@@ -161,7 +161,7 @@ class Loop:
                 self._begin()
             if wanted := self._wanted:
                 self._number += 1
-                if self._round(wanted, patient) or self._round(self._unseen_forces(), patient):
+                if self._round(wanted, patient) or self._round(self._look_beside(), patient):
                     self._mend()
                 else:
                     self.done = True
@@ -258,11 +258,11 @@ class Loop:
         self._accept(found, tests)
         return True
 
-    def _unseen_forces(self) -> tuple[Test, ...]:
-        """Tests for a force in what tests of the residual take for linear, where they see one.
+    def _look_beside(self) -> tuple[Test, ...]:
+        """Look for a force in what tests of the residual take for linear; what is seen is left.
 
         Under a sweep each frequency comes at one speed, and drag looks like another response.
-        Where no law convinces, what they see is left.
+        Where no law convinces either, that is what nothing explains.
         """
         if acceptance.force_acts(self.state.accepted):
             return ()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.diagnosis.periodic.period import Period
-from bayeshaptic.diagnosis.residuals.columns import columns, force_test
+from bayeshaptic.diagnosis.residuals.columns import ROUNDING, WEAK, columns, force_test
 from bayeshaptic.diagnosis.residuals.residual import (
     ForceSeen,
     Test,
@@ -21,12 +21,6 @@ from bayeshaptic.diagnosis.residuals.residual import (
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Complexes, Floats
-
-# Share of a column that is left beside everything else where it is nothing else: a force of two
-# levels has no cube.
-_ROUNDING = 1e-6
-# Share of an instrument that its column has at least: less says nothing of how strong a force is.
-_WEAK = 0.05
 
 
 def force_tests(fit: Fit, etfe: Etfe, period: Period) -> tuple[Test, ...]:
@@ -61,10 +55,10 @@ def force_tests(fit: Fit, etfe: Etfe, period: Period) -> tuple[Test, ...]:
         left = left_of(rows)
         instrument, column = left[:, 0], left[:, -1]
         size = float(np.linalg.norm(instrument))
-        if size <= _ROUNDING * float(np.linalg.norm(rows[:, 0])):
+        if size <= ROUNDING * float(np.linalg.norm(rows[:, 0])):
             continue
         along = float(instrument @ residual) / size
-        answers = max(float(instrument @ column) / size, _WEAK * size)
+        answers = max(float(instrument @ column) / size, WEAK * size)
         seen = ForceSeen(along / answers, noise / answers, rms)
         tests.append(force_test(name, abs(along) / noise, seen))
     return tuple(tests)

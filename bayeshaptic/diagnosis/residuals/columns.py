@@ -32,10 +32,10 @@ from bayeshaptic.types import Complexes, Floats
 
 # Share of a column that is left beside the response where it is the response itself: a power of a
 # force of two levels is that force, with the nine digits of a file.
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 # Share of an instrument that its input has at least: less says nothing of how strong a force is.
 # It bounds a strength's standard deviation, and no score, so it raises no alarm.
-_WEAK = 0.05
+WEAK = 0.05
 # Below it a hand moves the device, and the encoder sees it well.
 _SLOW_HZ, _OF_THE_RATE = 20.0, 0.4
 
@@ -83,7 +83,7 @@ def common_coefficient(windows: Windows, inputs: int = 1) -> tuple[float, float,
     instrument, found = windows.design[:, -inputs, -inputs], windows.target[:, -inputs]
     slope = windows.design[:, -inputs, -1]
     whole = np.linalg.norm(windows.design[:, :, -inputs], axis=1)
-    instrument = np.where(np.abs(instrument) > _ROUNDING * whole, instrument, 0.0)
+    instrument = np.where(np.abs(instrument) > ROUNDING * whole, instrument, 0.0)
     lines = np.maximum(windows.lines - nodes - 2, 0.5)
     others = np.sum(np.abs(windows.target[:, nodes + 1 :]) ** 2, axis=1)
     weight = lines / (windows.scatter + others)
@@ -91,7 +91,7 @@ def common_coefficient(windows: Windows, inputs: int = 1) -> tuple[float, float,
     if not each.any():
         return 0.0, 0.0, 1.0
     answers = float(np.sum(weight * (instrument.conj() * slope).real))
-    information = max(answers, _WEAK * float(np.sum(each)))
+    information = max(answers, WEAK * float(np.sum(each)))
     along = float(np.sum(weight * (instrument.conj() * found).real))
     left = found - along / np.sum(each) * instrument
     spread = np.sqrt(np.sum((weight * (instrument.conj() * left).real) ** 2))

@@ -163,6 +163,9 @@ def _blurred(share: float) -> float:
     Friction in it, a cable that slips, damps it and ends in small motions.  Of the power of a sign
     of normal numbers 2 / pi are linear and the rest is noise, half of which stays about a mode: the
     share that changes is 0.28 times the square of friction's share of the damping.
+
+    Both are derived, not measured: a quarter is added for what a mode is not (alone, and all of the
+    response), and a twentieth of the damping is taken to be viscous.
     """
     beyond, of_friction, least = 1.25, 0.28, 0.05
     rubs = float(np.sqrt(share / of_friction))
