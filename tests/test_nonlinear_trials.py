@@ -14,7 +14,7 @@ from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
-from bayeshaptic.diagnosis.trials import beside, force_search
+from bayeshaptic.diagnosis.trials import beside, force_search, force_slopes
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
@@ -161,6 +161,22 @@ def test_how_well_a_friction_is_known_does_not_depend_on_what_was_simulated_befo
     again, moved = spread(bench, found)
     np.testing.assert_allclose(again, known, rtol=0.1)
     np.testing.assert_allclose(moved, along, atol=0.1 * np.abs(along).max())
+
+
+def test_what_nobody_knows_goes_with_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slopes over a damper that is next to nothing are rounding, and friction is a large force."""
+    rng = np.random.default_rng(5)
+    linear = rng.standard_normal((400, 3)) * [4.0, 1.0, 1e-4]
+    forces = 30 * linear[:, :1] + 100 * rng.standard_normal((400, 1))
+    parts = (np.zeros(400), linear, forces, np.ones(3, bool))
+    monkeypatch.setattr(force_slopes, "slopes_of_all", lambda *_: parts)
+    nothing: Any = None
+    covariance, along = spread(nothing, nothing)
+    known = -np.linalg.lstsq(linear[:, :2], forces, rcond=None)[0]
+    np.testing.assert_allclose(along[:2], known, rtol=0.02, atol=0.02)
+    assert abs(along[2]) < 1
+    left = forces + linear[:, :2] @ known
+    assert covariance[0, 0] == pytest.approx(1 / (left.T @ left)[0, 0], rel=0.05)
 
 
 @pytest.mark.parametrize("law", ["coulomb_friction", "stribeck_friction"])

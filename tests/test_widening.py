@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from fake_analysis import FakeAnalysis, fake_closed
 
+from bayeshaptic.diagnosis.widening.discrepancy import share_left
+from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.recordings.study import StudyEntry
 from bayeshaptic.stability.cases import HELD
 from bayeshaptic.study.analysed import Analysed
@@ -50,3 +52,24 @@ def test_recordings_with_different_effects_are_not_alike() -> None:
     reflex, friction = closed("ana"), closed("ben", family="nonlinear")
     assert reflex.effects == ("reflex",) and friction.effects == ("coulomb_friction",)
     assert signature(reflex) != signature(friction)
+
+
+def test_a_law_that_is_not_quite_right_leaves_every_mass_one() -> None:
+    """Without the force the device was another: a load fifty times as heavy, hung on a spring."""
+    found = fake_closed("explained")
+    posterior, fit = found.analysis.posterior, found.analysis.fit
+    heavier = fit.theta * np.where(np.array(fit.model.names) == "m2", 50.0, 1.0)
+    wide = with_law_error(posterior, replace(fit, theta=heavier), fit, found.traced)
+    assert wide is not None
+    chains, before = (p.chains[..., posterior.names.index("m2")] for p in (wide, posterior))
+    assert chains.min() > 0
+    # The strength is known to 3.4 %, and tests see a ninth of what they saw.
+    law = found.traced.state.accepted[0]
+    sd = np.sqrt(
+        law.estimates["friction_force"].sd ** 2 / law.estimates["friction_force"].mean ** 2
+        + share_left(found.traced, "nonlinear") ** 2 / 3
+    )
+    up = chains > before
+    moved = (chains / before - 1)[up] / 49
+    assert np.sqrt(np.mean(moved**2)) == pytest.approx(sd, rel=0.1)
+    assert 0.4 < up.mean() < 0.6

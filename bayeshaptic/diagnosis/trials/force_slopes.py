@@ -84,8 +84,10 @@ def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
         fitted anew: friction that is a little more leaves a damper that is far less.
     """
     _, linear, forces, free = slopes_of_all(bench, found)
-    size, count = len(free), forces.shape[1]
-    along = np.zeros((size, count))
+    along = np.zeros((len(free), forces.shape[1]))
+    # Slopes over what nobody knows to a factor of e are rounding: that goes with no force.
+    linear = np.concatenate([linear, np.eye(linear.shape[1])])
+    forces = np.concatenate([forces, np.zeros((linear.shape[1], forces.shape[1]))])
     along[free] = -np.linalg.lstsq(linear, forces, rcond=None)[0]
     left = forces + linear @ along[free]
     return np.asarray(np.linalg.pinv(left.T @ left, hermitian=True)), along

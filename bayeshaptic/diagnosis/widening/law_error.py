@@ -16,6 +16,7 @@ from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.widening.discrepancy import share_left
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.types import Floats
 
 
 def with_law_error(
@@ -48,8 +49,17 @@ def with_law_error(
         ]
     )
     lowest = np.array([posterior.model.prior(name).support[0] for name in posterior.names])
-    chains = np.maximum(posterior.chains + share[..., None] * moved, lowest)
+    chains = _by(posterior.chains, share[..., None] * moved, lowest)
     return replace(posterior, chains=chains)
+
+
+def _by(chains: Floats, far: Floats, lowest: Floats) -> Floats:
+    """Moved that far, and down to a bound by ever less: a device has no mass that is zero."""
+    above = chains - lowest
+    with np.errstate(divide="ignore", invalid="ignore"):
+        down = lowest + above * np.exp(np.minimum(far, 0.0) / above)
+    bounded = np.isfinite(lowest) & (far < 0) & (above > 0)
+    return np.where(bounded, down, np.maximum(chains + far, lowest))
 
 
 def _relative_sd(law: Accepted) -> float:
