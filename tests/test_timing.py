@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.signals.timing import sampling_period
+from bayeshaptic.types import Floats, Ints
 
 RNG = np.random.default_rng(3)
 N = 5000
@@ -103,11 +104,12 @@ def test_a_period_beside_stamps() -> None:
             sampling_period(EVEN, period)
 
 
-def test_rows_that_a_logger_lost_are_put_back() -> None:
-    """White force on a mass: nothing is known of a lost force, and the position almost exactly."""
+def with_lost_rows(count: float) -> tuple[Floats, Floats, Ints, Recording]:
+    """White force on a mass, read in counts; 21 rows are lost, two of them beside each other."""
     force = RNG.normal(size=N)
     velocity = np.cumsum(force)
     position = np.cumsum(velocity - velocity.mean())
+    position = count * np.round(position / count)
     lost = np.sort(RNG.choice(np.arange(100, N - 100), 20, replace=False))
     lost = np.append(lost, lost[-1] + 1)
     kept = np.setdiff1d(np.arange(N), lost)
@@ -116,9 +118,20 @@ def test_rows_that_a_logger_lost_are_put_back() -> None:
     assert found.period_s == pytest.approx(1e-3, rel=1e-5)
     assert np.array_equal(found.force[kept], force[kept])
     assert np.array_equal(found.position[kept], position[kept])
-    # What is put in for a white force is next to its mean: of 48 coefficients none is sure.
-    assert np.std(found.force[lost]) < 0.5
-    assert np.max(np.abs(found.position[lost] - position[lost])) < 3
     (note,) = (n for n in found.notices if n.topic == "time stamps")
     assert note.level == "note"
     assert "are missing by their time stamps, 2 at most" in note.text
+    return force, position, lost, found
+
+
+def test_rows_that_a_logger_lost_are_put_back_as_the_motion_shows() -> None:
+    force, position, lost, found = with_lost_rows(0.3)
+    assert np.std((found.force - force)[lost]) < 0.1
+    assert np.max(np.abs(found.position[lost] - position[lost])) < 0.5
+
+
+def test_a_force_that_the_motion_hardly_shows_is_put_back_as_its_mean() -> None:
+    """Else noise of the encoder would be in it, and the response too large by it."""
+    _, position, lost, found = with_lost_rows(30.0)
+    assert np.std(found.force[lost]) < 0.5  # of 48 coefficients none is sure
+    assert np.max(np.abs(found.position[lost] - position[lost])) < 60

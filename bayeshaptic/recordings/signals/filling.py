@@ -96,6 +96,55 @@ class Predictor:
         return bands
 
 
+def fill_both(
+    position: Floats, force: Floats, missing: Bools, of_position: Predictor, of_force: Predictor
+) -> tuple[Floats, Floats, Floats]:
+    """Position and force where both are missing: what explains all others best.
+
+    The motion after a lost row tells of its force, as far as it stands out from what disturbs it.
+
+    Parameters
+    ----------
+    position, force : ndarray, shape (N,)
+        Anything where they are missing.
+    missing : ndarray of bool, shape (N,)
+    of_position, of_force : Predictor
+        Of the same order; that of the force takes nothing but its own past.
+
+    Returns
+    -------
+    position, force : ndarray, shape (N,)
+    variance : ndarray
+        Of what was put in for each missing force.
+    """
+    position, force, order = position.copy(), force.copy(), of_position.order
+    errors = (of_position.errors(position, force), of_force.errors(force, np.zeros(len(force))))
+    tiny = 1e-9  # of a signal, where it is predicted exactly
+    spreads = (
+        max(of_position.spread, tiny * float(np.std(position))),
+        max(of_force.spread, tiny * float(np.std(force))),
+    )
+    where, variance = np.flatnonzero(missing), []
+    for near in np.split(where, np.flatnonzero(np.diff(where) > order) + 1):
+        rows = slice(near[0], near[-1] + order + 1)
+        left = [error[rows] / spread for error, spread in zip(errors, spreads, strict=True)]
+        design = np.zeros((2, len(left[0]), 2, len(near)))
+        for column, at in enumerate(near - near[0]):
+            after = slice(at, at + order + 1)
+            count = len(left[0][after])
+            design[0, after, 0, column] = of_position.past[:count] / spreads[0]
+            design[0, after, 1, column] = -of_position.force[:count] / spreads[0]
+            design[1, after, 1, column] = of_force.past[:count] / spreads[1]
+        flat = design.reshape(2 * len(left[0]), -1)
+        scale = np.abs(flat).max(axis=0)
+        inverse = np.linalg.pinv(flat / scale, rcond=1e-12) / scale[:, None]
+        change = -(inverse @ np.concatenate(left)).reshape(2, -1)
+        position[near] += change[0]
+        force[near] += change[1]
+        variance.append(np.sum(inverse[len(near) :] ** 2, axis=1))
+    return position, force, np.concatenate(variance)
+
+
 def fit_predictor(
     position: Floats, force: Floats, missing: Bools, order: int = ORDER
 ) -> Predictor | None:
