@@ -19,9 +19,6 @@ from bayeshaptic.types import Floats
 
 _LINES, _FEWEST = 60, 5  # lines in a stretch above the band, and stretches that tell a floor
 _TOGETHER = 3  # windows whose noise is averaged
-# Columns of a window for leakage that has the poles of the response, as beside sharp modes of short
-# recordings: 10 to 38 dB of feigned noise in 6 of 30 clean ones that the others cannot hold.
-_LEAKS = 2
 _NEAR_OCTAVES = 0.2  # of a crossing: a mode wanders that far
 _HAND_HZ, _FREE_HZ = 45.0, 20.0  # below it a hand, or a draught, moves the device
 
@@ -89,11 +86,13 @@ def _noise_of(fit: Fit, etfe: Etfe) -> _Noise | None:
     rounded = 0.25  # counts a sample; rounding a slower motion does not make white noise
     if _counts_a_sample(recording) < rounded:
         return None
-    # As measured, nothing discounted.  Leakage has the poles of the response.
-    leaks = fit.response(spectra.frequency_hz) * spectra.frequency_hz ** np.arange(_LEAKS)[:, None]
-    windows = RandomSpectra.windows(spectra, fit.response, leaks)
-    lines = np.maximum(windows.lines - 3 - _LEAKS, 1.0)
-    scatter = windows.scatter - (windows.lines - lines) * spectra.floor  # a line's for each line
+    # As measured, nothing discounted.  A mode narrower than a line is where the window says it is:
+    # what a fit is off by there, many times smaller than the mode, would be louder than the noise.
+    windows = RandomSpectra.windows(spectra, fit.response)
+    own = RandomSpectra.windows(spectra)
+    lines = np.maximum(windows.lines - 3, 1.0)
+    left = np.minimum(windows.scatter, own.scatter)
+    scatter = left - (windows.lines - lines) * spectra.floor  # a line's for each line
     centre = windows.frequency_hz[:, 1]
     driven = centre > (_HAND_HZ if fit.model.held else _FREE_HZ)
     if driven.sum() < _TOGETHER:

@@ -12,6 +12,7 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import interval, pretty_unit, pure
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.spectra import (
+    JoinedSpectra,
     PeriodicSpectra,
     RandomSpectra,
     Spectra,
@@ -101,6 +102,12 @@ class Etfe(Shown):
     def stiffness_unit(self) -> str:
         return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
 
+    @property
+    def blurred(self) -> Etfe:
+        """With the leakage of modes that ring on among the noise, which widens their valleys."""
+        spectra = _blurred(self.spectra)
+        return self if spectra is self.spectra else replace(self, spectra=spectra)
+
     def later(self, delay_s: float) -> Etfe:
         """A table's response with more delay in it.
 
@@ -144,6 +151,16 @@ class Etfe(Shown):
             f"{pure(error, 2)} % of its magnitude",
             f"{'random' if self.period_lines is None else 'periodic'} excitation",
         )
+
+
+def _blurred(spectra: Spectra) -> Spectra:
+    if isinstance(spectra, JoinedSpectra):
+        parts = tuple(_blurred(part) for part in spectra.parts)
+        same = all(a is b for a, b in zip(parts, spectra.parts, strict=True))
+        return spectra if same else JoinedSpectra(parts)
+    if isinstance(spectra, RandomSpectra) and spectra.ringing_hz is not None:
+        return replace(spectra, ringing_hz=None)
+    return spectra
 
 
 def compress(

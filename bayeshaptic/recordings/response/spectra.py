@@ -54,6 +54,9 @@ class RandomSpectra:
         The reference to use when none is given.
     noise_slope : ndarray, shape (W,), or None
         The power with which the noise falls over the frequency in each window; None: zero.
+    ringing_hz : complex ndarray, shape (W,), or None
+        The pole f + j a / 2 pi of a mode at f, its decay a, whose leakage a window shows; nan in
+        the others, and None where it is in all of them (`estimators/ringing.py`).
     """
 
     frequency_hz: NDArray[Any] = field(repr=False)
@@ -63,6 +66,7 @@ class RandomSpectra:
     floor: NDArray[Any]
     reference: Reference = field(repr=False)
     noise_slope: NDArray[Any] | None = field(default=None, repr=False)
+    ringing_hz: NDArray[Any] | None = field(default=None, repr=False)
 
     @property
     def lines(self) -> int:
@@ -81,7 +85,8 @@ class RandomSpectra:
         return (low + high) / 2 + (high - low) / 2 * NODES
 
     @cached_property
-    def _blocks(self) -> list[Block]:
+    def blocks(self) -> list[Block]:
+        """All windows, those of similar width together."""
         # Padding costs less than a call a window: a block spans widths up to a factor 1.5.
         width = np.maximum.accumulate(np.diff(self.edges))
         blocks, first = [], 0
@@ -98,13 +103,12 @@ class RandomSpectra:
         line = start + np.minimum(offset, width - 1)
         x = 2 * (line - start) / (width - 1) - 1
         frequency = self.frequency_hz[line]
-        centre = frequency.mean(axis=1, keepdims=True)
         whitened = inside.astype(float)
         if self.noise_slope is not None:
             middle = self.nodes_hz[window, 1:2]
             whitened *= (frequency / middle) ** (self.noise_slope[window, None] / 2)
-        terms = leakage_terms(x, frequency, centre)
-        leakage = np.linalg.qr(terms * whitened[..., None])[0]
+        terms = self._leakage(window, x, frequency)
+        leakage = np.linalg.qr(terms * whitened[..., None])[0] * np.any(terms, -2, keepdims=True)
         position = self.position[line] * whitened
         return Block(
             window=window,
@@ -116,14 +120,30 @@ class RandomSpectra:
             weights=interpolation(x),
         )
 
+    def _leakage(self, window: slice, x: NDArray[Any], frequency: NDArray[Any]) -> NDArray[Any]:
+        """What leakage may be, (W, w, 5), or 6 with zeros where nothing rings."""
+        terms = leakage_terms(x, frequency, frequency.mean(axis=1, keepdims=True))
+        if self.ringing_hz is None:
+            return terms
+        pole = self.ringing_hz[window, None]
+        ringing = 1 / (frequency - np.where(np.isnan(pole), np.inf, pole))
+        return np.concatenate([terms, ringing[..., None]], axis=-1)
+
+    @cached_property
+    def freedom(self) -> NDArray[Any]:
+        """Lines of each window less what leakage takes; a pole that was looked for is one more."""
+        lines = np.diff(self.edges) - float(LEAKAGE_TERMS)
+        return lines if self.ringing_hz is None else lines - 2.0 * ~np.isnan(self.ringing_hz)
+
     def columns(self, window: int) -> tuple[slice, NDArray[Any]]:
-        """The lines of a window, and what response and leakage may make of it, (w, 8)."""
+        """The lines of a window, and what response and leakage may make of it, (w, 8 or 9)."""
         lines = slice(int(self.edges[window]), int(self.edges[window + 1]))
         frequency = self.frequency_hz[lines]
         x = np.linspace(-1, 1, len(frequency))
         ratio = self.reference(frequency)[:, None] / self.reference(self.nodes_hz[window])
         answer = self.force[lines, None] * interpolation(x) * ratio
-        return lines, np.concatenate([leakage_terms(x, frequency, frequency.mean()), answer], 1)
+        leakage = self._leakage(slice(window, window + 1), x[None], frequency[None])[0]
+        return lines, np.concatenate([leakage[:, np.any(leakage, axis=0)], answer], axis=1)
 
     def windows(
         self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
@@ -151,7 +171,7 @@ class RandomSpectra:
         design = np.zeros((count, k, k), dtype=complex)
         target = np.zeros((count, k), dtype=complex)
         scatter = np.empty(count)
-        for block in self._blocks:
+        for block in self.blocks:
             moved = [block.force[..., None] * columns.response(block), *columns.known(block)]
             column = project_out(block.leakage, np.concatenate(moved, axis=-1))
             q, triangle = np.linalg.qr(column)
@@ -160,13 +180,12 @@ class RandomSpectra:
             rows = z.shape[1]
             design[block.window, :rows], target[block.window, :rows] = triangle, z
             scatter[block.window] = np.sum(np.abs(rest) ** 2, axis=1)
-        lines = np.diff(self.edges) - LEAKAGE_TERMS
         return Windows(
             frequency_hz=self.nodes_hz,
             design=design,
             target=target,
-            scatter=scatter + lines * self.floor,
-            lines=lines.astype(float),
+            scatter=scatter + self.freedom * self.floor,
+            lines=self.freedom,
         )
 
 

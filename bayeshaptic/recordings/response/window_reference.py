@@ -63,6 +63,19 @@ class LocalRational:
             np.where(better[:, None], self.denominator, one),
         )
 
+    def with_poles(self, poles_hz: NDArray[Any]) -> LocalRational:
+        """`unit_mass` over a pole, where there is one; shape (W,), Hz, nan where not."""
+        here = (poles_hz - self.centre_hz) / self.scale_hz
+        one, over = np.array([1, 0, 0]), np.stack([-here, np.ones_like(here), 0 * here], axis=-1)
+        there = ~np.isnan(poles_hz)[:, None]
+        return LocalRational(
+            self.edges_hz,
+            self.centre_hz,
+            self.scale_hz,
+            np.where(there, one, self.numerator),
+            np.where(there, over, self.denominator),
+        )
+
 
 def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> LocalRational:
     """Fit the rational reference to the nodes of each window and its neighbours.

@@ -54,7 +54,7 @@ class InstrumentSpectra(RandomSpectra):
     def strength(self) -> NDArray[Any]:
         """F of the force's regression on the reference in each window, shape (W,)."""
         found = np.empty(len(self.nodes_hz))
-        for block in self._blocks:
+        for block in self.blocks:
             basis = self._basis(block, block.weights, ())
             force = project_out(block.leakage, block.force[..., None])
             rest = _power(project_out(basis, force))
@@ -83,7 +83,7 @@ class InstrumentSpectra(RandomSpectra):
         design = np.empty((count, k, k), dtype=complex)
         target = np.empty((count, k), dtype=complex)
         scatter = np.empty(count)
-        for block in self._blocks:
+        for block in self.blocks:
             response, known = columns.response(block), columns.known(block)
             moved = [block.force[..., None] * response, *known]
             column = project_out(block.leakage, np.concatenate(moved, axis=-1))

@@ -58,6 +58,7 @@ def _lowest(spectra: RandomSpectra, count: int) -> RandomSpectra:
         position=spectra.position[:end],
         edges=spectra.edges[: count + 1],
         floor=spectra.floor[:count],
+        ringing_hz=None if spectra.ringing_hz is None else spectra.ringing_hz[:count],
     )
 
 

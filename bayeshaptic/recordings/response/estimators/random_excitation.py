@@ -13,6 +13,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band
 from bayeshaptic.recordings.response.estimators.instrument import STRONG, InstrumentSpectra
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
+from bayeshaptic.recordings.response.estimators.ringing import with_ringing
 from bayeshaptic.recordings.response.local_polynomial import (
     default_minimum_lines,
     window_edges,
@@ -222,15 +223,20 @@ def _too_short(
 def _with_reference(spectra: RandomSpectra) -> RandomSpectra:
     """With a local rational reference where it explains a window better than a unit mass.
 
-    And with the slope of the noise around it.
+    And with the poles of modes that ring on, and the slope of the noise around it.
     """
     plain = spectra.windows()
     rational = fit_local_rational(plain)
     fitted = spectra.windows(rational)
     gain = (plain.lines - 1) * np.log(plain.scatter / fitted.scatter)
-    spectra = replace(spectra, reference=rational.where(gain > BETTER))
-    whole = spectra.regressed() if isinstance(spectra, InstrumentSpectra) else spectra
-    return replace(spectra, noise_slope=noise_slopes(whole))
+    curved = gain > BETTER
+    rational = rational.where(curved)
+    spectra = replace(spectra, reference=rational)
+    if isinstance(spectra, InstrumentSpectra):
+        return replace(spectra, noise_slope=noise_slopes(spectra.regressed()))
+    scatter = np.where(curved, fitted.scatter, plain.scatter)
+    spectra = with_ringing(spectra, rational, curved, scatter)
+    return replace(spectra, noise_slope=noise_slopes(spectra))
 
 
 def _detrended(values: NDArray[Any]) -> NDArray[Any]:

@@ -1,0 +1,142 @@
+r"""Leakage of modes that ring on: it has their poles, and no polynomial in a window has those.
+
+Between samples a linear device is a state that grows by a matrix.  The leakage of a record of N
+samples is what its two ends make of that,
+
+.. math:: T(z) \propto C (z I - F)^{-1} (x_0 - x_N),
+
+so that a mode of the pole p adds one column, 1 / (z - p), whatever the zeros of the response are.
+Where a mode is damped so little that its peak is a few lines wide, that column is not smooth
+over a window; left in, it looked like noise, up to 70 dB above the encoder's.  Near its mode the
+response has the same pole, so that force and position tell it: in each window
+
+.. math:: Y = \frac{b_0 + b_1 x + b_2 x^2}{x - p} U + \frac{t}{x - p} + \text{smooth leakage},
+
+linear but for p, which least squares find (variable projection: G. H. Golub and V. Pereyra, *SIAM
+Journal on Numerical Analysis* 10(2), 1973).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.recordings.response.local_polynomial import NODES
+from bayeshaptic.recordings.response.regressors import Block
+from bayeshaptic.recordings.response.spectra import RandomSpectra, project_out
+from bayeshaptic.recordings.response.window_reference import LocalRational, unit_mass
+
+# What a pole must explain of a window, and what of that as the response's: a tone has none.
+RINGS, ITS_RESPONSE = 25.0, 10.0
+# Of a line: what is damped less does not end with the record, and is a tone.
+LEAST_DAMPED = 0.1
+# A pole costs a window two lines, and of these at least five must be left.
+FEWEST_LINES = 12
+_LINEAR_ROUNDS, _ROUNDS = 4, 10
+_NEAREST = 0.02  # of a line: no pole is on one
+_FARTHEST = 4.0  # half-widths of a window: from there leakage is smooth
+
+
+def with_ringing(
+    spectra: RandomSpectra,
+    rational: LocalRational,
+    curved: NDArray[Any],
+    scatter: NDArray[Any],
+) -> RandomSpectra:
+    """With the poles of modes whose leakage a window shows, and in such windows of the response.
+
+    Parameters
+    ----------
+    spectra : RandomSpectra
+    rational : LocalRational
+        Its reference.
+    curved : ndarray of bool, shape (W,)
+        Windows whose response is more than a parabola; these are tried, and those beside them.
+    scatter : ndarray, shape (W,)
+        Of the windows as they are.
+    """
+    tried = _or_beside(curved) & (np.diff(spectra.edges) >= FEWEST_LINES)
+    poles_hz, left = np.full(len(tried), np.nan, complex), np.full(len(tried), np.inf)
+    for block in spectra.blocks:
+        rows = np.flatnonzero(tried[block.window])
+        if len(rows):
+            own = np.arange(len(tried))[block.window][rows]
+            poles_hz[own], left[own] = _poles(spectra, block, rows)
+    left += spectra.freedom * spectra.floor
+
+    def explains(more: NDArray[Any], enough: float) -> NDArray[Any]:
+        return (spectra.freedom - 1) * (np.log(more) - np.log(left)) > enough
+
+    line = spectra.frequency_hz[1] - spectra.frequency_hz[0]
+    found = explains(scatter, RINGS) & (poles_hz.imag > LEAST_DAMPED * line)
+    if not found.any():
+        return spectra
+    poles_hz[~found] = np.nan
+    as_a_tone = replace(spectra, ringing_hz=poles_hz).windows(unit_mass).scatter
+    rings = found & _or_beside(found & explains(as_a_tone, ITS_RESPONSE))
+    if not rings.any():
+        return spectra
+    poles_hz[~rings] = np.nan
+    return replace(spectra, reference=rational.with_poles(poles_hz), ringing_hz=poles_hz)
+
+
+def _or_beside(chosen: NDArray[Any]) -> NDArray[Any]:
+    return np.convolve(chosen, np.ones(3), "same") > 0
+
+
+def _poles(
+    spectra: RandomSpectra, block: Block, rows: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Poles that leave least in some windows of a block, Hz, and what they leave; shape (R,)."""
+    nodes = spectra.nodes_hz[block.window][rows]
+    block = Block(block.window, *(values[rows] for values in block[1:]))
+    centre = nodes[:, 1:2]
+    half = (nodes[:, 2:] - centre) / NODES[2]
+    x = (spectra.frequency_hz[block.line] - centre) / half
+    inside = block.whitened > 0
+    line = _NEAREST * 2 / (inside.sum(axis=1, keepdims=True) - 1)
+    powers = np.stack([np.ones_like(x), x, x**2], axis=-1)
+    forced = block.force[..., None] * powers
+    y = spectra.position[block.line] * block.whitened
+
+    pole = 1j * np.ones_like(centre)  # broad
+    weight = inside.astype(float)
+    for _ in range(_LINEAR_ROUNDS):
+        # (x - p) Y is linear in p, the response's numerator and the leakage's.
+        columns = np.concatenate([block.leakage, (x**3 * inside)[..., None], forced], -1)
+        basis = np.linalg.qr(columns * weight[..., None])[0]
+        known = project_out(basis, (weight * y)[..., None])
+        moved = project_out(basis, (weight * x * y)[..., None])
+        pole = _bounded(_quotient(known, moved), line)
+        weight = inside / np.abs(x - pole)
+    best, least = pole, np.full(len(pole), np.inf)
+    for _ in range(_ROUNDS):
+        peak = inside / (x - pole)
+        columns = np.concatenate([peak[..., None], forced * peak[..., None]], -1)
+        q, triangle = np.linalg.qr(project_out(block.leakage, columns))
+        z = q.conj().swapaxes(-1, -2) @ block.position[..., None]
+        rest = block.position[..., None] - q @ z
+        scatter = np.sum(np.abs(rest) ** 2, axis=(1, 2))
+        better = scatter < least
+        best = np.where(better[:, None], pole, best)
+        least = np.where(better, scatter, least)
+        coefficients = np.linalg.pinv(triangle, rcond=1e-12) @ z
+        slope = (columns @ coefficients) * peak[..., None]
+        slope = project_out(q, project_out(block.leakage, slope))
+        pole = _bounded(pole + _quotient(slope, rest), line)
+    return (centre + half * best)[:, 0], least
+
+
+def _quotient(by: NDArray[Any], of: NDArray[Any]) -> NDArray[Any]:
+    """Least squares of one column on another, (W, w, 1) each; shape (W, 1)."""
+    power = np.sum(np.abs(by) ** 2, axis=1) + np.finfo(float).tiny
+    return np.asarray(np.sum(by.conj() * of, axis=1) / power)
+
+
+def _bounded(pole: NDArray[Any], least: NDArray[Any]) -> NDArray[Any]:
+    """Damped, and not far from the window."""
+    real = np.clip(pole.real, -_FARTHEST, _FARTHEST)
+    return np.asarray(real + 1j * np.clip(pole.imag, least, _FARTHEST))
