@@ -206,6 +206,16 @@ def test_strong_friction_makes_a_free_device_look_held(monkeypatch, family, best
     assert chosen_of(monkeypatch, "grasped", misfits, found, scores=scores) == (best, tried)
 
 
+def test_no_hand_takes_for_its_own_motion_what_a_force_leaves(monkeypatch) -> None:
+    """Backlash in a free device: a hand that the response does not show has noise enough."""
+    found = {
+        "free": traced("free", UNEXPLAINED, 1.0, 1, family="nonlinear"),
+        "grasped": traced("grasped", CONSISTENT, 1.0),
+    }
+    misfits, scores = {"free": 1.0, "grasped": 1.0}, {"grasped": 50.0}
+    assert chosen_of(monkeypatch, "free", misfits, found, scores=scores) == ("free", ["free"])
+
+
 def test_of_base_models_that_explain_alike_the_one_with_fewest_effects(monkeypatch) -> None:
     """A third mass with a spring is a hand: 10 and 2 parameters, 11 and 1."""
     found = {

@@ -129,12 +129,14 @@ def _beside_a_force(begun: Begun, own: Traced) -> tuple[str, ...]:
     """The best other base model where a force was found that the choice did not know of.
 
     Strong friction makes a free device look held: the choice was made on a motion that is not
-    linear.
+    linear.  The other way round there is nothing to make good: no force hides a hand, and one that
+    the response does not show would take what the force leaves for its own motion.
     """
     choice = begun.choice
     if choice is None or not any(one.family == "nonlinear" for one in own.state.accepted):
         return ()
-    return _best_other(choice, choice.candidates[begun.fit.model.name])
+    chosen = choice.candidates[begun.fit.model.name]
+    return _best_other(choice, chosen) if chosen.held else ()
 
 
 def _hardly_worse(begun: Begun) -> tuple[str, ...]:
