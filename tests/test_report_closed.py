@@ -17,6 +17,9 @@ from fake_analysis import FakeAnalysis, fake_analysis, fake_closed
 from bayeshaptic import read_recording, write_report
 from bayeshaptic.diagnosis.residuals.columns import motions
 from bayeshaptic.diagnosis.residuals.force_curve import force_curve
+from bayeshaptic.diagnosis.state import Accepted
+from bayeshaptic.diagnosis.traced import Candidate
+from bayeshaptic.effects.library import effect_class
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.response.estimate import estimate_etfe
@@ -27,7 +30,7 @@ from bayeshaptic.report.figures import LOOP_PICTURES
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.tables import candidates, errors, estimates, found, outcomes
-from bayeshaptic.report.loop.words import lacked, verdict
+from bayeshaptic.report.loop.words import in_short, lacked, subject, verdict
 from bayeshaptic.report.words import widened
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
@@ -97,6 +100,29 @@ def test_two_effects_are_both_named() -> None:
     assert "a reflex of the hand" in text and " and dry (Coulomb) friction" in text
     assert "adding them (3 parameters)" in text
     assert [row.name for row in found(closed)] == ["reflex", "coulomb_friction"]
+
+
+@pytest.mark.parametrize(
+    "names, taken",
+    [
+        (["sample_jitter"], "taken for noise"),
+        (["quantisation"], "taken for noise"),
+        (["mains_tone"], "mended"),
+        (["quantisation", "held_samples"], "mended"),
+    ],
+)
+def test_what_cannot_be_mended_is_not_said_to_be(names: list[str], taken: str) -> None:
+    closed = fake_closed(family="linear")
+    kinds = [effect_class(name) for name in names]
+    seen = tuple(Accepted(e.name, e.title, e.family, "seen in the samples") for e in kinds)
+    tried = tuple(Candidate(e.name, e.title, 20.0, True, 0) for e in kinds)
+    state = replace(closed.traced.state, accepted=seen)
+    closed = replace(closed, traced=replace(closed.traced, state=state, candidates=tried))
+    assert f"here that is {taken}" in in_short(closed)
+    assert ("mending that" in lacked(closed)) == (taken == "mended")
+    assert subject(closed) == f"the recording with what was found {taken}"
+    (*_, fate) = candidates(closed)[0]
+    assert ("mended" in fate) == (names[0] == "mains_tone")
 
 
 def test_consistent_says_that_there_is_nothing() -> None:

@@ -14,11 +14,15 @@ from bayeshaptic.effects.registry import register
 
 @dataclass(frozen=True)
 class MeasurementEffect:
-    """What is wrong with a measurement, by name."""
+    """What is wrong with a measurement, by name.
+
+    What cannot be `mended` stays in the recording, as noise.
+    """
 
     name: ClassVar[str]
     title: ClassVar[str]
     family: ClassVar[str] = "measurement"
+    mended: ClassVar[bool] = True
     ties: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
 
@@ -29,6 +33,7 @@ class Quantisation(MeasurementEffect):
 
     name = "quantisation"
     title = "coarse resolution of the position"
+    mended = False
 
 
 @register
@@ -64,6 +69,7 @@ class SampleJitter(MeasurementEffect):
 
     name = "sample_jitter"
     title = "jitter of the sampling instants"
+    mended = False
 
 
 @register

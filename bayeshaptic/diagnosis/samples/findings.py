@@ -40,8 +40,6 @@ class Finding:
     statistic, threshold : float
     text : str
     estimates : mapping
-    mended : bool
-        Whether the recording can be mended.
     known : bool
         Whether it is understood; otherwise the test stays flagged.
     frequency_hz : float or None
@@ -52,13 +50,17 @@ class Finding:
     threshold: float
     text: str
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
-    mended: bool = True
     known: bool = True
     frequency_hz: float | None = None
 
     @property
     def flagged(self) -> bool:
         return self.test.flagged
+
+    @property
+    def mended(self) -> bool:
+        """Whether the recording can be mended."""
+        return self.effect.mended
 
     @property
     def test(self) -> Test:
@@ -89,9 +91,7 @@ def of_resolution(found: Resolution, unit: str) -> Finding:
         if found.declared:
             text += f" where {quantity(found.declared, unit)} were declared"
     estimates = {"resolution": Estimate(found.count, 0.0, unit)}
-    return Finding(
-        Quantisation, found.statistic, thresholds.RESOLUTION, text, estimates, mended=False
-    )
+    return Finding(Quantisation, found.statistic, thresholds.RESOLUTION, text, estimates)
 
 
 def of_clipping(recording: Recording, wrong: Bools, statistic: float) -> Finding:
@@ -157,7 +157,7 @@ def of_jitter(found: Jitter, period_s: float) -> Finding:
             f"({100 * found.sd_s / period_s:.2g} % of the period)"
         )
     estimates = {"sd_s": Estimate(found.sd_s, found.sd_sd_s, "s")}
-    return Finding(SampleJitter, found.score, found.threshold, text, estimates, mended=False)
+    return Finding(SampleJitter, found.score, found.threshold, text, estimates)
 
 
 def of_tones(found: Tones, unit: str) -> Finding:

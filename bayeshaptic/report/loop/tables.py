@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.effects.library import effect_class
 from bayeshaptic.quantities import estimate, percent, quantity, scale
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
@@ -102,7 +103,8 @@ def candidates(closed: Closed) -> Rows:
                 fate = "does not predict" if candidate.score <= 0 else "not accepted"
             score = _score(candidate.score)
             if candidate.accepted and number == 0:
-                score, fate = _DASH, "seen in the samples, and mended before the first round"
+                mended = "mended" if effect_class(candidate.name).mended else "taken for noise"
+                score, fate = _DASH, f"seen in the samples, and {mended} before the first round"
             rows.append((str(number), candidate.title, score, fate))
     return tuple(rows)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.traced import CONSISTENT, UNEXPLAINED
+from bayeshaptic.effects.library import effect_class
 from bayeshaptic.quantities import (
     estimate,
     pretty_unit,
@@ -71,16 +72,17 @@ def _rest(closed: Closed) -> str:
 
 def lacked(closed: Closed) -> str:
     """What was added and what it changed, in one paragraph."""
-    mended, added = _mended_and_added(closed)
+    measured, added = _measured_and_added(closed)
     parts = []
-    for what, effects in (("the recording has", mended), ("the model lacked", added)):
+    for what, effects in (("the recording has", measured), ("the model lacked", added)):
         named = [f"{_with_article(e.title)}{_numbers(closed, e)}" for e in effects]
         parts += [f"{what} {' and '.join(named)}"] if named else []
     text = "; ".join(parts)
     count = sum(_count(effect) for effect in added)
     size = f" ({count} parameter{'' if count == 1 else 's'})" if count else ""
     adding = f"adding {'it' if len(added) == 1 else 'them'}{size}"
-    doing = " and ".join((["mending that"] if mended else []) + ([adding] if added else []))
+    taking = "mending that" if _is_mended(closed) else "taking that for noise"
+    doing = " and ".join(([taking] if measured else []) + ([adding] if added else []))
     return (
         f"{text[0].upper()}{text[1:]}; {doing} {_error_change(closed)}{_noise_change(closed)}; "
         f"{_limit_change(closed)}."
@@ -101,30 +103,36 @@ def in_short(closed: Closed) -> str:
         return "The model as declared explains the recording to within its noise."
     if not closed.effects:
         return ""
-    mended, added = (
+    measured, added = (
         " and ".join(_with_article(effect.title) for effect in effects)
-        for effects in _mended_and_added(closed)
+        for effects in _measured_and_added(closed)
     )
     found = []
-    if mended:
-        found.append(f"The recording has {mended}; here that is mended.")
+    if measured:
+        taken = "is mended" if _is_mended(closed) else "is taken for noise"
+        found.append(f"The recording has {measured}; here that {taken}.")
     if added:
-        here = "it is" if len(_mended_and_added(closed)[1]) == 1 else "they are"
+        here = "it is" if len(_measured_and_added(closed)[1]) == 1 else "they are"
         found.append(f"The model as declared lacked {added}; here {here} in the model.")
     return f"{' '.join(found)} {_moved(closed)}."
 
 
-def _mended_and_added(closed: Closed) -> tuple[list[Accepted], list[Accepted]]:
+def _measured_and_added(closed: Closed) -> tuple[list[Accepted], list[Accepted]]:
     """What was found in the measurement, and in the device."""
-    mended = [effect for effect in closed.effects if effect.family == "measurement"]
-    return mended, [effect for effect in closed.effects if effect not in mended]
+    measured = [effect for effect in closed.effects if effect.family == "measurement"]
+    return measured, [effect for effect in closed.effects if effect not in measured]
+
+
+def _is_mended(closed: Closed) -> bool:
+    """Whether something found in the measurement was put right, and does not stay as noise."""
+    return any(effect_class(effect.name).mended for effect in _measured_and_added(closed)[0])
 
 
 def subject(closed: Closed) -> str:
     """What the numbers of a page are of, where something was found."""
-    mended, added = _mended_and_added(closed)
+    mended, added = _is_mended(closed), _measured_and_added(closed)[1]
     if not added:
-        return "the recording with what was found mended"
+        return "the recording with what was found" + (" mended" if mended else " taken for noise")
     return f"the model with what was found{' in the mended recording' if mended else ''}"
 
 
@@ -137,7 +145,7 @@ def scope(closed: Closed) -> str:
     """What else is different in the rest of the page."""
     families = {effect.family for effect in closed.effects}
     found = []
-    if families & {"nonlinear", "measurement"}:
+    if "nonlinear" in families or _is_mended(closed):
         found.append("the measured response is drawn without what these add to it")
     if "time-varying" in families:
         found.append("of what changes over time, the worst part or state counts")
