@@ -135,3 +135,15 @@ def test_a_force_that_the_motion_hardly_shows_is_put_back_as_its_mean() -> None:
     _, position, lost, found = with_lost_rows(30.0)
     assert np.std(found.force[lost]) < 0.5  # of 48 coefficients none is sure
     assert np.max(np.abs(found.position[lost] - position[lost])) < 60
+
+
+def test_a_force_of_two_levels_is_put_back_between_them() -> None:
+    """Held for five samples, it is expected not to change at most of them, and changes at some."""
+    held = np.repeat(RNG.choice([-1.0, 1.0], N // 5), 5)
+    velocity = np.cumsum(held)
+    position = np.round(np.cumsum(velocity - velocity.mean()))
+    lost = 100 + 121 * np.arange(40)
+    kept = np.setdiff1d(np.arange(N), lost)
+    found = recording_from_arrays(held[kept], position[kept], time=EVEN[kept]).force
+    assert np.abs(found).max() <= 1
+    assert np.std((found - held)[lost]) < 0.3

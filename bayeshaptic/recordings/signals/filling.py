@@ -119,10 +119,12 @@ def fill_both(
     """
     position, force, order = position.copy(), force.copy(), of_position.order
     errors = (of_position.errors(position, force), of_force.errors(force, np.zeros(len(force))))
+    whole = np.convolve(missing, np.ones(order + 1))[: len(missing)] < 1
     tiny = 1e-9  # of a signal, where it is predicted exactly
     spreads = (
         max(of_position.spread, tiny * float(np.std(position))),
-        max(of_force.spread, tiny * float(np.std(force))),
+        # Of a force that is constant most of the time the median error says nothing of its steps.
+        max(float(np.std(errors[1][whole])), tiny * float(np.std(force))),
     )
     where, variance = np.flatnonzero(missing), []
     for near in np.split(where, np.flatnonzero(np.diff(where) > order) + 1):

@@ -51,7 +51,8 @@ def put_back(
     place, push, variance = fill_both(moved, pushed, missing, of_motion, own)
     if np.sum(variance) > _BIAS * np.sum(force**2):
         push = own.fill(pushed, np.zeros(len(every)), missing)
-        place = _predictor(moved, push, missing, where).fill(moved, push, missing)
+        place = of_motion.fill(moved, push, missing)
+    push = np.clip(push, force.min(), force.max())  # it was commanded as the others were
     for signal in (push, place):
         signal.setflags(write=False)
     return push, place, along
