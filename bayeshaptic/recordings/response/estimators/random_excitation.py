@@ -13,7 +13,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band
 from bayeshaptic.recordings.response.estimators.instrument import STRONG, InstrumentSpectra
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
-from bayeshaptic.recordings.response.estimators.ringing import with_ringing
+from bayeshaptic.recordings.response.estimators.ringing import ringing_poles
 from bayeshaptic.recordings.response.local_polynomial import (
     default_minimum_lines,
     window_edges,
@@ -231,11 +231,13 @@ def _with_reference(spectra: RandomSpectra) -> RandomSpectra:
     gain = (plain.lines - 1) * np.log(plain.scatter / fitted.scatter)
     curved = gain > BETTER
     rational = rational.where(curved)
-    spectra = replace(spectra, reference=rational)
     if isinstance(spectra, InstrumentSpectra):
+        spectra = replace(spectra, reference=rational)
         return replace(spectra, noise_slope=noise_slopes(spectra.regressed()))
-    scatter = np.where(curved, fitted.scatter, plain.scatter)
-    spectra = with_ringing(spectra, rational, curved, scatter)
+    poles = ringing_poles(spectra, curved, np.where(curved, fitted.scatter, plain.scatter))
+    if poles is not None:
+        rational = rational.with_poles(poles)
+    spectra = replace(spectra, reference=rational, ringing_hz=poles)
     return replace(spectra, noise_slope=noise_slopes(spectra))
 
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from bayeshaptic.recordings.response.local_polynomial import NODES
 from bayeshaptic.recordings.response.regressors import Block
 from bayeshaptic.recordings.response.spectra import RandomSpectra, project_out
-from bayeshaptic.recordings.response.window_reference import LocalRational, unit_mass
+from bayeshaptic.recordings.response.window_reference import unit_mass
 
 # What a pole must explain of a window, and what of that as the response's: a tone has none.
 RINGS, ITS_RESPONSE = 25.0, 10.0
@@ -40,23 +40,18 @@ _NEAREST = 0.02  # of a line: no pole is on one
 _FARTHEST = 4.0  # half-widths of a window: from there leakage is smooth
 
 
-def with_ringing(
-    spectra: RandomSpectra,
-    rational: LocalRational,
-    curved: NDArray[Any],
-    scatter: NDArray[Any],
-) -> RandomSpectra:
-    """With the poles of modes whose leakage a window shows, and in such windows of the response.
+def ringing_poles(
+    spectra: RandomSpectra, curved: NDArray[Any], scatter: NDArray[Any]
+) -> NDArray[Any] | None:
+    """Poles of modes whose leakage a window shows, Hz, nan where none, shape (W,); None: nowhere.
 
     Parameters
     ----------
     spectra : RandomSpectra
-    rational : LocalRational
-        Its reference.
     curved : ndarray of bool, shape (W,)
         Windows whose response is more than a parabola; these are tried, and those beside them.
     scatter : ndarray, shape (W,)
-        Of the windows as they are.
+        Of the windows with the best reference that they have without a pole.
     """
     tried = _or_beside(curved) & (np.diff(spectra.edges) >= FEWEST_LINES)
     poles_hz, left = np.full(len(tried), np.nan, complex), np.full(len(tried), np.inf)
@@ -73,14 +68,12 @@ def with_ringing(
     line = spectra.frequency_hz[1] - spectra.frequency_hz[0]
     found = explains(scatter, RINGS) & (poles_hz.imag > LEAST_DAMPED * line)
     if not found.any():
-        return spectra
+        return None
     poles_hz[~found] = np.nan
     as_a_tone = replace(spectra, ringing_hz=poles_hz).windows(unit_mass).scatter
     rings = found & _or_beside(found & explains(as_a_tone, ITS_RESPONSE))
-    if not rings.any():
-        return spectra
     poles_hz[~rings] = np.nan
-    return replace(spectra, reference=rational.with_poles(poles_hz), ringing_hz=poles_hz)
+    return poles_hz if rings.any() else None
 
 
 def _or_beside(chosen: NDArray[Any]) -> NDArray[Any]:
