@@ -11,7 +11,7 @@ least that are possible.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from dataclasses import dataclass, replace
 
@@ -312,7 +312,9 @@ def beside_the_bound(count: int, noise: float) -> None:
 
 
 if __name__ == "__main__":
-    asked = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=200)
+    asked = parser.parse_args().count
     main(asked)
     for share in (0.003, 0.01, 0.03):
         beside_the_bound(asked // 4, share)

@@ -11,8 +11,8 @@ stopped goes on from there.
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -176,7 +176,8 @@ def main(count: int, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(
-        int(sys.argv[1]) if len(sys.argv) > 1 else 200,
-        Path(sys.argv[2] if len(sys.argv) > 2 else "through-reference.jsonl"),
-    )
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=200)
+    parser.add_argument("file", nargs="?", type=Path, default=Path("through-reference.jsonl"))
+    asked = parser.parse_args()
+    main(asked.count, asked.file)

@@ -10,8 +10,8 @@ keeps what is done, a line a recording: a run that was stopped goes on from ther
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 import time
 import traceback
 import warnings
@@ -169,9 +169,12 @@ def kept(seeds: Sequence[int], path: Path | None, found: Callable[[int], Row]) -
 
 
 def main() -> None:
-    arguments = [*sys.argv[1:], *("40", "0", "")[len(sys.argv) - 1 :]]
-    count, first = int(arguments[0]), int(arguments[1])
-    kept(range(first, first + count), Path(arguments[2]) if arguments[2] else None, one)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=40)
+    parser.add_argument("first", nargs="?", type=int, default=0)
+    parser.add_argument("file", nargs="?", type=Path)
+    asked = parser.parse_args()
+    kept(range(asked.first, asked.first + asked.count), asked.file, one)
 
 
 if __name__ == "__main__":

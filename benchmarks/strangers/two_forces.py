@@ -9,7 +9,7 @@ recording: the way of the command line's defaults.  FILE keeps what is done, a l
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -130,14 +130,19 @@ def make(kind: str, seed: int) -> Case | None:
 
 
 def main() -> None:
-    arguments = [*sys.argv[1:], *("nothing", "20", "0", "")[len(sys.argv) - 1 :]]
-    kinds, count, first = arguments[0].split(","), int(arguments[1]), int(arguments[2])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kinds", nargs="?", default="nothing")
+    parser.add_argument("count", nargs="?", type=int, default=20)
+    parser.add_argument("first", nargs="?", type=int, default=0)
+    parser.add_argument("file", nargs="?", type=Path)
+    asked = parser.parse_args()
+    kinds = asked.kinds.split(",")
 
     def found(seed: int) -> Row:
         kind = kinds[seed % len(kinds)]
         return {"seed": seed, "kind": kind} | analysed(make(kind, seed))
 
-    kept(range(first, first + count), Path(arguments[3]) if arguments[3] else None, found)
+    kept(range(asked.first, asked.first + asked.count), asked.file, found)
 
 
 if __name__ == "__main__":
