@@ -178,6 +178,18 @@ def test_assumptions_say_what_was_added_and_widened() -> None:
     assert "widened" not in " ".join(assumptions(closed.analysis))
 
 
+def test_assumptions_say_that_a_sweep_hides_what_changes() -> None:
+    analysis = fake_closed().analysis
+    recording = analysis.etfe.recording
+    assert recording is not None
+    assert "sweep" not in " ".join(assumptions(analysis))
+    time_s = np.arange(recording.samples) * recording.period_s
+    force = np.sin(2 * np.pi * (5 + 100 * time_s / time_s[-1]) * time_s)
+    analysis.etfe = replace(analysis.etfe, recording=replace(recording, force=force))
+    text = " ".join(assumptions(analysis))
+    assert "A sweep comes by each frequency at a moment of its own" in text
+
+
 # ---- tables
 
 

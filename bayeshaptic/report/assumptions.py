@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.models.structures import QUANTITIES
 from bayeshaptic.quantities import interval, pretty_unit, pure, quantity
+from bayeshaptic.recordings.signals.sweeps import is_sweep
 from bayeshaptic.report import words
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, 
         words.delay(analysis),
         f"The force is in command units ({unit}): a wrong force constant makes masses, dampers and "
         "springs wrong by its factor, but cancels in the stiffness that may be commanded.",
-        _constancy(closed),
+        _constancy(analysis, closed),
         _model(analysis, closed),
         *_widening(closed),
         *_noise(analysis),
@@ -97,7 +98,7 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
     )
 
 
-def _constancy(closed: Closed | None) -> str:
+def _constancy(analysis: Analysis, closed: Closed | None) -> str:
     found = [] if closed is None else closed.effects
     names = [effect.title for effect in found if effect.family in ("nonlinear", "time-varying")]
     but = f", but for what was found ({' and '.join(names)})" if names else ""
@@ -107,6 +108,12 @@ def _constancy(closed: Closed | None) -> str:
     )
     if any(effect.family == "time-varying" for effect in found):
         text += " Of a device or a grip that changes, the limit is that of the worst part."
+    if (recording := analysis.etfe.recording) is not None and is_sweep(recording.force):
+        text += (
+            " A sweep comes by each frequency at a moment of its own: a grip that grew firmer "
+            "meanwhile looks like another device, and the limit is that of the moments at which "
+            "its frequency came by."
+        )
     return text
 
 
