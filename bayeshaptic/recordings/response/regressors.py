@@ -14,7 +14,7 @@ from bayeshaptic.recordings.response.windows import Reference
 class Block(NamedTuple):
     """Windows of similar width side by side, padded with lines that weigh nothing."""
 
-    window: slice
+    window: slice | NDArray[Any]
     line: NDArray[Any]  # (W, w) which line; padding repeats the last
     whitened: NDArray[Any]  # (W, w) weight of a line by its noise; zero in the padding
     force: NDArray[Any]  # (W, w) whitened, as are the next two

@@ -18,14 +18,14 @@ Journal on Numerical Analysis* 10(2), 1973).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.recordings.response.local_polynomial import NODES
-from bayeshaptic.recordings.response.regressors import Block
+from bayeshaptic.recordings.response.regressors import Block, regressors
 from bayeshaptic.recordings.response.spectra import RandomSpectra, project_out
 from bayeshaptic.recordings.response.window_reference import unit_mass
 
@@ -59,11 +59,8 @@ def ringing_poles(
     """
     tried = _or_beside(curved) & (np.diff(spectra.edges) >= FEWEST_LINES)
     poles_hz, left = np.full(len(tried), np.nan, complex), np.full(len(tried), np.inf)
-    for block in spectra.blocks:
-        rows = np.flatnonzero(tried[block.window])
-        if len(rows):
-            own = np.arange(len(tried))[block.window][rows]
-            poles_hz[own], left[own] = _poles(spectra, block, rows)
+    for block in _blocks(spectra, tried):
+        poles_hz[block.window], left[block.window] = _poles(spectra, block)
     left += spectra.freedom * spectra.floor
 
     def explains(more: NDArray[Any], enough: float) -> NDArray[Any]:
@@ -74,22 +71,40 @@ def ringing_poles(
     if not found.any():
         return None
     poles_hz[~found] = np.nan
-    as_a_tone = replace(spectra, ringing_hz=poles_hz).windows(unit_mass).scatter
+    as_a_tone = scatter.copy()
+    for block in _blocks(spectra, found):
+        as_a_tone[block.window] = _left_by_tones(spectra, block, poles_hz[block.window, None])
     rings = found & _or_beside(found & explains(as_a_tone, ITS_RESPONSE))
     poles_hz[~rings] = np.nan
     return poles_hz if rings.any() else None
+
+
+def _blocks(spectra: RandomSpectra, chosen: NDArray[Any]) -> Iterator[Block]:
+    """Some windows, those of similar width together; their `window` is an array of numbers."""
+    for block in spectra.blocks:
+        rows = np.flatnonzero(chosen[block.window])
+        if len(rows):
+            own = np.arange(len(chosen))[block.window][rows]
+            yield Block(own, *(values[rows] for values in block[1:]))
 
 
 def _or_beside(chosen: NDArray[Any]) -> NDArray[Any]:
     return np.convolve(chosen, np.ones(3), "same") > 0
 
 
-def _poles(
-    spectra: RandomSpectra, block: Block, rows: NDArray[Any]
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Poles that leave least in some windows of a block, Hz, and what they leave; shape (R,)."""
-    nodes = spectra.nodes_hz[block.window][rows]
-    block = Block(block.window, *(values[rows] for values in block[1:]))
+def _left_by_tones(spectra: RandomSpectra, block: Block, poles_hz: NDArray[Any]) -> NDArray[Any]:
+    """What poles, shape (R, 1), leave where the response is a parabola without them, (R,)."""
+    smooth = regressors(spectra.frequency_hz, spectra.nodes_hz, unit_mass, None)
+    tone = (block.whitened / (spectra.frequency_hz[block.line] - poles_hz))[..., None]
+    columns = np.concatenate([tone, block.force[..., None] * smooth.response(block)], axis=-1)
+    q = np.linalg.qr(project_out(block.leakage, columns))[0]
+    rest = np.sum(np.abs(project_out(q, block.position[..., None])) ** 2, axis=(1, 2))
+    return np.asarray(rest + spectra.freedom[block.window] * spectra.floor[block.window])
+
+
+def _poles(spectra: RandomSpectra, block: Block) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Poles that leave least in the windows of a block, Hz, and what they leave; shape (R,)."""
+    nodes = spectra.nodes_hz[block.window]
     centre = nodes[:, 1:2]
     half = (nodes[:, 2:] - centre) / NODES[2]
     x = (spectra.frequency_hz[block.line] - centre) / half
