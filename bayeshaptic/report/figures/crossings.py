@@ -89,15 +89,18 @@ def _stiffness_range(etfe: Etfe, critical: list[float], row: Scale) -> tuple[flo
 
 
 def _curves(axes: Axes, frequency: NDArray[Any], values: NDArray[Any]) -> None:
-    for number, curve in enumerate(values):
-        axes.plot(
-            frequency,
-            curve,
-            color=style.MODEL,
-            linewidth=0.6,
-            alpha=0.3,
-            label="draws of the posterior" if number == 0 else None,
-        )
+    """All draws as one artist, in pixels: as strokes they are too much for a page."""
+    from matplotlib.collections import LineCollection
+
+    curves = LineCollection(
+        [np.column_stack([frequency, curve]) for curve in values],
+        colors=style.MODEL,
+        linewidths=0.6,
+        alpha=0.3,
+        label="draws of the posterior",
+        rasterized=True,
+    )
+    axes.add_collection(curves, autolim=False)
 
 
 def _unbroken(phase_deg: NDArray[Any]) -> NDArray[Any]:

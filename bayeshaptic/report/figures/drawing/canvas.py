@@ -206,10 +206,12 @@ class _Both(RendererBase):
         """What was drawn since becomes an image of the SVG."""
         image = np.asarray(self._layer.buffer_rgba())
         self._layer = self._pixels
-        rows, columns = (np.flatnonzero(image[..., 3].any(axis=axis)) for axis in (1, 0))
+        rows = np.flatnonzero(image[..., 3].any(axis=1))
         if not len(rows):
             return
-        part = image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        part = image[rows[0] : rows[-1] + 1]
+        columns = np.flatnonzero(part[..., 3].any(axis=0))
+        part = part[:, columns[0] : columns[-1] + 1]
         height, width, _ = part.shape
         sides = {"x": columns[0], "y": rows[0], "width": width, "height": height}
         self._vector.writer.element(
