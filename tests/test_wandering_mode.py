@@ -19,13 +19,13 @@ M1, M2, BC, KC, B1, B2 = 0.1, 0.4, 0.5, 40e3, 0.1, 5.0  # a mode at 112 Hz
 DELAY = T
 
 
-def step_of(stiffness: float) -> tuple[np.ndarray, np.ndarray]:
-    """States (x1, x2, v1, v2) a sample later, by state and by the force that is held."""
+def step_of(stiffness: float, step_s: float = T) -> tuple[np.ndarray, np.ndarray]:
+    """States (x1, x2, v1, v2) a step later, by state and by the force that is held."""
     k = np.array([[stiffness, -stiffness], [-stiffness, stiffness]])
     b = np.array([[BC + B1, -BC], [-BC, BC + B2]])
     mass = np.array([[M1], [M2]])
     a = np.block([[np.zeros((2, 2)), np.eye(2)], [-k / mass, -b / mass]])
-    both = expm(T * np.block([[a, np.array([[0, 0, 1 / M1, 0]]).T], [np.zeros((1, 5))]]))
+    both = expm(step_s * np.block([[a, np.array([[0, 0, 1 / M1, 0]]).T], [np.zeros((1, 5))]]))
     return both[:4, :4], both[:4, 4]
 
 

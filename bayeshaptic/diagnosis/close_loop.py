@@ -27,6 +27,7 @@ from bayeshaptic.diagnosis.feedback.mode_above_band import mode_above_band
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.options import Options, options_from
+from bayeshaptic.diagnosis.residuals.excess import noise_besides
 from bayeshaptic.diagnosis.state import held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
@@ -111,6 +112,8 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
     notices = analysis.notices + traced.notices
     if state.etfe.through_reference:
         notices += mode_above_band(state.fit, state.etfe, analysis.limit)
+    if (noise := noise_besides(state.fit, state.etfe)) is not None:
+        notices += (noise.notice(state.etfe),)
     seconds = _stages(begun.seconds, tracing_s, base.seconds, analysis.seconds)
     wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, seed)
     stated, louder = wide or analysis.posterior, analysis.noise_scale

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.force_noise import NoiseOfForce, noise_of_force
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.fit import Fit
@@ -24,20 +25,21 @@ _HAND_HZ, _FREE_HZ = 45.0, 20.0  # below it a hand, or a draught, moves the devi
 
 
 def excess_noise_test(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
-    """How far does the noise in the driven band rise above the encoder's?
+    """How far does the noise in the driven band rise above the encoder's, and the force's?
 
-    The noise of an encoder is the same at all frequencies, and where the force ends nothing else
-    is left. What a linear device adds to it is the motion of a hand, at low frequencies; so noise
-    that rises inside the band comes of a force that is not linear in the motion, of a device that
-    changes, or of a fault of the measurement.  The noise of a sensor of the force moves nothing,
-    but is multiplied by the response when that is taken off.  Where the force drives everything the
-    fast end of the band stands for what is beyond.  None where the motion is too slow for its
-    encoder.
+    The noise of an encoder is the same at all frequencies, and where the force ends nothing else is
+    left. What a linear device adds to it is the motion of a hand, at low frequencies, and that of a
+    force which is noisy itself: the power of the response times a smooth spectrum (`force_noise`).
+    So other noise that rises inside the band comes of a force that is not linear in the motion, of
+    a device that changes, or of a fault of the measurement. The noise of a sensor of the force
+    moves nothing, but is multiplied by the response when that is taken off. Where the force drives
+    everything the fast end of the band stands for what is beyond. None where the motion is too slow
+    for its encoder.
     """
     found = _noise_of(fit, etfe)
     if found is None:
         return ()
-    rise = 10 * np.log10(found.noise / found.still)
+    rise = 10 * np.log10(found.noise / (found.still + _forced(found)))
     worst = int(np.argmax(rise))
     where = float(found.centre_hz[worst])
     text = f"around {where:.3g} Hz the noise is {rise[worst]:.1f} dB louder than the encoder's"
@@ -63,19 +65,45 @@ def changing_share(fit: Fit, etfe: Etfe, frequency_hz: float | None = None) -> f
     octaves = np.log2(found.centre_hz / found.centre_hz[0])
     if frequency_hz is None:
         return float(np.median((found.noise / found.answer)[octaves < 1]))
-    loud = found.noise > 10 ** (0.1 * thresholds.EXCESS_DB) * found.still
+    usual = found.still + _forced(found)
+    loud = found.noise > 10 ** (0.1 * thresholds.EXCESS_DB) * usual
     near = np.abs(octaves - np.log2(frequency_hz / found.centre_hz[0])) < _NEAR_OCTAVES
-    share = (found.noise - found.still) / found.answer
+    share = (found.noise - usual) / found.answer
     return float(np.max(share[near & loud], initial=0.0))
 
 
+def noise_besides(fit: Fit, etfe: Etfe) -> NoiseOfForce | None:
+    """The noise of the force, where it is the louder noise; None where there is none.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+    """
+    found = _noise_of(fit, etfe)
+    if found is None or found.force is None:
+        return None
+    rise = found.noise / found.still
+    return found.force if rise.max() > 10 ** (0.1 * thresholds.EXCESS_DB) else None
+
+
+def _forced(found: _Noise) -> Floats | float:
+    """Power of a line that the noise of the force makes."""
+    return found.gain * found.force.power(found.centre_hz) if found.force else 0.0
+
+
 class _Noise(NamedTuple):
-    """Power of a line in windows together, shape (W,): noise, a resting device's, the answer."""
+    """Power of a line in windows together, shape (W,): noise, a resting device's, the answer.
+
+    `gain` is the power of the response; what `force` is there makes noise besides that at rest.
+    """
 
     centre_hz: Floats
     noise: Floats
     still: Floats
     answer: Floats
+    gain: Floats
+    force: NoiseOfForce | None
 
 
 def _noise_of(fit: Fit, etfe: Etfe) -> _Noise | None:
@@ -114,7 +142,10 @@ def _noise_of(fit: Fit, etfe: Etfe) -> _Noise | None:
     moved = together(gain * force)
     least = together(spectra.floor * shape / _TOGETHER)
     answer = together(gain * spectra.force_power)
-    return _Noise(middle, noise, np.maximum(floor + moved, least), answer)
+    still = np.maximum(floor + moved, least)
+    gain = together(gain)
+    besides = noise_of_force(middle, noise, still, gain, answer, together(lines))
+    return _Noise(middle, noise, still, answer, gain, besides)
 
 
 def _of_the_hand(centre_hz: Floats, force: Floats) -> Floats:

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.excess import changing_share
+from bayeshaptic.diagnosis.residuals.excess import changing_share, noise_besides
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern
 from bayeshaptic.effects.laws import variables
@@ -77,6 +77,11 @@ def with_discrepancy(
     if (changing := changing_at_limit(limit, fit, traced)) > 0:
         factor = np.exp(-_blurred(changing) * rng.random(len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
+    if (noise := noise_besides(fit, traced.state.etfe)) is not None:
+        # In the record of the command, and not at the motor, it makes the response smaller by its
+        # share: nobody knows which.
+        recorded = rng.integers(2, size=len(limit.samples))
+        limit = replace(limit, samples=limit.samples * np.exp(-np.log1p(noise.share) * recorded))
     return limit
 
 
