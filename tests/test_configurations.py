@@ -212,6 +212,10 @@ def test_cases_of_a_study(mixed: StudyAnalysis) -> None:
     assert "configuration 0.2, nobody holds it" in labels
     assert any("(predicted)" in label for label in labels)
     assert mixed.population is not None and mixed.population.users == ("u0", "u1", "u2")
+    held = [one for one in mixed.recordings if one.entry.user]
+    held[3] = replace(held[3], entry=replace(held[3].entry, user="u0"))  # in it but for this one
+    again = study_cases(held, 0, lambda share, word: None).cases
+    assert [case.label for case in again][::3] == ["user u0", "user u0 (odd)"]
     assert any("Left out" in one.text and "odd" in one.text for one in mixed.notices)
     assert mixed.limit is not None
     # Free, the PHANToM is far worse than held; and that comes out by itself.

@@ -81,19 +81,20 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
     ways: list[ConfigurationLimits] = []
     covered: list[Analysed] = []
     for is_held, some, begin in ((False, free, 0.6), (True, like, 0.8)):
-        along = _alike([one for one in some if _numbered(one)])[0]
+        measured = _alike([one for one in some if _numbered(one)])[0]
         with notes.stage(f"configurations ({'held' if is_held else 'free'})"):
-            way = _along(along, is_held, seed, report, begin)
+            way = _along(measured, is_held, seed, report, begin)
             if way is not None:
                 ways.append(way)
-                covered += along
+                covered += measured
                 notes.notices += way.inferred.notices
+    along = [case for way in ways for case in way.cases]
     cases = (
-        *recorded([one for one in free if one not in covered], FREE),
+        *recorded([one for one in free if one not in covered], FREE, along),
         *users,
-        *recorded([one for one in held if not users or one in odd], HELD),
+        *recorded([one for one in held if not users or one in odd], HELD, [*users, *along]),
         *new_person,
-        *(case for way in ways for case in way.cases),
+        *along,
     )
     return StudyCases(
         population,

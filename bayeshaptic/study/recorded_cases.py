@@ -80,14 +80,18 @@ def place_of(configuration: float | str | None) -> str:
     return f", configuration {name}"
 
 
-def recorded(some: Sequence[Analysed], group: str) -> tuple[Case, ...]:
-    """One case for each user (or nobody), configuration and model; its trials in equal shares."""
+def recorded(some: Sequence[Analysed], group: str, beside: Sequence[Case] = ()) -> tuple[Case, ...]:
+    """One case for each user (or nobody), configuration and model; its trials in equal shares.
+
+    No two have one label, nor one of those `beside` them: a user's recordings may be in the
+    population but for one.
+    """
     found: dict[tuple[str, ...], list[Analysed]] = {}
     for one in some:
         who = "nobody holds it" if group == FREE else f"user {one.entry.user}"
         label = who + place_of(one.entry.configuration)
         found.setdefault((label, *signature(one)), []).append(one)
-    labels = [key[0] for key in found]
+    labels = [*(key[0] for key in found), *(case.label for case in beside)]
     return tuple(
         _pooled(
             key[0] if labels.count(key[0]) == 1 else f"{key[0]} ({trials[0].name})",
