@@ -43,7 +43,7 @@ CLIPPED = 6.0
 HELD = 10.0
 """Samples that repeat the one before although the device moved on, less those off by chance."""
 LOST, WILD = 4.0, 4.0
-"""Missing rows, and wild samples: counts; each one is beyond doubt by itself (faults)."""
+"""Missing rows, and wild samples by how far off they are; each is beyond doubt (faults)."""
 JITTER, JITTER_STAMPED = 7.0, 2.5
 """Rise of the noise with the speed, in standard deviations from blocks of samples; the second
 where the time stamps show jitter already."""

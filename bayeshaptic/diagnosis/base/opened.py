@@ -20,6 +20,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.differences import with_differences
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
 from bayeshaptic.recordings.through_reference import through_reference, too_weak, unusable
 from bayeshaptic.threads import single_threaded
@@ -74,7 +75,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     if isinstance(measurement, Recording):
         with clock.stage("checks"):
             options.report(0.0, "checking the recording")
-            whole = unbroken(measurement)
+            whole = without_lone(unbroken(measurement))
             notices += told(measurement.feedback, check_recording(whole, device))
             if one_mass:  # followed in time instead
                 if measurement.reference is not None and has_feedback(notices):

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Predictor, Samples
+from bayeshaptic.recordings.signals.lone import lone
 
 _ERRORS = 5.0  # how badly a sample must be predicted to be looked at
 _WILD = 8.0  # how far off a wild one must be, in the same measure
+_FAR = 5.0  # of that measure again, as many as one wild sample counts for at most
 _EQUATIONS = (24, 10, 6)  # predictions that a fault must explain; fewer where faults lie close
 _A_ROW = 4.0  # squared errors that a further missing row must explain
 _SIMPLER = 8.0  # and that a gap must explain more than a wild sample
@@ -31,7 +33,8 @@ class Faults:
     wild : ndarray of bool, shape (N,)
         Wild samples, in the rows of `samples`.
     wild_score : float
-        How many, less the samples that are badly predicted for no reason found.
+        How far off they are, in eight errors of the prediction and five at most each, less the
+        number of samples that are badly predicted for no reason found.
     """
 
     lost: int
@@ -87,7 +90,11 @@ def faults(samples: Samples) -> Faults:
             break
         mended = _restored(mended, look.gaps)
         look = _look(mended, look.predictor)
-    return Faults(lost, mended, look.wild, float(look.wild.sum() - look.unexplained))
+    wild = look.wild | lone(mended.recording.position)
+    off = np.abs(mended.recording.position - mended.without(wild).position)[wild]
+    # Four that just are wild are none; one that is far beyond is one.
+    far = np.minimum(off / (_WILD * look.predictor.spread), _FAR)
+    return Faults(lost, mended, wild, float(far.sum()) - look.unexplained)
 
 
 def _look(samples: Samples, predictor: Predictor) -> _Look:

@@ -142,7 +142,10 @@ def of_missing(found: Faults) -> Finding:
 
 def of_wild(found: Faults) -> Finding:
     """Samples that are far off."""
-    text = f"{found.wild.sum()} single positions are far off; they were filled in"
+    count = int(found.wild.sum())
+    text = f"{count} single positions are far off; they were filled in"
+    if count == 1:
+        text = "a single position is far off; it was filled in"
     return Finding(
         WildSamples, found.wild_score, thresholds.WILD, text, {"share": _share(found.wild)}
     )

@@ -15,6 +15,7 @@ import numpy as np
 
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.filling import Predictor, fit_predictor
+from bayeshaptic.recordings.signals.lone import lone
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Bools, Floats
 
@@ -78,5 +79,8 @@ class Samples:
 
 
 def as_recorded(recording: Recording) -> Samples:
-    """All samples taken to be right."""
-    return Samples(recording, np.zeros(recording.samples, dtype=bool))
+    """All samples taken to be right but those far from any beside them.
+
+    A few that are off by more than the device moves would decide every coefficient.
+    """
+    return Samples(recording, lone(recording.position))

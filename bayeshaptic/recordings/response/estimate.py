@@ -17,6 +17,7 @@ from bayeshaptic.recordings.response.estimators.random_excitation import estimat
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import JoinedSpectra, PeriodicSpectra, RandomSpectra
 from bayeshaptic.recordings.signals.excitation import FEWEST_LINES
+from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.threads import single_threaded
 
 
@@ -62,9 +63,14 @@ def estimate_etfe(
         raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
     found = None
     if recording.reference is None:
-        found = estimate_periodic(recording, band_hz, fewest_tones)
+        # In the mean over the periods nothing tells them from the motion any more.
+        mended = without_lone(recording)
+        found = estimate_periodic(mended, band_hz, fewest_tones)
     spectra: PeriodicSpectra | RandomSpectra
     spectra, points, notices = found or estimate_random(recording, band_hz, minimum_lines)
+    if found is not None:
+        notices += _of_lone(recording, mended)
+        recording = mended
     return Etfe(
         frequency_hz=points.frequency_hz,
         value=points.value,
@@ -79,6 +85,17 @@ def estimate_etfe(
         period_lines=spectra.lines if found is not None else None,
         notices=notices,
     )
+
+
+def _of_lone(recording: Recording, mended: Recording) -> tuple[Notice, ...]:
+    count = np.count_nonzero(recording.position != mended.position)
+    if not count:
+        return ()
+    text = (
+        f"Single positions that are far from those beside them ({count}: a bit that flipped, a "
+        "pulse that was missed) were filled in before the periods were averaged."
+    )
+    return (Notice("note", "wild samples", text),)
 
 
 def _joined(

@@ -22,6 +22,7 @@ from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
 from bayeshaptic.recordings.response.window_reference import fit_local_rational, unit_mass
 from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.recordings.signals.raw_signals import clipping
 from bayeshaptic.recordings.signals.sweeps import FEWEST_COUNTS, moves_until
 
@@ -91,13 +92,15 @@ def points(windows: Windows) -> Points:
 
 def _in_chosen_band(recording: Recording, minimum: int) -> tuple[RandomSpectra, Notice]:
     widest = max(LOWEST_HZ, LOW_END_WINDOWS * minimum / recording.duration_s)
-    everything = _spectra(recording, (widest, 0.5 / recording.period_s), minimum)
+    # A wild sample is noise at all frequencies, until the loop mends it, in this band.
+    seen = without_lone(recording)
+    everything = _spectra(seen, (widest, 0.5 / recording.period_s), minimum)
     try:
         low, high = choose_band(everything, recording.name)
     except InputError as error:
         raise _cut_off(recording) or error from None
     why, drives = "the force has power and the position answers it", "the force drives"
-    until = moves_until(recording)
+    until = moves_until(seen)
     if until is not None and low < until < high:
         high = until
         why = f"the sweep moves the device by {FEWEST_COUNTS} counts of its encoder or more"
