@@ -60,6 +60,7 @@ class FakeClosed(SimpleNamespace):
     """The parts of a `Closed`, each of which may be changed."""
 
     effects, force, changing_at_limit = (), None, 0.0
+    may_be_held_by_friction = False
     closed = property(lambda self: self)
     verdict = property(lambda self: self.diagnosis["verdict"])
     measured = property(lambda self: self.base)

@@ -9,6 +9,9 @@ import pytest
 
 from bayeshaptic.diagnosis.residuals import residual
 from bayeshaptic.diagnosis.state import Accepted, Estimate
+from bayeshaptic.diagnosis.widening import discrepancy
+from bayeshaptic.diagnosis.widening.discrepancy import may_be_held_by_friction
+from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.report.objections import _rubs_otherwise
 
 
@@ -38,3 +41,17 @@ def test_what_a_force_leaves_over_the_velocity_counts_where_nobody_holds(
     what: Any, objects: bool
 ) -> None:
     assert _rubs_otherwise(what) == objects
+
+
+@pytest.mark.parametrize("share, held", [(0.05, True), (0.01, False)])
+def test_noise_beside_a_force_may_be_friction_that_holds(
+    share: float, held: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """55 times the limit was recommended: Stribeck's friction had been found, and held on."""
+    monkeypatch.setattr(discrepancy, "changing_share", lambda fit, etfe: share)
+    state = SimpleNamespace(fit=None, etfe=None)
+    noise = residual.Test(EXCESS_NOISE, "nonlinear", 23.8, 9.0, 21.0, "")
+    left = residual.Test("sign(v)", "nonlinear", 23.8, 9.0, None, "")
+    assert may_be_held_by_friction(None, SimpleNamespace(state=state, after=(noise,))) == held  # type: ignore[arg-type]
+    both = SimpleNamespace(state=state, after=(noise, left))
+    assert not may_be_held_by_friction(None, both)  # type: ignore[arg-type]

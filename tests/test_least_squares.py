@@ -11,7 +11,7 @@ from linear_bench import LHIFAM_FREE, Device
 
 from bayeshaptic.inference.least_squares import _other_valleys, least_squares
 from bayeshaptic.models import LogNormal, free, grasped, rigid
-from bayeshaptic.numerics.gauss_newton import jacobian, minimise
+from bayeshaptic.numerics.gauss_newton import _damped_step, jacobian, minimise
 from bayeshaptic.numerics.truncated_normal import draw_above, moments_above
 from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
@@ -184,6 +184,21 @@ def test_gauss_newton_on_a_problem_with_a_known_answer():
     assert cut == pytest.approx(np.tile([0.5, 0.25], (3, 1)), abs=1e-5)
     slope = jacobian(residuals, np.array([[0.5, 2.0]]))
     assert slope[0] == pytest.approx(np.array([[-10.0, 10.0], [-1.0, 0.0]]), abs=1e-4)
+
+
+def test_a_step_along_two_equal_directions_after_many_wins():
+    """Friction that holds a device left such a fit without damping: a traceback."""
+    rng = np.random.default_rng(0)
+    wide, no_damping = np.full(3, 1e3), np.array([1e-40])
+    for _ in range(50):  # rounding decides which of them have a pivot of zero
+        same = rng.normal(size=(50, 1)) * 1e5
+        slope = np.concatenate([same, same, rng.normal(size=(50, 1))], axis=1)
+        value = rng.normal(size=50)
+        normal, gradient = slope.T @ slope, slope.T @ value
+        step = _damped_step(normal[None], gradient[None], no_damping, np.zeros((1, 3)), -wide, wide)
+        left = value + slope @ step[0]
+        # A least-squares solution leaves nothing along any direction.
+        assert np.all(np.abs(slope.T @ left) < 1e-6 * np.linalg.norm(slope, axis=0))
 
 
 @pytest.mark.parametrize("mean", [-6.0, -1.0, 0.0, 0.7, 5.0])

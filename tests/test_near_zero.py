@@ -15,6 +15,7 @@ from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.laplace import _possible, laplace
 from bayeshaptic.inference.sampling.near_zero import (
+    _errors,
     inside,
     redrawing,
     resolved,
@@ -45,6 +46,17 @@ def test_the_area_is_the_known_integral():
         prior = bh.NearZero(3.0, 3.0 * ratio)
         area = np.exp(-prior.log_density(0.0)) / prior.floor
         assert area == pytest.approx(-np.log(ratio) + 0.5 * (np.log(2) - np.euler_gamma), abs=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_errors_of_directions_that_are_alike(seed):
+    """Their square has lost them to rounding, and its inverse had variances below zero."""
+    rng = np.random.default_rng(seed)
+    same = 1e9 * rng.normal(size=50)
+    same /= np.linalg.norm(same) / 1e9
+    slope = np.stack([same, same, rng.normal(size=50)], axis=1)
+    # Along (1, -1) the data say nothing and the prior of one says all: 1 / 2 of its variance each.
+    assert _errors(slope)[:2] == pytest.approx([np.sqrt(0.5)] * 2, rel=1e-4)
 
 
 def test_every_factor_is_alike():

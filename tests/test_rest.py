@@ -12,6 +12,7 @@ from fake_analysis import _tests
 
 from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED
+from bayeshaptic.diagnosis.widening import rest
 from bayeshaptic.diagnosis.widening.deviation import Deviation, evidence, matern, modelled
 from bayeshaptic.diagnosis.widening.rest import BENDS, with_rest
 from bayeshaptic.inference.around_fit import draws_around
@@ -119,6 +120,24 @@ def test_what_jumps_from_window_to_window_is_no_bend(clean: Fit) -> None:
     louder = replace(loud, variance=loud.variance + loud.jumps)
     sizes = [np.dot(w, [size for size, _ in cases]) for cases, w in map(evidence, (loud, louder))]
     assert sizes[1] < 0.5 * sizes[0]
+
+
+def test_parameters_that_the_data_cannot_tell_apart_are_widened(
+    clean: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of friction that holds a device: the square of such slopes was not positive definite."""
+    posterior, slopes = draws_around(clean), rest._slopes
+    for size in np.geomspace(1e4, 1e9, 20):
+
+        def alike(fit: Fit, here: Any, size: float = size) -> np.ndarray:
+            same = size * slopes(fit, here)
+            same[..., 1] = same[..., 0]
+            return same
+
+        monkeypatch.setattr(rest, "_slopes", alike)
+        found = with_rest(posterior, clean, left("nonlinear"))
+        assert found is not None
+        assert np.all(np.isfinite(found.draws))
 
 
 def test_what_is_explained_widens_nothing(clean: Fit) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 from bayeshaptic.diagnosis.analysis import Analysis, limit_line
 from bayeshaptic.diagnosis.feedback.explain import ForceExplained
 from bayeshaptic.diagnosis.state import Accepted
-from bayeshaptic.diagnosis.traced import Traced
-from bayeshaptic.diagnosis.widening.discrepancy import changing_at_limit
+from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
+from bayeshaptic.diagnosis.widening.discrepancy import changing_at_limit, may_be_held_by_friction
 from bayeshaptic.models import Model
 from bayeshaptic.shown import Shown
 
@@ -59,6 +59,13 @@ class Closed(Shown):
     def changing_at_limit(self) -> float:
         """See `bayeshaptic.diagnosis.widening`; kept: every headline of a page asks."""
         return changing_at_limit(self.analysis.limit, self.traced.state.fit, self.traced)
+
+    @cached_property
+    def may_be_held_by_friction(self) -> bool:
+        """Whether a force that was found, and not explained, leaves noise as such friction does."""
+        if self.verdict != UNEXPLAINED or all(e.family != "nonlinear" for e in self.effects):
+            return False
+        return may_be_held_by_friction(self.traced.state.fit, self.traced)
 
     @property
     def model(self) -> Model:

@@ -13,6 +13,7 @@ Residuals = Callable[[Floats], Floats]
 # whose equal poles are moved apart to have partial fractions.
 _STEP = 1e-5
 _LEAST = 0.2  # by which damping falls after a step
+_ROUNDED = 1e-13  # damping below it is lost in rounding, and nothing parts equal directions
 _TINY = 1e-12
 _FEW = 8  # a call costs 0.1 ms, a vector 3 us, and four steps in ten do not win
 
@@ -141,7 +142,9 @@ def _damped_step(
     size = normal.shape[2]
     held = ((phi <= low) & (gradient > 0)) | ((phi >= high) & (gradient < 0))
     diagonal = np.einsum("bpp->bp", normal) + 1e-12
-    normal[:, np.arange(size), np.arange(size)] = diagonal * (1 + damping[:, None])
+    normal[:, np.arange(size), np.arange(size)] = diagonal * (
+        1 + np.maximum(damping, _ROUNDED)[:, None]
+    )
     normal = np.where(held[:, :, None] | held[:, None, :], 0.0, normal)
     normal[:, np.arange(size), np.arange(size)] += np.where(held, 1.0, 1e-300)
     gradient = np.where(held, 0.0, gradient)

@@ -49,6 +49,12 @@ def why_none(result: Result) -> tuple[str, ...]:
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part"
         )
+    if closed and closed.may_be_held_by_friction:
+        found.append(
+            "beside the force that was found the device makes noise of its own, as one does that "
+            "friction holds for most of the time, and what the model takes for damping may be that "
+            "friction"
+        )
     if closed and closed.changing_at_limit > _CHANGES:
         found.append(
             "what the device does at the frequency of the limit is not the same from moment to "

@@ -143,9 +143,7 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
         if trial.accepted.family == family
     ]
     raised = {test.name for test in traced.after if test.flagged}
-    # Noise that nothing else goes with may be friction that holds a mass most of the time.
-    nameless = {t.name for t in traced.after if t.flagged and t.family == family} == {EXCESS_NOISE}
-    holds = nameless and changing_share(fit, traced.state.etfe) > _HELD_BY_FRICTION
+    holds = family == "nonlinear" and may_be_held_by_friction(fit, traced)
     if holds or {VELOCITY, LOAD_VELOCITY} & variables(raised):
         damped = np.array([n in GROUND_DAMPERS for n in fit.model.names])
         damping_left = 0.2  # of the damping, if most of it is friction that was fitted as damping
@@ -155,6 +153,18 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
         return _LEAST[family]
     lowest = min([here, *others])
     return max(_LEAST[family], float(np.log(here / max(lowest, 1e-3 * here))))
+
+
+def may_be_held_by_friction(fit: Fit, traced: Traced) -> bool:
+    """Whether nothing but noise is left of a force, as of friction that holds a mass mostly.
+
+    Parameters
+    ----------
+    fit : Fit
+    traced : Traced
+    """
+    left = {test.name for test in traced.after if test.flagged and test.family == "nonlinear"}
+    return left == {EXCESS_NOISE} and changing_share(fit, traced.state.etfe) > _HELD_BY_FRICTION
 
 
 def _blurred(share: float) -> float:

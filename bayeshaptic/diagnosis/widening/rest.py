@@ -58,7 +58,9 @@ def with_rest(
     size = np.sum(np.abs(white) ** 2, axis=1)[:, None]
     bent = _bends(fit, left, believed * pull / size)
     real = np.sqrt(2) * np.concatenate([slopes.real, slopes.imag]).reshape(-1, len(believed))
-    root = np.linalg.cholesky(real.T @ real + np.diag(1 / believed**2))
+    # Of the slopes, not of their square: that has lost what is known worst to rounding.
+    prior = np.diag(1 / believed)
+    root = np.asarray(np.linalg.qr(np.concatenate([real, prior]), mode="r")).T
     # In coordinates where the noise alone makes a unit: louder noise has made more of it already.
     follow = np.linalg.solve(root, 2 * pull.conj().T)
     spread, axes = np.linalg.eigh(0.5 * np.real(follow @ bent @ follow.conj().T))

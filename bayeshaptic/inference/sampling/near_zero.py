@@ -99,8 +99,9 @@ def _beside(slope: Floats, values: Floats, small: list[int]) -> int | None:
 
 def _errors(slope: Floats) -> Floats:
     """Standard deviations of coordinates, shape (P,), those without a slope aside."""
-    known = slope.T @ slope + np.eye(slope.shape[1])
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(known))))
+    # Of the triangle, not of its square: that has lost what is known worst to rounding.
+    triangle = np.linalg.qr(np.concatenate([slope, np.eye(slope.shape[1])]), mode="r")
+    return np.asarray(np.linalg.norm(np.linalg.inv(triangle), axis=1))
 
 
 def _followed(slope: Floats, small: list[int]) -> Floats:
