@@ -216,6 +216,36 @@ def test_no_hand_takes_for_its_own_motion_what_a_force_leaves(monkeypatch) -> No
     assert chosen_of(monkeypatch, "free", misfits, found, scores=scores) == ("free", ["free"])
 
 
+@pytest.mark.parametrize(
+    ("verdict", "left", "best"),
+    [
+        # A dead zone of a free device: something of it is left, and a hand takes the rest up.
+        (UNEXPLAINED, 1.1, "free"),
+        (UNEXPLAINED, 3.0, "grasped"),  # without a hand the response is predicted worse
+        (EXPLAINED, 1.1, "free"),
+    ],
+)
+def test_a_hand_explains_nothing_that_a_free_device_predicts_better(
+    monkeypatch, verdict, left, best
+) -> None:
+    found = {
+        "grasped": traced("grasped", EXPLAINED, 1.5, 1, 1, family="nonlinear"),
+        "free": traced("free", verdict, left, 1, family="nonlinear"),
+    }
+    misfits = {"free": 90.0, "grasped": 50.0}
+    assert chosen_of(monkeypatch, "grasped", misfits, found)[0] == best
+
+
+def test_what_was_given_up_takes_no_explanation_away(monkeypatch) -> None:
+    monkeypatch.setattr(best_base, "_criterion", lambda one, _: one.state.fit.reduced_chi_square)
+    found = {
+        "grasped": traced("grasped", EXPLAINED, 1.5, 1, 1),
+        "free": traced("free", UNEXPLAINED, 1.0, 1),
+    }
+    assert best_base._best(found, 1.0, ()) == "free"
+    assert best_base._best(found, 1.0, ("free",)) == "grasped"
+
+
 def test_of_base_models_that_explain_alike_the_one_with_fewest_effects(monkeypatch) -> None:
     """A third mass with a spring is a hand: 10 and 2 parameters, 11 and 1."""
     found = {

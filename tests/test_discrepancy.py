@@ -10,7 +10,7 @@ import pytest
 from fake_analysis import _tests, fake_closed
 
 from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, _further, drift_trials
 from bayeshaptic.diagnosis.widening.discrepancy import share_left, with_discrepancy
@@ -162,6 +162,28 @@ def test_where_nothing_was_found_the_limit_falls_and_its_upper_end_stays() -> No
     assert np.log(after[0] / before[0]) < -0.1
     # A little above, by a quarter of the least way down (0.12) at most and some sampling noise.
     assert 0 < np.log(after[1] / before[1]) < 0.04
+
+
+def test_a_force_that_gained_a_little_may_be_what_is_left() -> None:
+    """The limit falls to where the device would be with it."""
+    closed = fake_closed("unexplained", "nonlinear")
+    one, fit = closed.analysis, closed.analysis.fit
+    theta = fit.theta.copy()
+    for name in ("b1", "bc", "b2"):
+        theta[fit.model.names.index(name)] *= 0.4
+    less = replace(fit, theta=theta)
+    force = Accepted("dead_zone", "dead zone", "nonlinear", "")
+    near = Trial(force, replace(closed.traced.state, fit=less), 9.0, 4.0, 1)
+    farther = replace(closed.traced, rejected=(near,))
+    low, there = (
+        np.quantile(np.log(wide.samples / one.limit.samples), 0.05)
+        for wide in (
+            with_discrepancy(one.limit, one.posterior, fit, fit, traced)
+            for traced in (closed.traced, farther)
+        )
+    )
+    reach = float(np.log(limit_of(less) / limit_of(fit)))
+    assert reach < low and there < 0.8 * reach
 
 
 def test_the_end_of_a_gains_course_is_known_as_its_neighbours_agree() -> None:

@@ -314,5 +314,29 @@ def test_a_force_that_is_seen_and_that_no_law_explains_is_left() -> None:
     assert traced.verdict == "unexplained" and all(test.flagged for test in traced.after)
 
 
+def little_gained(state: State, name: str, family: Any, gain: float) -> Trial:
+    effect = Accepted(name, name, family, "")
+    return Trial(effect, replace(state, accepted=(effect,)), gain, gain, 1)
+
+
+def test_a_force_that_gains_a_little_stays_among_what_it_may_be() -> None:
+    """No law of the library may be the device's; what comes near says how far the limit may be."""
+    _, etfe, fit = fitted(False, 5.0, ())
+
+    class LittleGained(NothingConvinces):
+        def trials(self, state: State, *_: Any) -> list[Trial]:
+            return [
+                little_gained(state, "dead_zone", "nonlinear", 3.0),
+                little_gained(state, "lag", "linear", 3.0),
+                little_gained(state, "drag", "nonlinear", 0.0),
+            ]
+
+    kind: Any = LittleGained(State(etfe, fit))
+    traced = trace(etfe, fit, trials=kind)
+    assert traced.verdict == "unexplained"
+    assert [trial.name for trial in traced.rejected] == ["dead_zone"]
+    assert not traced.rejected[0].convincing and traced.rejected[0].score > 0
+
+
 def _of_shapes(test: ResidualTest) -> bool:
     return not test.name.endswith(BESIDE)

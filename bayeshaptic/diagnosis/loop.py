@@ -233,7 +233,8 @@ class Loop:
                 left[id(trial)] = self._remaining(trial.state)
             return left[id(trial)]
 
-        open_ = [t for t in trials if t.convincing and not _raises(self.state, t.state)]
+        near = [t for t in trials if t.score > 0 and not _raises(self.state, t.state)]
+        open_ = [trial for trial in near if trial.convincing]
         chosen = acceptance.choose(
             open_,
             lambda trial: acceptance.excess(remaining(trial)),
@@ -243,7 +244,7 @@ class Loop:
             Candidate(t.name, t.accepted.title, t.score, t is chosen, self._number)
             for t in sorted(trials, key=lambda trial: -trial.score)
         ]
-        self._rejected = tuple(trial for trial in open_ if trial is not chosen)
+        self._rejected = tuple(t for t in near if t is not chosen and _may_be(t))
         if chosen is None:
             return False
         found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
@@ -288,6 +289,11 @@ class Loop:
             self._told = self._number
             share = 1 - 0.5 ** (self._number - 1) * (1 - 0.5 * (1 - 0.8 ** (self._tried - 1)))
             self._progress(share, f"round {self._number}: trying {what}")
+
+
+def _may_be(trial: Trial) -> bool:
+    """Whether it may be what is left: a force that gains a little is, under another law."""
+    return trial.convincing or trial.accepted.family == "nonlinear"
 
 
 def _raises(before: State, after: State) -> bool:

@@ -55,7 +55,8 @@ class Traced:
         The tests of the residual before and after.
     candidates : tuple of Candidate
     rejected : tuple of Trial
-        Trials of the last round that were good but not accepted: how else it could be.
+        Trials of the last round that were good but not accepted, and forces that gained anything:
+        how else it could be.
     path : tuple of State
         From the base model on, one for each time that something was accepted.
     skipped : tuple of str

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from bayeshaptic.diagnosis.base.begun import Begun, refitted
 from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn
@@ -85,7 +87,7 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
     loops.take_turns(rivals)
     found = {name: loop.traced for name, loop in loops.running.items()}
     noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
-    best = _best(found, noise)
+    best = _best(found, noise, loops.given_up)
     assert begun.choice is not None
     fit = begun.choice.candidates[best].fit if best in rivals else begun.fit
     said = _said(best, found, noise, loops.given_up)
@@ -162,14 +164,30 @@ def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
     return simple and all(begun.fit.model.size < size for size in sizes)
 
 
-def _comparable(found: Mapping[str, Traced]) -> Mapping[str, Traced]:
-    """What explains; where nothing does, all."""
-    return {name: one for name, one in found.items() if one.verdict != UNEXPLAINED} or found
+def _comparable(
+    found: Mapping[str, Traced], noise: float, given_up: Collection[str]
+) -> Mapping[str, Traced]:
+    """What explains; where nothing does, all.
+
+    A hand can take up what a force does to a device that nobody holds: it explains nothing where
+    two masses or one, with what they lack, predict the response better without it.
+    """
+    simple = {"rigid", "free"} - set(given_up)
+    unheld = [_criterion(one, noise) for name, one in found.items() if name in simple]
+    least = min(unheld, default=np.inf)
+    explains = {
+        name: one
+        for name, one in found.items()
+        if one.verdict != UNEXPLAINED
+        and (not one.state.fit.model.held or _criterion(one, noise) < least)
+    }
+    return explains or found
 
 
-def _best(found: dict[str, Traced], noise: float) -> str:
+def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] = ()) -> str:
     """What explains comes first, then the information criterion; of equals the fewest effects."""
-    behind = {name: _criterion(traced, noise) for name, traced in _comparable(found).items()}
+    among = _comparable(found, noise, given_up)
+    behind = {name: _criterion(traced, noise) for name, traced in among.items()}
     equals = [name for name in behind if behind[name] <= min(behind.values()) + _BARE_MENTION]
     return min(equals, key=lambda name: (len(found[name].state.accepted), behind[name]))
 
@@ -194,6 +212,6 @@ def _said(best: str, found: Mapping[str, Traced], noise: float, given_up: Collec
         if name in given_up:
             verdict = "given up: more would be no simpler than what explains"
         words.append(f"{name} with {effects} ({verdict})")
-    least = min(_comparable(found), key=lambda name: behind[name])
+    least = min(_comparable(found, noise, given_up), key=lambda name: behind[name])
     most = "as much with fewer effects" if behind[least] < 0 else "the most"
     return f" With what each of them lacks, {best} explains {most}: {'; '.join(words)}."

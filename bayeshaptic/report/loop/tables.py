@@ -91,7 +91,8 @@ def candidates(closed: Closed) -> Rows:
     tried = closed.traced.candidates
     for number in sorted({c.round for c in tried}):
         ranked = sorted((c for c in tried if c.round == number), key=lambda c: -c.score)
-        others = {t.name for t in closed.traced.rejected} if number == tried[-1].round else set()
+        last = closed.traced.rejected if number == tried[-1].round else ()
+        others = {trial.name for trial in last if trial.convincing}
         for candidate in ranked[:_SHOWN]:
             if candidate.taken_out:
                 fate = "accepted, and taken out when another made it needless"
