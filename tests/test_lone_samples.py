@@ -60,6 +60,14 @@ def test_a_resting_encoder_that_flickers_has_none() -> None:
     assert not lone(position).any()
 
 
+@pytest.mark.parametrize("size", [3.0, -40.0])
+def test_a_position_that_jumps_and_stays_there_has_none(size: float) -> None:
+    """Counts that were lost at once: the samples on both sides are off, as far as each other."""
+    position = recorded("lhifam").position.copy()
+    position[3000:] += size * position.std()
+    assert not lone(position).any()
+
+
 @pytest.mark.parametrize("held", [False, True])
 def test_those_that_are_off_are_found_and_nothing_else(held: bool) -> None:
     clean = recorded("lhifam", held=held)

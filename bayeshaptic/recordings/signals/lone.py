@@ -13,12 +13,14 @@ from bayeshaptic.types import Bools, Floats
 
 _FARTHER = 8.0  # than any sample around them, and than a count
 _AROUND = 10  # samples on either side
+_ALONE = 1.5  # times as far as the two beside it, which are off by half: after a jump one is as far
 
 
 def lone(position: Floats) -> Bools:
     """Samples eight times as far from the middle of both neighbours as any of the eighteen around.
 
-    A device that is struck goes on as it was pushed, and a resting encoder flickers by one count.
+    A device that is struck goes on as it was pushed, a position that jumps stays where it is then,
+    and a resting encoder flickers by one count.
 
     Parameters
     ----------
@@ -36,6 +38,7 @@ def lone(position: Floats) -> Bools:
     apart = 1 + _AROUND // 2
     beside = maximum_filter1d(np.pad(off, apart), _AROUND - 1)
     found: Bools = off > _FARTHER * np.maximum(beside[: -2 * apart], beside[2 * apart :])
+    found[1:-1] &= off[1:-1] > _ALONE * np.maximum(off[:-2], off[2:])
     found[:2] = found[-2:] = False  # of the first and the last one cannot be told
     if found.any():
         found &= off > _FARTHER * (increment_unit(position) or 0.0)
