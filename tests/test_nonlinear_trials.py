@@ -419,7 +419,7 @@ def test_a_gap_is_followed_to_its_sharp_peak(monkeypatch: pytest.MonkeyPatch) ->
     bench = LHIFAM.with_effect("backlash")
     best = best_of(bench.effects[0], "clipped stretch")
     assert best.accepted.title == "backlash in the connection"
-    # Two per cent off the true gap half of the likelihood's gain is gone.
+    # Two per cent off the true gap a sixth of the likelihood's gain is gone.
     assert best.accepted.estimates["half_gap"].mean == pytest.approx(bench.effects[0].gap, rel=0.02)
     assert best.accepted.estimates["damping_in_gap"].mean <= 1.0
 

@@ -26,6 +26,7 @@ from bayeshaptic.effects.nonlinear.internal_force import (
     Place,
     forced_motion,
 )
+from bayeshaptic.effects.nonlinear.observer import correction
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.spending import spend
@@ -120,24 +121,31 @@ class ForceBench:
         (x, v), *others = linear_motions(system, command, period, masses, SUBSTEPS)
         found = {}
         along: Floats | float = 0.0
+        # The measured position has what a hand does, and where the device stands.
+        driven = self.recording.position - x[::SUBSTEPS]
+        besides = driven - self._extra
         if {MOTOR, LOAD} & set(places):
-            # The measured position has what a hand does, and where the device stands.
-            measured = self.recording.position
-            besides = measured - x[::SUBSTEPS] - self._extra
             along = _between(self._hand(besides) if self.held else self._drift(besides, theta))
             found[MOTOR] = Motion(self._measured, v + along, command)
         for x2, v2 in others:
-            found[CONNECTION] = Motion(x - x2, v - v2, command)
+            if CONNECTION in places:
+                own = driven - self._slow(besides) if self.held else driven
+                stretch = x - x2 + _between(correction(own, period))
+                found[CONNECTION] = Motion(stretch, v - v2, command)
             if LOAD in places:  # what is slow moves both masses
                 found[LOAD] = Motion(x2, v2 + along, command)
         return found
 
     def _hand(self, besides: Floats) -> Floats:
         """Velocity that a hand adds: what is slow, because there the encoder sees it well."""
+        return np.gradient(self._slow(besides), self.recording.period_s)
+
+    def _slow(self, besides: Floats) -> Floats:
+        """Position that a hand adds."""
         rate = 1 / self.recording.period_s
         hand_hz = 20.0
         low = butter(2, min(hand_hz, 0.4 * rate), fs=rate, output="sos")
-        return np.gradient(sosfiltfilt(low, besides), 1 / rate)
+        return np.asarray(sosfiltfilt(low, besides))
 
     def _drift(self, besides: Floats, theta: Floats) -> Floats:
         """Velocity of a free device from how it began and from a constant force."""
@@ -278,7 +286,9 @@ def with_forces(etfe: Etfe, changes: Sequence[Change], sign: float = 1.0) -> Etf
 
 
 def _between(samples: Floats) -> Floats:
-    """Along straight lines to the fine grid, the last sample held, shape (N * SUBSTEPS,)."""
-    ahead = np.append(samples[1:], samples[-1])
-    weight = np.arange(SUBSTEPS) / SUBSTEPS
-    return np.asarray(np.stack([samples, ahead], axis=1) @ np.stack([1 - weight, weight])).ravel()
+    """Along cubics through four samples each to the fine grid, shape (N * SUBSTEPS,)."""
+    t = np.arange(SUBSTEPS) / SUBSTEPS
+    before, first = -t * (t - 1) * (t - 2) / 6, (t + 1) * (t - 1) * (t - 2) / 2
+    last, after = -(t + 1) * t * (t - 2) / 2, (t + 1) * t * (t - 1) / 6
+    four = np.lib.stride_tricks.sliding_window_view(np.pad(samples, (1, 2), mode="edge"), 4)
+    return np.asarray(four @ np.stack([before, first, last, after])).ravel()

@@ -5,7 +5,7 @@ and move it further, each in the motion that all of them make.  Only the further
 simulated, on a fine grid, with the exact step of the linear mechanism; the force of a step is found
 together with its end, so that dry friction sticks exactly, and turns within the step in which the
 motion does: with one force for all of that step a drag beside friction would have to stand out of
-what the steps are off by.
+what the steps are off by.  Between masses an observer keeps to the measured motion.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from bayeshaptic.compiled import callback
+from bayeshaptic.effects.nonlinear.observer import filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.types import Floats
 
@@ -86,7 +87,7 @@ class Internal:
     law : Law
     position, velocity : ndarray, shape (N * substeps,)
         Of the mass, or of the first mass relative to the second. Against the ground the position is
-        the one with the forces: it is measured.
+        the one with the forces: it is measured. Between masses it has the observer's `correction`.
     """
 
     place: Place
@@ -142,6 +143,10 @@ def steps(
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Exact steps, as `step_through` takes them: matrix, rows, drive, gains, reading."""
     a = mechanism.state_matrix()[0]
+    reading = np.concatenate([mechanism.drive_vector(), np.zeros(len(a) // 2)])
+    corrected = np.zeros_like(reading)
+    if any(place.second is not None for place in places):
+        a, reading, corrected = filtered(a, reading)
     size, n, count = len(a), len(mechanism.masses), len(places)
     push, at = np.zeros((size, count)), np.zeros((count, 2, size))
     for i, place in enumerate(places):
@@ -151,6 +156,8 @@ def steps(
                 # Against the ground the measured position counts, which holds everything already.
                 at[i, 0, mass] = sign if place.second is not None else 0.0
                 at[i, 1, n + mass] = sign
+        if place.second is not None:
+            at[i, 0] -= corrected
     block = np.zeros((size + count, size + count))
     block[:size, :size], block[:size, size:] = a, push
     step = expm(block * step_s)
@@ -158,5 +165,4 @@ def steps(
     middle = 0.5 * (at + at @ state)
     rows = np.concatenate([middle, at[:, 1:] @ state], axis=1)
     gains = np.concatenate([0.5 * at @ drive, at[:, 1:] @ drive], axis=1)
-    reading = np.concatenate([mechanism.drive_vector(), np.zeros(size // 2)])
     return state, rows, drive.T.copy(), np.swapaxes(gains, 1, 2).copy(), reading
