@@ -95,7 +95,7 @@ def recorded(bench: Bench) -> Recording:
 
 def plainly(mechanism: Any, forces: list[Internal]) -> Any:
     """As `forced_motion`, in plain NumPy."""
-    linear = steps(mechanism, [force.place for force in forces], STEP_S)
+    linear = steps(mechanism, forces, STEP_S)
     motion = np.array([[force.position, force.velocity] for force in forces])
     laws = tuple(force.law.force for force in forces)
     sticks = [force.law.sticks for force in forces]

@@ -122,16 +122,12 @@ class ForceBench:
         found = {}
         along: Floats | float = 0.0
         # The measured position has what a hand does, and where the device stands.
-        driven = self.recording.position - x[::SUBSTEPS]
-        besides = driven - self._extra
+        besides = self.recording.position - x[::SUBSTEPS] - self._extra
         if {MOTOR, LOAD} & set(places):
             along = _between(self._hand(besides) if self.held else self._drift(besides, theta))
             found[MOTOR] = Motion(self._measured, v + along, command)
         for x2, v2 in others:
-            if CONNECTION in places:
-                own = driven - self._slow(besides) if self.held else driven
-                stretch = x - x2 + _between(correction(own, period))
-                found[CONNECTION] = Motion(stretch, v - v2, command)
+            found[CONNECTION] = Motion(x - x2, v - v2, command)
             if LOAD in places:  # what is slow moves both masses
                 found[LOAD] = Motion(x2, v2 + along, command)
         return found
@@ -146,6 +142,14 @@ class ForceBench:
         hand_hz = 20.0
         low = butter(2, min(hand_hz, 0.4 * rate), fs=rate, output="sos")
         return np.asarray(sosfiltfilt(low, besides))
+
+    def _corrected(self, theta: Floats, command: Floats) -> Floats:
+        """How far the measurement draws the motion in the connection, but for what forces do."""
+        period = self.recording.period_s
+        x = linear_motion(self.model.system(theta), command, period)[0]
+        driven = self.recording.position - x
+        slow = self._slow(driven - self._extra) if self.held else 0.0
+        return _between(correction(driven - slow, period))
 
     def _drift(self, besides: Floats, theta: Floats) -> Floats:
         """Velocity of a free device from how it began and from a constant force."""
@@ -165,12 +169,14 @@ class ForceBench:
         step = 4.0  # what a step costs, with the motion around it, in values of a rational model
         spend(step * SUBSTEPS * self.recording.samples * len(inner))
         places = tuple(dict.fromkeys(forces[i].effect.place for i in inner))
-        motion = self.motions(theta, places, self.force - self.lost(forces))
+        command = self.force - self.lost(forces)
+        motion = self.motions(theta, places, command)
         acting = []
         for i in inner:
             effect = forces[i].effect
             law, there = effect.law(forces[i].strength, self.model, theta), motion[effect.place]
-            acting.append(Internal(effect.place, law, there.position, there.velocity))
+            seen = there.position + (self._corrected(theta, command) if law.observed else 0.0)
+            acting.append(Internal(effect.place, law, seen, there.velocity))
         period = self.recording.period_s
         mechanism = self.model.system(theta).mechanism
         added[inner] = forced_motion(mechanism, acting, period / SUBSTEPS, SUBSTEPS)

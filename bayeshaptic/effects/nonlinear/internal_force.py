@@ -5,7 +5,7 @@ and move it further, each in the motion that all of them make.  Only the further
 simulated, on a fine grid, with the exact step of the linear mechanism; the force of a step is found
 together with its end, so that dry friction sticks exactly, and turns within the step in which the
 motion does: with one force for all of that step a drag beside friction would have to stand out of
-what the steps are off by.  Between masses an observer keeps to the measured motion.
+what the steps are off by.  In a gap an observer keeps to the measured motion.
 """
 
 from __future__ import annotations
@@ -50,11 +50,14 @@ class Law:
     constants : tuple of float
     sticks : bool
         Whether it is dry friction, which holds the mass where it can: `force` is its largest size.
+    observed : bool
+        Whether an observer corrects the position that it is told, between the motor and a mass.
     """
 
     force: Force
     constants: tuple[float, ...]
     sticks: bool = False
+    observed: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,7 @@ class Internal:
     law : Law
     position, velocity : ndarray, shape (N * substeps,)
         Of the mass, or of the first mass relative to the second. Against the ground the position is
-        the one with the forces: it is measured. Between masses it has the observer's `correction`.
+        the one with the forces: it is measured. Where it is observed, with the `correction`.
     """
 
     place: Place
@@ -121,7 +124,7 @@ def forced_motion(
 
     from bayeshaptic.effects.nonlinear.stepping_kernel import step_through
 
-    linear = steps(mechanism, [force.place for force in forces], step_s)
+    linear = steps(mechanism, forces, step_s)
     motion = np.array([[force.position, force.velocity] for force in forces])
     laws = tuple(callback(force.law.force) for force in forces)
     sticks = np.array([force.law.sticks for force in forces])
@@ -139,24 +142,25 @@ def numbers_of(laws: Sequence[Law]) -> tuple[Floats, tuple[int, ...]]:
 
 
 def steps(
-    mechanism: Mechanism, places: Sequence[Place], step_s: float
+    mechanism: Mechanism, forces: Sequence[Internal], step_s: float
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Exact steps, as `step_through` takes them: matrix, rows, drive, gains, reading."""
     a = mechanism.state_matrix()[0]
     reading = np.concatenate([mechanism.drive_vector(), np.zeros(len(a) // 2)])
     corrected = np.zeros_like(reading)
-    if any(place.second is not None for place in places):
+    if any(force.law.observed for force in forces):
         a, reading, corrected = filtered(a, reading)
-    size, n, count = len(a), len(mechanism.masses), len(places)
+    size, n, count = len(a), len(mechanism.masses), len(forces)
     push, at = np.zeros((size, count)), np.zeros((count, 2, size))
-    for i, place in enumerate(places):
+    for i, force in enumerate(forces):
+        place = force.place
         for mass, sign in ((place.first, 1.0), (place.second, -1.0)):
             if mass is not None:
                 push[n + mass, i] = sign / float(mechanism.masses[mass][0])
                 # Against the ground the measured position counts, which holds everything already.
                 at[i, 0, mass] = sign if place.second is not None else 0.0
                 at[i, 1, n + mass] = sign
-        if place.second is not None:
+        if force.law.observed:
             at[i, 0] -= corrected
     block = np.zeros((size + count, size + count))
     block[:size, :size], block[:size, size:] = a, push

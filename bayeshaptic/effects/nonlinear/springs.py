@@ -116,7 +116,7 @@ class Backlash(NonlinearEffect):
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         values = dict(zip(model.names, theta, strict=True))
         damping = (1 - self.shape["damping_in_gap"]) * values["bc"]
-        return Law(_gap, (strength, values["kc"], damping))
+        return Law(_gap, (strength, values["kc"], damping), observed=True)
 
 
 def _gap_of(half: float, unit: str) -> Shape:
