@@ -26,7 +26,7 @@ from bayeshaptic.effects.nonlinear.internal_force import (
     Place,
     forced_motion,
 )
-from bayeshaptic.effects.nonlinear.observer import correction
+from bayeshaptic.effects.nonlinear.observer import correction, stretched
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.spending import spend
@@ -127,7 +127,7 @@ class ForceBench:
             along = _between(self._hand(besides) if self.held else self._drift(besides, theta))
             found[MOTOR] = Motion(self._measured, v + along, command)
         for x2, v2 in others:
-            found[CONNECTION] = Motion(x - x2, v - v2, command)
+            found[CONNECTION] = Motion(x - x2 + self._stretched(besides, theta), v - v2, command)
             if LOAD in places:  # what is slow moves both masses
                 found[LOAD] = Motion(x2, v2 + along, command)
         return found
@@ -142,6 +142,13 @@ class ForceBench:
         hand_hz = 20.0
         low = butter(2, min(hand_hz, 0.4 * rate), fs=rate, output="sos")
         return np.asarray(sosfiltfilt(low, besides))
+
+    def _stretched(self, besides: Floats, theta: Floats) -> Floats | float:
+        """How far the motor hangs back where a hand moves the device."""
+        if not self.held:
+            return 0.0
+        values = dict(zip(self.model.names, theta.tolist(), strict=True))
+        return _between(stretched(self._slow(besides), self.recording.period_s, values))
 
     def _corrected(self, theta: Floats, command: Floats) -> Floats:
         """How far the measurement draws the motion in the connection, but for what forces do."""
