@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.causal import causal_tests
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.diagnosis.residuals.drift import drift_tests
 from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
@@ -39,6 +40,8 @@ def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tupl
     """
     if is_periodic(etfe):
         return periodic_tests(fit, etfe)
+    if etfe.direct:
+        return causal_tests(fit, etfe)
     if etfe.through_reference:
         return (*frequency_tests(fit), *nonlinear_tests(fit, etfe))
     return (*model_tests(fit, etfe), *measurement_tests(fit, etfe, look))

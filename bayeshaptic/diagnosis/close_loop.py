@@ -10,12 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.analyse import finish, without_sampling
+from bayeshaptic.diagnosis.acceptance import verdict_of
+from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish, without_sampling
 from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.diagnosis.base.any_loop import in_any_loop, left_in_any_loop
 from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
 from bayeshaptic.diagnosis.base.opened import Opened, opened
+from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
@@ -28,19 +31,20 @@ from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.excess import noise_besides
-from bayeshaptic.diagnosis.state import held_out_rms
+from bayeshaptic.diagnosis.state import State, held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.diagnosis.widening.rest import with_rest
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
-from bayeshaptic.errors import Notice
+from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 from bayeshaptic.threads import single_threaded
 
 
@@ -74,6 +78,10 @@ def close_loop(
     chosen = options_from(options, changes)
     prior = HiddenPrior.from_table(chosen.effects)
     found = opened(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
+    direct = _whatever_loop(found, model, chosen)
+    if isinstance(direct, Closed):
+        return direct
+    found = direct
     in_time = has_feedback(found.notices) or told_too_little(found.notices)
     force = explain_force(found.etfe.recording) if in_time else None
     if force is not None and (followed := _in_loop(found, force, chosen)) is not None:
@@ -120,6 +128,34 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
     wide = with_rest(stated, state.fit, traced, louder, seed) or wide
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)
     return Closed(base, analysis, traced, _error(base), _error(analysis))
+
+
+def _whatever_loop(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
+    """By the direct method; where something is left, what was opened, told so.
+
+    Where that is open, one mass is no model of it: the motion in time knows more of such a device,
+    dry friction above all.
+    """
+    lines = in_any_loop(found, options)
+    if lines is None:
+        return found
+    try:
+        begun = fitted(lines, model, options.within(0.0, 0.3))
+    except InputError:
+        return found
+    tests = residual_tests(begun.fit, begun.etfe)
+    state = State(begun.etfe, begun.fit)
+    traced = Traced(*verdict_of((), tests), state, tests, tests)
+    if traced.verdict == UNEXPLAINED:
+        return replace(found, notices=(*found.notices, left_in_any_loop(tests)))
+    if begun.fit.model.name == "rigid":
+        return found
+    nothing = EtfeCriticalStiffness(
+        None, None, None, None, begun.fit.model.stiffness_unit, NO_WITNESS
+    )
+    analysis = finish(begun, begun.etfe, begun.fit, options.within(0.3, 0.95), witness=nothing)
+    error = _limit_alone(analysis)
+    return Closed(analysis, analysis, traced, error, error)
 
 
 def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:

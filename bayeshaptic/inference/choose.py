@@ -235,8 +235,12 @@ def deviance(fit: Fit, noise: float) -> tuple[float, float]:
     from_a_hand : float
         The hand's part of it, a chi-square of five numbers; zero where nobody holds the device.
     """
+    at_fit = 2 * float(np.sum(np.abs(fit.residual) ** 2)) / noise
+    # Where the noise is what the fit leaves the likelihood tells one fit from another.
+    known = fit.windows.noise is None
+    own = at_fit if known else -2 * fit.log_likelihood
     if not fit.model.held:
-        return 2 * float(np.sum(np.abs(fit.residual) ** 2)) / noise, 0.0
+        return own, 0.0
     here, low, high = search_box(fit.model)
     misfit = weighted_residuals(fit.likelihood, here)
     mass = float(fit.model.prior("mh").quantile(0.5))
@@ -251,7 +255,7 @@ def deviance(fit: Fit, noise: float) -> tuple[float, float]:
     start = here.coordinate(fit.theta[None])
     steps, settled = 40, 1e-3  # of the least sum of misfit and distance from a hand
     phi, half = minimise(both, start, low, high, steps, settled)
-    return 2 * float(half[0]), float(np.sum(hand(phi) ** 2))
+    return own + 2 * float(half[0]) - at_fit, float(np.sum(hand(phi) ** 2))
 
 
 def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: bool | None) -> str:

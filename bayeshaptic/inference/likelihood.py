@@ -142,13 +142,20 @@ class Likelihood:
     @property
     def noise_variance(self) -> Floats:
         """Expected |z - R g|^2 / k of a window where the model is true, shape (W,)."""
+        if self.windows.noise is not None:
+            return self.windows.noise
         nodes = self.windows.target.shape[1]
         # |z - R g|^2 / k over s0 / (n - k) is an F variable; this is its mean times s0 / (n - k).
         freedom = np.maximum(self.windows.lines - nodes - 1, 0.5)
         return self.windows.scatter / freedom
 
     def reduced_chi_square(self, theta: Floats) -> Floats:
-        """Mean squared normalised deviation a degree of freedom, shape (B,); 1 is the noise."""
+        """Mean squared normalised deviation a degree of freedom, shape (B,); 1 is the noise.
+
+        Where the noise is what a fit leaves there is no other to compare it with.
+        """
+        if self.windows.noise is not None:
+            return np.ones(len(theta))
         left = self.normalised(theta)
         freedom = left.shape[1] * left.shape[2] - 0.5 * self.model.size
         return np.sum(np.abs(left) ** 2, axis=(1, 2)) / max(freedom, 0.5)

@@ -91,6 +91,11 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
             "What the controller followed does not depend on the motion; the response is read "
             f"through it alone. {scatter}"
         )
+    if etfe.direct:
+        scatter = (
+            "The command depends on the motion before it alone, not on what is to come; by which "
+            f"controller is no matter. {scatter}"
+        )
     return (
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
         "extrapolates.",

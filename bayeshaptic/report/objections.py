@@ -35,6 +35,7 @@ _BESIDES = 0.25
 # Of the power of the response at the limit: from 0.28 on friction may be all of the damping there.
 # It is asked only where the noise of the device is flagged: in none of 60 clean recordings.
 _CHANGES = 0.25
+_WIDE = "the recording leaves the limit open within more than a factor of two"
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 
 
@@ -115,6 +116,8 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
         )
     if analysis.etfe.through_reference:
         found += _in_closed_loop(analysis, verdict)
+    if analysis.etfe.direct and _is_wide(analysis):
+        found.append(_WIDE)
     recording = analysis.recording
     if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
         found.append(
@@ -227,7 +230,12 @@ def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
         )
     if any(notice.topic == VALLEY for notice in analysis.notices):
         found.append("a vibration mode elsewhere explains what the reference moves as well")
-    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
-    if not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB):
-        found.append("the recording leaves the limit open within more than a factor of two")
+    if _is_wide(analysis):
+        found.append(_WIDE)
     return found
+
+
+def _is_wide(analysis: Analysis) -> bool:
+    """Whether the limit's 90 % interval is wider than a factor of two."""
+    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
+    return not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB)

@@ -138,7 +138,9 @@ def _recording(analysis: Analysis) -> dict[str, Any]:
         "configuration": recording.configuration,
         "samples": recording.samples,
         "excitation_rms": np.sqrt(np.mean(np.square(recording.force))),
-        "feedback": has_feedback(analysis.notices) or analysis.etfe.through_reference,
+        "feedback": has_feedback(analysis.notices)
+        or analysis.etfe.through_reference
+        or analysis.etfe.direct,
     }
 
 

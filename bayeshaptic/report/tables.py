@@ -190,6 +190,8 @@ def _excitation(analysis: Analysis) -> str:
         return "computed from the motion"
     if analysis.etfe.through_reference:
         return "of a controller, read through what it followed"
+    if analysis.etfe.direct:
+        return "of a controller that is not known"
     if told_too_little(analysis.notices):
         return "too little of a response"
     lines = analysis.etfe.period_lines

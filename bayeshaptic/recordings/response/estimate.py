@@ -13,7 +13,10 @@ from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import refuse_band
 from bayeshaptic.recordings.response.estimators.periodic_excitation import estimate_periodic
-from bayeshaptic.recordings.response.estimators.random_excitation import estimate_random
+from bayeshaptic.recordings.response.estimators.random_excitation import (
+    estimate_direct,
+    estimate_random,
+)
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import JoinedSpectra, PeriodicSpectra, RandomSpectra
 from bayeshaptic.recordings.signals.excitation import FEWEST_LINES
@@ -84,6 +87,41 @@ def estimate_etfe(
         recording=recording,
         period_lines=spectra.lines if found is not None else None,
         notices=notices,
+    )
+
+
+def estimate_in_any_loop(recording: Recording) -> Etfe:
+    """The response at all lines, for fits that hold whatever loop it was recorded in.
+
+    What a person sees of it, feedback biases; `DirectSpectra` says why a fit does not mind.
+
+    Parameters
+    ----------
+    recording : Recording
+        In one piece.
+
+    Raises
+    ------
+    InputError
+        When the recording is too short.
+    """
+    spectra, points = estimate_direct(recording)
+    text = (
+        f"All {spectra.lines} lines count, to the Nyquist frequency: in closed loop none may be "
+        "left out."
+    )
+    return Etfe(
+        frequency_hz=points.frequency_hz,
+        value=points.value,
+        variance=points.variance,
+        coherence=points.coherence,
+        period_s=recording.period_s,
+        band_hz=(float(spectra.frequency_hz[0]), float(spectra.frequency_hz[-1])),
+        force_unit=recording.force_unit,
+        position_unit=recording.position_unit,
+        spectra=spectra,
+        recording=recording,
+        notices=(Notice("note", "band", text),),
     )
 
 

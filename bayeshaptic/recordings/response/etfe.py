@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import interval, pretty_unit, pure
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.estimators.direct import DirectSpectra
 from bayeshaptic.recordings.response.spectra import (
     JoinedSpectra,
     PeriodicSpectra,
@@ -87,6 +88,11 @@ class Etfe(Shown):
     def through_reference(self) -> bool:
         """Whether it was made in closed loop, and is read through what the controller followed."""
         return self.recording is not None and self.recording.reference is not None
+
+    @property
+    def direct(self) -> bool:
+        """Whether it may be biased by feedback, and is fitted so that this does not matter."""
+        return isinstance(self.spectra, DirectSpectra)
 
     @property
     def relative_sd(self) -> NDArray[Any]:

@@ -34,6 +34,8 @@ class Windows:
         s0 > 0: what no smooth response explains.
     lines : ndarray, shape (W,)
         n: complex degrees of freedom of target and scatter together.
+    noise : ndarray, shape (W,), or None
+        Variance of a line's noise as a first fit leaves it; None: as the scatter tells.
     """
 
     frequency_hz: NDArray[Any]
@@ -41,6 +43,7 @@ class Windows:
     target: NDArray[Any]
     scatter: NDArray[Any]
     lines: NDArray[Any]
+    noise: NDArray[Any] | None = None
 
     @property
     def inputs(self) -> int:
@@ -55,4 +58,5 @@ class Windows:
             self.target[chosen],
             self.scatter[chosen],
             self.lines[chosen],
+            None if self.noise is None else self.noise[chosen],
         )

@@ -28,6 +28,11 @@ _BIBTEX = {
   journal = {Publications of the Astronomical Society of the Pacific},
   volume = {125}, number = {925}, pages = {306--312}, year = {2013}
 }""",
+    "ljung1999": """@book{ljung1999,
+  author = {Ljung, Lennart},
+  title = {System Identification: Theory for the User},
+  publisher = {Prentice Hall}, edition = {2}, year = {1999}
+}""",
     "pintelon2012": """@book{pintelon2012,
   author = {Pintelon, Rik and Schoukens, Johan},
   title = {System Identification: A Frequency Domain Approach},
@@ -92,6 +97,11 @@ def _measured(etfe: Etfe) -> tuple[str, ...]:
     )
     if etfe.through_reference:
         how += ", through the reference of the controller that computed the force as an instrument"
+    if etfe.direct:
+        how += (
+            ", every line up to the Nyquist frequency counting alike, so that feedback does not "
+            "bias the fit (the direct method [ljung1999])"
+        )
     return (
         f"The device's response to a commanded force was recorded for {length} at {rate}, and "
         f"estimated {how} with its noise ({band}).",

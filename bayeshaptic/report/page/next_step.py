@@ -75,6 +75,8 @@ def next_steps(
         return (Step(f"{cure}. Then:", new),)
     if analysis.etfe.through_reference:
         return _after_reference(result, command, new)
+    if analysis.etfe.direct and analysis.posterior.converged:
+        return (_in_open_loop(new),)
     return (_after_fit(result, command, new),)
 
 
@@ -121,11 +123,7 @@ def _after_fit(result: Result, command: str, new: str) -> Step:
 def _after_feedback(result: Result, command: str, new: str, bare: str) -> tuple[Step, ...]:
     """Where the force was computed from the motion."""
     analysis = result.analysis
-    again = Step(
-        "Record again with a force that does not depend on the motion: white noise, or a "
-        "multisine. Then report on that recording:",
-        new,
-    )
+    again = _in_open_loop(new)
     if analysis.in_loop is None or analysis.in_loop.doubts:
         given = any(notice.topic == "reference" for notice in analysis.notices)
         return (again, _through(bare)) if is_certain(analysis.notices) and not given else (again,)
@@ -146,6 +144,14 @@ def _after_reference(result: Result, command: str, new: str) -> tuple[Step, ...]
             "open loop, where friction can be told from the rest. Then:",
             new,
         ),
+    )
+
+
+def _in_open_loop(new: str) -> Step:
+    return Step(
+        "Record again with a force that does not depend on the motion: white noise, or a "
+        "multisine. Then report on that recording:",
+        new,
     )
 
 

@@ -11,19 +11,25 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band
+from bayeshaptic.recordings.response.estimators.direct import DirectSpectra
 from bayeshaptic.recordings.response.estimators.instrument import STRONG, InstrumentSpectra
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.estimators.ringing import ringing_poles
 from bayeshaptic.recordings.response.local_polynomial import (
+    ENOUGH_LINES,
     default_minimum_lines,
     window_edges,
 )
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
-from bayeshaptic.recordings.response.window_reference import fit_local_rational, unit_mass
+from bayeshaptic.recordings.response.window_reference import (
+    LocalRational,
+    fit_local_rational,
+    unit_mass,
+)
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.recordings.signals.lone import without_lone
-from bayeshaptic.recordings.signals.raw_signals import clipping
+from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.sweeps import FEWEST_COUNTS, moves_until
 
 FEWEST_WINDOWS = 8
@@ -70,6 +76,29 @@ def estimate_random(
         spectra, notice = _in_given_band(recording, band_hz, minimum)
     spectra = _with_reference(spectra)
     return spectra, points(spectra.windows()), (notice,) if notice else ()
+
+
+def estimate_direct(recording: Recording) -> tuple[DirectSpectra, Points]:
+    """All lines of a recording with feedback, and the response of each window, which it biases.
+
+    Parameters
+    ----------
+    recording : Recording
+        In one piece.
+
+    Raises
+    ------
+    InputError
+        When there are too few lines.
+    """
+    nyquist = 0.5 / recording.period_s
+    plain = _spectra(recording, (0.5 / recording.duration_s, nyquist), ENOUGH_LINES)
+    same = {field.name: getattr(plain, field.name) for field in fields(RandomSpectra)}
+    same["floor"] = _rounding(recording.position) ** 2 * np.ones(len(plain.floor))
+    count = increment_unit(recording.position) or 0.0
+    spectra = DirectSpectra(**same, rounding=count**2 / 12)
+    ours = replace(spectra, reference=_local_reference(spectra)[0])
+    return ours, points(ours.windows())
 
 
 def points(windows: Windows) -> Points:
@@ -196,15 +225,18 @@ def _spectra(
     scale = 1 / np.sqrt(samples)
     found = np.fft.rfft(position)[lines] * scale
     power = np.add.reduceat(np.abs(found) ** 2, edges[:-1]) / np.diff(edges)
-    rounding = np.finfo(float).eps * np.max(np.abs(recording.position))
     return RandomSpectra(
         frequency_hz=frequency[lines],
         force=np.fft.rfft(recording.force - recording.force.mean())[lines] * scale,
         position=found,
         edges=edges,
-        floor=rounding**2 + REPEATS_TO**2 * power,
+        floor=_rounding(recording.position) ** 2 + REPEATS_TO**2 * power,
         reference=unit_mass,
     )
+
+
+def _rounding(position: NDArray[Any]) -> float:
+    return float(np.finfo(float).eps * np.max(np.abs(position)))
 
 
 def _too_short(
@@ -228,20 +260,25 @@ def _with_reference(spectra: RandomSpectra) -> RandomSpectra:
 
     And with the poles of modes that ring on, and the slope of the noise around it.
     """
+    rational, curved, scatter = _local_reference(spectra)
+    if isinstance(spectra, InstrumentSpectra):
+        spectra = replace(spectra, reference=rational)
+        return replace(spectra, noise_slope=noise_slopes(spectra.regressed()))
+    poles = ringing_poles(spectra, curved, scatter)
+    if poles is not None:
+        rational = rational.with_poles(poles)
+    spectra = replace(spectra, reference=rational, ringing_hz=poles)
+    return replace(spectra, noise_slope=noise_slopes(spectra))
+
+
+def _local_reference(spectra: RandomSpectra) -> tuple[LocalRational, Any, NDArray[Any]]:
+    """The reference, where it is rational, and the scatter of each window around it."""
     plain = spectra.windows()
     rational = fit_local_rational(plain)
     fitted = spectra.windows(rational)
     gain = (plain.lines - 1) * np.log(plain.scatter / fitted.scatter)
     curved = gain > BETTER
-    rational = rational.where(curved)
-    if isinstance(spectra, InstrumentSpectra):
-        spectra = replace(spectra, reference=rational)
-        return replace(spectra, noise_slope=noise_slopes(spectra.regressed()))
-    poles = ringing_poles(spectra, curved, np.where(curved, fitted.scatter, plain.scatter))
-    if poles is not None:
-        rational = rational.with_poles(poles)
-    spectra = replace(spectra, reference=rational, ringing_hz=poles)
-    return replace(spectra, noise_slope=noise_slopes(spectra))
+    return rational.where(curved), curved, np.where(curved, fitted.scatter, plain.scatter)
 
 
 def _detrended(values: NDArray[Any]) -> NDArray[Any]:

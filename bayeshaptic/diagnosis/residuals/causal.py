@@ -1,0 +1,139 @@
+"""Is the model right, where feedback may bias the response?  Scores of causal changes tell.
+
+Around the fit of a direct likelihood (`recordings/response/estimators/direct.py`) every window may
+deviate, by as much as the controller makes of the noise.  What must vanish is the sum over all of
+them of the score of any change that is causal: of the response by a filter, or of the motion by a
+force.  Its variance is that of a regression in which the noise itself excites nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.columns import columns, force_test, line_transform
+from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test, chi_square_score
+from bayeshaptic.inference.coordinates import coordinates
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.types import Complexes, Floats
+
+_FILTERS = 12  # of first and of second order, evenly over log frequency
+_DAMPED = 0.2  # damping ratio of those of second order
+_LEAST = 1e-8  # share of a change that is none of the parameters', from which on it is one
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Scores of changes, each over its size, and their covariance where the model is true."""
+
+    score: Floats
+    covariance: Floats
+    size: Floats
+
+    def beside(self, count: int) -> Scores:
+        """Of all but the first `count` changes, with what those can do taken off."""
+        known, new = slice(0, count), slice(count, None)
+        inverse = np.linalg.pinv(self.covariance[known, known], rcond=1e-12, hermitian=True)
+        share = self.covariance[new, known] @ inverse
+        left = self.covariance[new, new] - share @ self.covariance[known, new]
+        return Scores(self.score[new] - share @ self.score[known], left, self.size[new])
+
+
+def causal_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """Tests for another linear response, for forces, and for a gain that changes in time.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+        With all lines.
+    """
+    smooth = np.concatenate([_own_changes(fit), _filtered(fit)], axis=2)
+    own = fit.model.size
+    linear = scores(fit, fit.windows, smooth).beside(own)
+    return (_linear_test(linear), *_force_tests(fit, etfe, smooth))
+
+
+def scores(fit: Fit, windows: Windows, changes: Complexes) -> Scores:
+    """Scores of changes of the response at the nodes, (W, k, C), and then of further inputs."""
+    nodes = windows.frequency_hz
+    response = fit.response(nodes.ravel()).reshape(nodes.shape)
+    own, further = windows.design[:, :, : nodes.shape[1]], windows.design[:, :, nodes.shape[1] :]
+    left = windows.target - (own @ response[..., None])[..., 0]
+    moved = np.concatenate([own @ changes, further], axis=2)
+    power = windows.scatter + np.sum(np.abs(left) ** 2, axis=1)
+    weight = 2 * (windows.lines - 1) / power
+    along = np.einsum("wkc,wk->wc", moved.conj(), left)
+    # What of a change goes with the noise itself is the controller's answer, and tells nothing.
+    both = np.einsum("w,wkc,wkd->cd", weight, moved.conj(), moved).real
+    answers = np.einsum("w,wc,wd->cd", weight / power, along, along.conj()).real
+    size = np.sqrt(np.maximum(np.diag(both), np.finfo(float).tiny))
+    return Scores(
+        (weight[:, None] * along.real).sum(axis=0) / size,
+        (both - answers) / np.outer(size, size),
+        size,
+    )
+
+
+def _own_changes(fit: Fit) -> Complexes:
+    """What each parameter does to the response at the nodes, (W, k, P)."""
+    here, nodes = coordinates(fit.model), fit.windows.frequency_hz
+    phi = np.repeat(here.coordinate(fit.theta[None]), fit.model.size + 1, axis=0)
+    phi[1:] += _STEP * np.eye(fit.model.size)
+    response = fit.model.response(here.natural(phi), nodes.ravel())
+    slope = (response[1:] - response[0]) / _STEP
+    return np.moveaxis(slope.reshape(-1, *nodes.shape), 0, -1)
+
+
+def _filtered(fit: Fit) -> Complexes:
+    """The response behind stable filters, (W, k, C): what a causal change may be made of."""
+    nodes = fit.windows.frequency_hz
+    response = fit.response(nodes.ravel()).reshape(nodes.shape)
+    at = np.geomspace(nodes.min(), nodes.max() / 2, _FILTERS)
+    s = 1j * nodes[..., None] / at
+    second = 1 / (1 + 2 * _DAMPED * s + s**2)
+    return response[..., None] * np.concatenate([1 / (1 + s), second, s * second], axis=-1)
+
+
+def _linear_test(found: Scores) -> Test:
+    sizes, directions = np.linalg.eigh(found.covariance)
+    kept = sizes > _LEAST * max(float(sizes.max()), _LEAST)
+    along = directions[:, kept].T @ found.score
+    z = chi_square_score(float(np.sum(along**2 / sizes[kept])), int(kept.sum()))
+    text = f"a causal change of the response would explain it ({z:.1f} standard deviations)"
+    return Test("causal change", "linear", z, thresholds.SMOOTH, None, text)
+
+
+def _force_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
+    """Of forces by their shapes, what any linear response can do taken off."""
+    recording = etfe.unbroken
+    assert recording is not None
+    frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
+    at_lines = line_transform(etfe, recording)
+    found = []
+    for name, (inputs, rms) in columns(fit, recording, frequency_hz, at_lines).items():
+        score, sd = _beside_linear(fit, etfe, smooth, inputs[0])
+        found.append(force_test(name, abs(score), ForceSeen(score * sd, sd, rms)))
+    time = np.linspace(-1.0, 1.0, recording.samples)
+    later = fit.response(frequency_hz) * at_lines(recording.force * time)
+    score, _ = _beside_linear(fit, etfe, smooth, later)
+    text = f"a gain that changes in time stands {abs(score):.1f} standard deviations out"
+    test = Test("gain in time", "time-varying", abs(score), thresholds.two_sided(), None, text)
+    return [*found, test]
+
+
+def _beside_linear(
+    fit: Fit, etfe: Etfe, smooth: Complexes, motion: Complexes
+) -> tuple[float, float]:
+    """Score of a motion, and the standard deviation of its strength."""
+    windows = etfe.spectra.windows(fit.response, motion[None])
+    found = scores(fit, windows, smooth).beside(smooth.shape[2])
+    information = float(found.covariance[0, 0])
+    if information < _LEAST:
+        return 0.0, np.inf
+    return float(found.score[0] / information**0.5), float(1 / (found.size[0] * information**0.5))
