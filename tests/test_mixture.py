@@ -9,7 +9,8 @@ from scipy.stats import kstest, multivariate_t
 from scipy.stats import t as student_t
 
 from bayeshaptic.inference.sampling.ensembles import warmed_up
-from bayeshaptic.numerics.mixture import StudentMixture, fit_student_mixture, student
+from bayeshaptic.numerics.mixture import StudentMixture, student
+from bayeshaptic.numerics.mixture_fit import fit_student_mixture
 from bayeshaptic.numerics.straightening import nothing_to_straighten, straighten
 from bayeshaptic.numerics.weights import effective, normalised, tempered
 
