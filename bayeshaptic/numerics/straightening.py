@@ -13,6 +13,7 @@ which keeps volumes as they are, so that densities carry over without a Jacobian
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,21 +45,28 @@ class Straightening:
     def straight(self, x: Floats) -> Floats:
         """Straight coordinates of `x`."""
         v = (x - self.mean) @ self.whiten
-        y = v - self.constant - v @ self.linear.T
-        for k, matrix in enumerate(self.quadratic):
-            below = v[:, :k]
-            y[:, k] -= np.sum((below @ matrix[:k, :k]) * below, axis=1)
+        y = v - self.constant
+        for k in self._curved:
+            y[:, k] -= self._follows(k, v)
         return y
 
     def bent(self, y: Floats) -> Floats:
         """The points whose straight coordinates are `y`."""
         v = y + self.constant
         with np.errstate(over="ignore", invalid="ignore"):  # far out there is nothing to find
-            for k, matrix in enumerate(self.quadratic):
-                below = v[:, :k]
-                v[:, k] += below @ self.linear[k, :k]
-                v[:, k] += np.sum((below @ matrix[:k, :k]) * below, axis=1)
+            for k in self._curved:
+                v[:, k] += self._follows(k, v)
             return v @ self.colour + self.mean
+
+    @cached_property
+    def _curved(self) -> tuple[int, ...]:
+        """Which components follow others: few, where a posterior is next to normal."""
+        return tuple(np.flatnonzero(self.linear.any(axis=1) | self.quadratic.any(axis=(1, 2))))
+
+    def _follows(self, k: int, v: Floats) -> Floats:
+        """q_k without its constant, shape (B,)."""
+        below = v[:, :k]
+        return np.einsum("bi,bi->b", below @ self.quadratic[k, :k, :k] + self.linear[k, :k], below)
 
 
 def nothing_to_straighten(size: int) -> Straightening:
