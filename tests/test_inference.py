@@ -9,7 +9,8 @@ import bayeshaptic as bh
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.choose import choose_model
 from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform, draw
-from bayeshaptic.numerics.mixture import fit_student_mixture, student
+from bayeshaptic.numerics.mixture import student
+from bayeshaptic.numerics.mixture_fit import fit_student_mixture
 from bayeshaptic.rig import Bench, simulate
 
 

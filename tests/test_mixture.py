@@ -9,7 +9,8 @@ from scipy.stats import kstest, multivariate_t
 from scipy.stats import t as student_t
 
 from bayeshaptic.inference.sampling.ensembles import warmed_up
-from bayeshaptic.numerics.mixture import StudentMixture, fit_student_mixture, student
+from bayeshaptic.numerics.mixture import StudentMixture, student
+from bayeshaptic.numerics.mixture_fit import fit_student_mixture
 from bayeshaptic.numerics.straightening import nothing_to_straighten, straighten
 from bayeshaptic.numerics.weights import effective, normalised, tempered
 
@@ -30,6 +31,21 @@ def test_density_of_one_component_is_the_textbooks(freedom):
     x = mean + 3 * rng.standard_normal((40, 3))
     truth = multivariate_t(mean, scale, df=freedom).logpdf(x)
     assert student(mean, scale, freedom).log_density(x) == pytest.approx(truth, abs=1e-9)
+
+
+def test_components_have_degrees_of_freedom_of_their_own():
+    """What covers the tails leaves the rest as it is."""
+    normal = student(np.zeros(1), np.eye(1), 200.0)
+    both = normal.with_component(student(np.array([9.0]), np.eye(1), 3.0), 0.25)
+    x = both.sample(np.random.default_rng(21), 20_000)[:, 0]
+
+    def below(value):
+        return 0.75 * student_t(200.0).cdf(value) + 0.25 * student_t(3.0).cdf(value - 9.0)
+
+    assert kstest(below(x), "uniform").pvalue > 1e-3
+    at = np.linspace(-5, 20, 11)
+    truth = 0.75 * student_t(200.0).pdf(at) + 0.25 * student_t(3.0).pdf(at - 9.0)
+    assert np.exp(both.log_density(at[:, None])) == pytest.approx(truth, rel=1e-9)
 
 
 def test_density_integrates_to_one():
@@ -178,6 +194,11 @@ def test_far_points_do_not_warn():
     straightening = straighten(banana(np.random.default_rng(14), 3000))
     far = straightening.bent(np.full((1, 5), 1e200))
     assert not np.isfinite(far).all()
+
+
+def test_accidents_of_few_draws_bend_nothing():
+    straightening = straighten(np.random.default_rng(22).standard_normal((1000, 11)))
+    assert not straightening.quadratic.any()
 
 
 def test_nothing_to_straighten():

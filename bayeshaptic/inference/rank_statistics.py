@@ -7,6 +7,8 @@ which the tests compare them with; its import alone would take a tenth of the ti
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.special import ndtri
 
@@ -60,10 +62,21 @@ def _halves(chains: Floats) -> Floats:
 
 def _normal_scores(values: Floats) -> Floats:
     """Normal quantiles of the ranks (Blom's), ties sharing their average rank."""
-    kinds, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    rank = np.cumsum(count) - 0.5 * (count - 1)
-    score = ndtri((rank - 0.375) / (values.size + 0.25))
-    return score[place].reshape(values.shape)
+    flat = values.ravel()
+    order = np.argsort(flat)
+    ordered = flat[order]
+    begins = np.append(True, ordered[1:] != ordered[:-1])
+    first = np.flatnonzero(begins)
+    twice = first + np.append(first[1:], len(flat)) + 1  # the average rank, from one on
+    scores = np.empty(len(flat))
+    scores[order] = _scores_of(len(flat))[twice][np.cumsum(begins) - 1]
+    return scores.reshape(values.shape)
+
+
+@lru_cache(maxsize=4)
+def _scores_of(count: int) -> Floats:
+    """Scores of twice the ranks 0 to `count`, which a column shares with the next."""
+    return np.asarray(ndtri((0.5 * np.arange(2 * count + 1) - 0.375) / (count + 0.25)))
 
 
 def _rhat(chains: Floats) -> float:
@@ -79,7 +92,7 @@ def _size(chains: Floats) -> float:
     count, draws = chains.shape
     if np.ptp(chains) < np.finfo(float).resolution:
         return float(chains.size)
-    covariance = _autocovariance(chains).mean(axis=0)
+    covariance = _autocovariance(chains)
     within = covariance[0] * draws / (draws - 1.0)
     total = covariance[0] + (chains.mean(axis=1).var(ddof=1) if count > 1 else 0.0)
     correlation = 1.0 - (within - covariance) / total
@@ -94,10 +107,11 @@ def _size(chains: Floats) -> float:
 
 
 def _autocovariance(chains: Floats) -> Floats:
-    """Of every chain at every lag, shape (chain, draw)."""
+    """At every lag, the mean of all chains, shape (draw,)."""
     from scipy.fft import irfft, next_fast_len, rfft
 
     draws = chains.shape[1]
     length = next_fast_len(2 * draws)
     spectrum = rfft(chains - chains.mean(axis=1, keepdims=True), length, axis=1)
-    return irfft(np.abs(spectrum) ** 2, length, axis=1)[:, :draws] / draws
+    power = np.einsum("cf,cf->f", spectrum.view(float), spectrum.view(float))
+    return irfft(power[::2] + power[1::2], length)[:draws] / chains.size

@@ -13,10 +13,11 @@ which keeps volumes as they are, so that densities carry over without a Jacobian
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -44,21 +45,28 @@ class Straightening:
     def straight(self, x: Floats) -> Floats:
         """Straight coordinates of `x`."""
         v = (x - self.mean) @ self.whiten
-        y = v - self.constant - v @ self.linear.T
-        for k, matrix in enumerate(self.quadratic):
-            below = v[:, :k]
-            y[:, k] -= np.sum((below @ matrix[:k, :k]) * below, axis=1)
+        y = v - self.constant
+        for k in self._curved:
+            y[:, k] -= self._follows(k, v)
         return y
 
     def bent(self, y: Floats) -> Floats:
         """The points whose straight coordinates are `y`."""
         v = y + self.constant
         with np.errstate(over="ignore", invalid="ignore"):  # far out there is nothing to find
-            for k, matrix in enumerate(self.quadratic):
-                below = v[:, :k]
-                v[:, k] += below @ self.linear[k, :k]
-                v[:, k] += np.sum((below @ matrix[:k, :k]) * below, axis=1)
+            for k in self._curved:
+                v[:, k] += self._follows(k, v)
             return v @ self.colour + self.mean
+
+    @cached_property
+    def _curved(self) -> tuple[int, ...]:
+        """Which components follow others: few, where a posterior is next to normal."""
+        return tuple(np.flatnonzero(self.linear.any(axis=1) | self.quadratic.any(axis=(1, 2))))
+
+    def _follows(self, k: int, v: Floats) -> Floats:
+        """q_k without its constant, shape (B,)."""
+        below = v[:, :k]
+        return np.einsum("bi,bi->b", below @ self.quadratic[k, :k, :k] + self.linear[k, :k], below)
 
 
 def nothing_to_straighten(size: int) -> Straightening:
@@ -82,20 +90,37 @@ def straighten(x: Floats) -> Straightening:
     size = x.shape[1]
     constant, linear = np.zeros(size), np.zeros((size, size))
     quadratic = np.zeros((size, size, size))
+    first, second = np.triu_indices(size - 1)
+    products = v[:, first] * v[:, second]
+    strength = _strength(products, v)
     ridge = 1e-3
     for k in range(1, size):
+        chosen = _chosen(np.where(second < k, strength[:, k], 0.0), len(x))
+        if not len(chosen):
+            continue
         # Principal components are uncorrelated, but not with each other's squares where skewed.
-        first, second = np.triu_indices(_how_many(k, len(x)))
-        terms = np.column_stack([np.ones(len(v)), v[:, :k], v[:, first] * v[:, second]])
+        terms = np.column_stack([np.ones(len(v)), v[:, :k], products[:, chosen]])
         normal = terms.T @ terms + ridge * len(v) * np.eye(terms.shape[1])
         found = np.linalg.solve(normal, terms.T @ v[:, k])
         constant[k], linear[k, :k] = found[0], found[1 : k + 1]
-        quadratic[k, first, second] = found[k + 1 :]
+        quadratic[k, first[chosen], second[chosen]] = found[k + 1 :]
     return Straightening(mean, whiten, colour, constant, linear, quadratic)
 
 
-def _how_many(before: int, points: int) -> int:
-    """Of the components before this one, how many the points can decide products of."""
+def _strength(products: Floats, v: Floats) -> Floats:
+    """How far the slope of each component over each product is from zero, in standard errors."""
+    off = products - products.mean(axis=0)
+    size = np.sqrt(np.einsum("bq,bq->q", off, off))
+    return np.asarray(np.abs(off.T @ v) / np.maximum(size, 1e-300)[:, None])
+
+
+def _chosen(strength: Floats, points: int) -> Ints:
+    """Which products are seen, the clearest ones if the points cannot decide that many.
+
+    What is not seen would bend a straight ridge by the accidents of the draws: of eleven parameters
+    there are some two hundred products.
+    """
+    seen = 5.0  # standard errors of independent points; those of walkers go together
     points_a_term = 30  # fewer points than that cannot decide a coefficient
-    affordable = points / points_a_term
-    return min(before, int((np.sqrt(1 + 8 * affordable) - 1) / 2))
+    clearest = np.argsort(-strength, kind="stable")[: points // points_a_term]
+    return np.sort(clearest[strength[clearest] > seen])

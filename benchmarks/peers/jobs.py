@@ -117,7 +117,7 @@ LAWS: dict[str, tuple[str, str, str, dict[str, float], float]] = {
         0.3,
     ),
     "dahl": ("friction", "DahlFriction", "MOTOR", {"presliding_distance": 1e-5}, 0.3),
-    "drag": ("friction", "Drag", "MOTOR", {}, 10.0),
+    "drag": ("drag", "Drag", "MOTOR", {}, 10.0),
     "hardening": ("springs", "HardeningSpring", "MOTOR", {}, 1e9),
     "gap": ("springs", "Backlash", "CONNECTION", {"damping_in_gap": 0.9}, 1e-5),
 }
@@ -128,7 +128,8 @@ def internal_force(name: str) -> Callable[[], Any]:
     room, kind, at, shape, strength = LAWS[name]
     force = moved("effects.nonlinear.internal_force", "effects.internal_force")
     place = getattr(force, at)
-    known = moved(f"effects.nonlinear.{room}", f"effects.{room}")
+    older = {"drag": "friction"}.get(room, room)
+    known = moved(f"effects.nonlinear.{room}", f"effects.{older}")
     effect = getattr(known, kind)(place, shape) if shape else getattr(known, kind)(place)
     model, made = bh.free(device="lhifam"), recording(30.0)
     system = model.system(model.values)

@@ -88,9 +88,16 @@ def target(device: str, held: bool, with_file: bool) -> Target:
 
 
 def ours(known: Target) -> np.ndarray:
-    """Natural values, shape (chains, draws, P): an ensemble is a chain."""
-    made = bh.sample(known.fit.model, known.etfe, start=known.fit)
-    return made.chains.reshape(len(made.chains), -1, known.fit.model.size)
+    """Natural values, shape (chains, draws, P)."""
+    return by_walker(bh.sample(known.fit.model, known.etfe, start=known.fit).chains)
+
+
+def by_walker(chains: np.ndarray) -> np.ndarray:
+    """Chains (ensembles, steps, walkers, P), a walker as a chain: (ensembles * walkers, steps, P).
+
+    Walkers one after the other in one chain would look like as many effective draws as draws.
+    """
+    return np.swapaxes(chains, 1, 2).reshape(-1, chains.shape[1], chains.shape[3])
 
 
 def by_emcee(known: Target, move: str) -> np.ndarray:
@@ -242,8 +249,7 @@ def by_older(path: str, known: Target) -> tuple[np.ndarray, float]:
         ]
         subprocess.run(words, env=os.environ | {"PYTHONPATH": path}, cwd=place, check=True)
         found = np.load(out)
-        theta = found["theta"]
-        return theta.reshape(len(theta), -1, theta.shape[-1]), float(found["seconds"])
+        return by_walker(found["theta"]), float(found["seconds"])
 
 
 SAMPLERS: dict[str, tuple[str, Callable[[Target], np.ndarray]]] = {

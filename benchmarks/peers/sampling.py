@@ -8,7 +8,8 @@ They begin at the fit and get coordinates in which the posterior's covariance th
 For NUTS a gradient costs one call of the compiled density with twice as many vectors as there are
 parameters, which is less than automatic differentiation of it would take.  Compilation of the
 density is left out, JAX's of a sampler (some 5 s) is not; tuning counts for everybody.  Effective
-draws are ArviZ's.  Limits whose medians differ by more than four Monte-Carlo errors are marked.
+draws are ArviZ's, of walkers each walker a chain.  Limits whose medians differ by more than four
+Monte-Carlo errors are marked.
 --old adds the sampler of an older version of this package, on the posterior that it has of the same
 recording (its priors and its noise are its own).
 """
@@ -82,8 +83,17 @@ def counted(known: Target, theta: np.ndarray, seconds: float) -> Counted:
         min(effective[:-1]),
         float(np.median(limit)),
         float(1.25 * np.std(limit) / np.sqrt(effective[-1])),
-        max(float(az.rhat(one)) for one in everything),
+        max(float(az.rhat(_joined(one))) for one in everything),
     )
+
+
+def _joined(chains: np.ndarray) -> np.ndarray:
+    """Chains, shape (n, draws); the walkers of an ensemble as one, in the order of time."""
+    walkers = 64
+    if len(chains) <= walkers:
+        return chains
+    by_time = np.swapaxes(chains.reshape(-1, walkers, chains.shape[1]), 1, 2)
+    return by_time.reshape(len(by_time), -1)
 
 
 def main() -> None:

@@ -128,6 +128,6 @@ def _gap_of(half: float, unit: str) -> Shape:
 def _gap(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
     """What the linear connection takes inside the gap, given back."""
     half, stiffness, damping = constants[0], constants[1], constants[2]
-    if abs(x) < half:
-        return stiffness * x + damping * v
-    return stiffness * min(max(x, -half), half)
+    taken = min(max(x, -half), half)
+    # Without a branch: which side a step is on is not to be foreseen.
+    return stiffness * taken + (damping * v if taken == x else 0.0)

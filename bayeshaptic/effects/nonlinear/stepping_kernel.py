@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from bayeshaptic.compiled import kernel
 from bayeshaptic.types import Floats
 
+_LANES = 4  # states at a time
+
 
 @kernel(inline=True)
 def rubbing(start: float, last: float, gain: float, bound: float) -> float:
@@ -34,6 +36,53 @@ def rubbing(start: float, last: float, gain: float, bound: float) -> float:
         rest = 1.0 - start / (start - last + full)
         force = (rest * (last - start + full) - last) / gain
     return force if way >= 0.0 else -force
+
+
+@kernel(inline=True)
+def _tables(matrix: Floats, rows: Floats, drive: Floats) -> tuple[Floats, Floats]:
+    """A step of the states together with what is seen of them, which is known a step ahead then.
+
+    So the next forces wait for one product with these, and not for sums over the states.
+
+    Returns
+    -------
+    table : ndarray, shape (S', W)
+        What the states become, and `rows` of that, for each state before; S' and W filled up with
+        zeros to fours.
+    push : ndarray, shape (F, W)
+        What a unit of each force adds.
+    """
+    count, _, states = rows.shape
+    width = states + 3 * count
+    becomes = np.zeros((width + -width % _LANES, states))
+    becomes[:states] = np.eye(states)
+    for f in range(count):
+        becomes[states + 3 * f : states + 3 * f + 3] = rows[f]
+    table = np.zeros((states + -states % _LANES, len(becomes)))
+    push = np.zeros((count, len(becomes)))
+    for j in range(width):
+        for i in range(states):
+            for f in range(count):
+                push[f, j] += becomes[j, i] * drive[f, i]
+            for between in range(states):
+                table[i, j] += becomes[j, between] * matrix[between, i]
+    return table, push
+
+
+@kernel(inline=True)
+def _advance(table: Floats, push: Floats, force: float, w: Floats, spare: Floats) -> None:
+    """One step of the states of one force and of what is seen of them, `w`."""
+    for group in range(0, len(table), _LANES):
+        a, b, c, d = w[group], w[group + 1], w[group + 2], w[group + 3]
+        to_a, to_b, to_c, to_d = table[group], table[group + 1], table[group + 2], table[group + 3]
+        if group == 0:
+            for j in range(len(w)):
+                spare[j] = (to_a[j] * a + to_b[j] * b) + (to_c[j] * c + to_d[j] * d)
+        else:
+            for j in range(len(w)):
+                spare[j] += (to_a[j] * a + to_b[j] * b) + (to_c[j] * c + to_d[j] * d)
+    for j in range(len(w)):
+        w[j] = spare[j] + push[j] * force
 
 
 @kernel
@@ -87,36 +136,30 @@ def step_through(
     count, states = len(laws), len(matrix)
     steps = motion.shape[2]
     motor = np.empty((count, steps // substeps))
-    z, ahead = np.zeros((count, states)), np.empty((count, states))
+    table, push = _tables(matrix, rows, drive)
+    w, spare = np.zeros(push.shape), np.empty(push.shape[1])
     force = np.zeros(count)
     for sample in range(motor.shape[1]):
         for f in range(count):
             read = 0.0
             for i in range(states):
-                read += reading[i] * z[f, i]
+                read += reading[i] * w[f, i]
             motor[f, sample] = read
         for k in range(sample * substeps, (sample + 1) * substeps):
-            for f in range(count):
-                for j in range(states):
-                    total = 0.0
-                    for i in range(states):
-                        total += matrix[j, i] * z[f, i]
-                    ahead[f, j] = total
             after = min(k + 1, steps - 1)
             for f in range(count):
-                x, v, last = 0.0, 0.0, 0.0  # in registers: the law waits for them
+                x = 0.5 * (motion[f, 0, k] + motion[f, 0, after])
+                v = 0.5 * (motion[f, 1, k] + motion[f, 1, after])
+                last = motion[f, 1, after]
+                seen = states + 3 * f
                 for g in range(count):
-                    for i in range(states):
-                        x += rows[f, 0, i] * z[g, i]
-                        v += rows[f, 1, i] * z[g, i]
-                        last += rows[f, 2, i] * z[g, i]
+                    x += w[g, seen]
+                    v += w[g, seen + 1]
+                    last += w[g, seen + 2]
                 for g in range(f):
                     x += gains[f, g, 0] * force[g]
                     v += gains[f, g, 1] * force[g]
                     last += gains[f, g, 2] * force[g]
-                x += 0.5 * (motion[f, 0, k] + motion[f, 0, after])
-                v += 0.5 * (motion[f, 1, k] + motion[f, 1, after])
-                last += motion[f, 1, after]
                 gain, before = gains[f, f, 2], force[f]
                 if f == 0:  # a view costs a tenth of the step
                     force[f] = laws[f](x, v, last, gain, before, step_s, constants)
@@ -126,6 +169,5 @@ def step_through(
                 if sticks[f]:
                     force[f] = rubbing(2 * v - last, last, gain, force[f])
             for f in range(count):
-                for i in range(states):
-                    z[f, i] = ahead[f, i] + drive[f, i] * force[f]
+                _advance(table, push[f], force[f], w[f], spare)
     return motor

@@ -103,7 +103,6 @@ class Run:
         proposal = self.ensembles.proposal
         numbers = {
             "share": self.ensembles.share,
-            "freedom": proposal.mixture.freedom,
             **{name: getattr(self, name) for name in ("more", "every", "refits")},
             "rng": self.rng.bit_generator.state,
         }
@@ -112,7 +111,7 @@ class Run:
         straight = {f.name: getattr(proposal.straightening, f.name) for f in fields(Straightening)}
         return {
             **straight,
-            **{name: getattr(proposal.mixture, name) for name in ("weights", "means", "roots")},
+            **{f.name: getattr(proposal.mixture, f.name) for f in fields(StudentMixture)},
             "archive": proposal.archive,
             "positions": self.ensembles.positions,
             "chains": self.chains,
@@ -126,9 +125,7 @@ class Run:
     ) -> Run:
         """What `to_arrays` kept, of the same `density` and `redraw`."""
         numbers = json.loads(str(arrays["numbers"]))
-        mixture = StudentMixture(
-            arrays["weights"], arrays["means"], arrays["roots"], numbers["freedom"]
-        )
+        mixture = StudentMixture(**{f.name: arrays[f.name] for f in fields(StudentMixture)})
         straightening = Straightening(**{f.name: arrays[f.name] for f in fields(Straightening)})
         kind, words, *others = numbers["state"]
         rng = np.random.default_rng()
