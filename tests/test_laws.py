@@ -91,7 +91,7 @@ def test_it_is_simulated() -> None:
     law = effect_class("rounded_friction")().law(0.5, model, model.values)
     found = forced_motion(mechanism, [Internal(MOTOR, law, v, v)], PERIOD_S / 8, 8)
     plain = step_through(
-        *steps(mechanism, [MOTOR], PERIOD_S / 8),
+        *steps(mechanism, [Internal(MOTOR, law, v, v)], PERIOD_S / 8),
         np.array([[v, v]]),
         PERIOD_S / 8,
         8,

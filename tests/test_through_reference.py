@@ -182,8 +182,8 @@ def test_one_mass_that_rubs_is_followed_in_time_although_its_reference_was_writt
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"model": "free"}, "Set aside: the base model free"),
-        ({"modes": 1}, "Set aside: the base model free"),
+        ({"model": "free", "band_hz": (1.0, 300.0)}, "Set aside: the base model free"),
+        ({"modes": 1, "band_hz": (1.0, 300.0)}, "Set aside: the base model free"),
         ({"model": "rigid"}, "The reference is not used: one mass is followed in time"),
         ({}, "The reference is not used: "),
     ],

@@ -13,7 +13,7 @@ import numpy as np
 from bayeshaptic.diagnosis.acceptance import verdict_of
 from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish, without_sampling
 from bayeshaptic.diagnosis.analysis import Analysis
-from bayeshaptic.diagnosis.base.any_loop import in_any_loop, left_in_any_loop
+from bayeshaptic.diagnosis.base.any_loop import beyond_reach, in_any_loop, left_in_any_loop
 from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
@@ -148,6 +148,8 @@ def _whatever_loop(found: Opened, model: str | Model, options: Options) -> Close
     traced = Traced(*verdict_of((), tests), state, tests, tests)
     if traced.verdict == UNEXPLAINED:
         return replace(found, notices=(*found.notices, left_in_any_loop(tests)))
+    if (beyond := beyond_reach(begun.fit)) is not None:
+        return replace(found, notices=(*found.notices, beyond))
     if begun.fit.model.name == "rigid":
         return found
     nothing = EtfeCriticalStiffness(

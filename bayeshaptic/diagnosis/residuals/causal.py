@@ -97,7 +97,12 @@ def _filtered(fit: Fit) -> Complexes:
     at = np.geomspace(nodes.min(), nodes.max() / 2, _FILTERS)
     s = 1j * nodes[..., None] / at
     second = 1 / (1 + 2 * _DAMPED * s + s**2)
-    return response[..., None] * np.concatenate([1 / (1 + s), second, s * second], axis=-1)
+    period_s = fit.model.period_s
+    assert period_s is not None
+    # A sample later, or, with the other sign, earlier: a delay that was given may be another.
+    later = np.exp(-2j * np.pi * nodes[..., None] * period_s)
+    filters = np.concatenate([1 / (1 + s), second, s * second, later], axis=-1)
+    return response[..., None] * filters
 
 
 def _linear_test(found: Scores) -> Test:

@@ -255,6 +255,8 @@ class MassInLoop:
         for _ in range(steps):
             trial = best.copy()
             for piece, own, slopes in self._begins(best, uneven):
+                if not np.isfinite(slopes).all():  # a motion that runs away begins nowhere
+                    return best
                 trial[own] += np.linalg.lstsq(slopes, error[piece], rcond=None)[0]
             left = self.error(trial, uneven)
             if not left @ left < (1 - 1e-3) * (error @ error):

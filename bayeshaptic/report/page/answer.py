@@ -29,6 +29,11 @@ FARED_IN_LOOP = (
     "fared: of 9 simulated devices that nobody held, 7 of the 90 % intervals held the true limit, "
     "and 2 missed it by less than 0.01 dB."
 )
+FARED_DIRECT = (
+    "Recorded in closed loop, of which nothing else was told. How such intervals fared: of 20 "
+    "simulated loops that were read so, 17 of the 90 % intervals held the true limit, and no "
+    "stiffness lay above it."
+)
 
 
 def facts(result: Result) -> Rows:
@@ -61,6 +66,8 @@ def fared(result: Result) -> str:
         return ""
     if result.analysis.etfe.through_reference:
         return FARED_IN_LOOP
+    if result.analysis.etfe.direct:
+        return FARED_DIRECT
     held, count, which = FARED[closed.verdict]
     if closed.verdict == "consistent" and result.analysis.hidden is not None:
         held, count = FARED_HIDDEN

@@ -98,6 +98,8 @@ def estimate_direct(recording: Recording) -> tuple[DirectSpectra, Points]:
     count = increment_unit(recording.position) or 0.0
     spectra = DirectSpectra(**same, rounding=count**2 / 12)
     ours = replace(spectra, reference=_local_reference(spectra)[0])
+    # Where a hand's own motion falls steeply within a window, lines that weigh alike do not add up.
+    ours = replace(ours, noise_slope=noise_slopes(ours))
     return ours, points(ours.windows())
 
 

@@ -1,0 +1,76 @@
+"""Closed loops of which nothing else is known: the direct method, on loops of the bench."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.residuals.causal import scores
+from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.rig import Bench, run_loop
+
+
+def loop(seed, held=False, friction=0.0, seconds=8.0):
+    """A bench in a loop of a P controller that follows noise, and what it recorded."""
+    bench = Bench.from_device("phantom", held, "grasped" if held else "free")
+    truth = bench.true_critical_stiffness()
+    if friction:
+        bench = bench.with_effect("coulomb_friction", force=friction * bench.force_rms)
+    stiffness = 0.3 * truth
+    samples = round(seconds / bench.period_s)
+    noise = np.random.default_rng(seed).normal(size=samples)
+    pole = np.exp(-2 * np.pi * 30.0 * bench.period_s)
+    smooth = lfilter([1 - pole], [1, -pole], lfilter([1 - pole], [1, -pole], noise))
+    wanted = smooth / smooth.std() * bench.force_rms / stiffness
+    made = run_loop(bench, lambda k, y: stiffness * (wanted[k] - y), seconds, seed)
+    recording = recording_from_arrays(
+        made.force, made.position, bench.period_s, force_unit="Nm", position_unit="rad"
+    )
+    return bench, truth, recording
+
+
+def test_every_line_counts_alike():
+    _, _, recording = loop(1)
+    spectra = estimate_in_any_loop(recording).spectra
+    windows = spectra.windows()
+    width = np.diff(spectra.edges)
+    assert width.sum() == (recording.samples - 1) // 2
+    assert np.allclose((windows.lines - 1) / width, (windows.lines[0] - 1) / width[0])
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_the_limit_of_a_loop_whose_reference_nobody_knows(held):
+    # 90 % intervals: of three that each hold with 0.9, fewer than two do once in 36.
+    inside = 0
+    for seed in (3, 4, 5):
+        bench, truth, recording = loop(seed, held)
+        closed = close_loop(recording, hidden=False, held=held, delay_s=bench.delay_s)
+        assert closed.analysis.etfe.direct
+        assert closed.verdict == "consistent"
+        low, high = (float(closed.analysis.limit.quantile(p)) for p in (0.05, 0.95))
+        inside += low <= truth <= high
+    assert inside >= 2
+
+
+def test_the_score_of_a_causal_change_is_zero_where_the_response_is_biased():
+    bench, _, recording = loop(6, held=True, seconds=20.0)
+    closed = close_loop(recording, "grasped", hidden=False, delay_s=bench.delay_s)
+    fit = closed.analysis.fit
+    nodes = fit.windows.frequency_hz
+    delayed = fit.response(nodes.ravel()).reshape(nodes.shape) * np.exp(-2j * np.pi * nodes * 1e-3)
+    found = scores(fit, fit.windows, delayed[..., None])
+    assert abs(found.score[0]) < 4 * np.sqrt(found.covariance[0, 0])
+
+
+def test_friction_in_a_loop_is_seen():
+    bench, _, recording = loop(7, friction=0.15)
+    closed = close_loop(recording, hidden=False, held=False, delay_s=bench.delay_s)
+    assert not closed.analysis.etfe.direct
+    assert any(notice.topic == "direct" for notice in closed.analysis.notices)
+
+
+def test_a_device_that_is_declared_to_be_one_mass_is_followed_in_time():
+    bench, _, recording = loop(8)
+    closed = close_loop(recording, "rigid", hidden=False, delay_s=bench.delay_s)
+    assert not closed.analysis.etfe.direct
