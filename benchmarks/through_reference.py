@@ -1,11 +1,12 @@
 """Devices of two masses and hands in closed loop: how often the intervals hold what the bench was.
 
-    python -m benchmarks.through_reference [COUNT] [FILE]
+    python -m benchmarks.through_reference [COUNT] [FILE] [--without-reference]
 
 LHIfAM- and PHANToM-like devices, free and held, under five controllers that follow steps, ramps or
 noise, 2 to 30 s, every other one with dry friction.  References of noise are written down beside
 the force; where they step or ramp, the controller is read off the recording.  Each recording takes
-the whole way to a recommendation.  FILE keeps what is done, a line a recording: a run that was
+the whole way to a recommendation.  Without their references, those that follow noise alone: the
+direct method.  FILE keeps what is done, a line a recording: a run that was
 stopped goes on from there.
 """
 
@@ -92,9 +93,11 @@ def bound_db(case: Case, model: Model) -> float:
     return float(np.sqrt(gradient @ np.linalg.pinv(information, rcond=1e-14) @ gradient))
 
 
-def one(seed: int) -> dict[str, Any]:
-    """What became of one recording."""
+def one(seed: int, without: bool = False) -> dict[str, Any]:
+    """What became of one recording, without its reference or with it."""
     case = make(seed)
+    if without:
+        case = replace(case, recording=replace(case.recording, reference=None))
     found: dict[str, Any] = {"seed": seed, "what": case.what, "friction": case.friction}
     began = time.process_time()
     try:
@@ -108,7 +111,8 @@ def one(seed: int) -> dict[str, Any]:
     found |= {
         "outcome": "refused" if told.status == "untrusted" else "recommended",
         "why": told.sentence,
-        "through": analysis.etfe.through_reference,
+        "through": analysis.etfe.through_reference or analysis.etfe.direct,
+        "stiffness": told.stiffness and told.stiffness / truth,
         "model": analysis.model.name,
         "verdict": closed.verdict,
         "flags": [test.name for test in closed.traced.after if test.flagged],
@@ -138,7 +142,7 @@ def summary(found: list[dict[str, Any]]) -> None:
         through = [one for one in told if one["through"]]
         print(
             f"{label}: {len(some)} recordings, {len(told)} recommended, {len(through)} of them "
-            "through the reference"
+            "through the reference, or by the direct method"
         )
         if not through:
             continue
@@ -161,14 +165,15 @@ def summary(found: list[dict[str, Any]]) -> None:
         )
 
 
-def main(count: int, path: Path) -> None:
+def main(count: int, path: Path, without: bool) -> None:
     """Run what is not in the file yet, and print what all say."""
     kept = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     done = {one["seed"] for one in kept}
     for seed in range(count):
-        if seed in done:
+        follows_noise = REFERENCES[seed // 5 % 3] == "noise"
+        if seed in done or (without and not follows_noise):
             continue
-        kept.append(one(seed))
+        kept.append(one(seed, without))
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(kept[-1]) + "\n")
         print(seed, kept[-1]["what"], kept[-1]["outcome"], kept[-1].get("limit_db"), flush=True)
@@ -179,5 +184,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=200)
     parser.add_argument("file", nargs="?", type=Path, default=Path("through-reference.jsonl"))
+    parser.add_argument("--without-reference", action="store_true", help="as if nobody knew it")
     asked = parser.parse_args()
-    main(asked.count, asked.file)
+    main(asked.count, asked.file, asked.without_reference)
