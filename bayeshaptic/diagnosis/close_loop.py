@@ -131,10 +131,10 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
 
 
 def _whatever_loop(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
-    """By the direct method; where something is left, what was opened, told so.
+    """By the direct method; or what was opened, and told what stands against that.
 
-    Where that is open, one mass is no model of it: the motion in time knows more of such a device,
-    dry friction above all.
+    One mass is followed in time instead, with its friction, and so is whatever leaves more than
+    noise.
     """
     lines = in_any_loop(found, options)
     if lines is None:

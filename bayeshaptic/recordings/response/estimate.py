@@ -18,6 +18,7 @@ from bayeshaptic.recordings.response.estimators.random_excitation import (
     estimate_random,
 )
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.spectra import JoinedSpectra, PeriodicSpectra, RandomSpectra
 from bayeshaptic.recordings.signals.excitation import FEWEST_LINES
 from bayeshaptic.recordings.signals.lone import without_lone
@@ -74,20 +75,8 @@ def estimate_etfe(
     if found is not None:
         notices += _of_lone(recording, mended)
         recording = mended
-    return Etfe(
-        frequency_hz=points.frequency_hz,
-        value=points.value,
-        variance=points.variance,
-        coherence=points.coherence,
-        period_s=recording.period_s,
-        band_hz=(float(spectra.frequency_hz[0]), float(spectra.frequency_hz[-1])),
-        force_unit=recording.force_unit,
-        position_unit=recording.position_unit,
-        spectra=spectra,
-        recording=recording,
-        period_lines=spectra.lines if found is not None else None,
-        notices=notices,
-    )
+    period_lines = spectra.lines if found is not None else None
+    return replace(_shown(recording, spectra, points, notices), period_lines=period_lines)
 
 
 def estimate_in_any_loop(recording: Recording) -> Etfe:
@@ -110,6 +99,15 @@ def estimate_in_any_loop(recording: Recording) -> Etfe:
         f"All {spectra.lines} lines count, to the Nyquist frequency: in closed loop none may be "
         "left out."
     )
+    return _shown(recording, spectra, points, (Notice("note", "band", text),))
+
+
+def _shown(
+    recording: Recording,
+    spectra: PeriodicSpectra | RandomSpectra,
+    points: Points,
+    notices: tuple[Notice, ...],
+) -> Etfe:
     return Etfe(
         frequency_hz=points.frequency_hz,
         value=points.value,
@@ -121,7 +119,7 @@ def estimate_in_any_loop(recording: Recording) -> Etfe:
         position_unit=recording.position_unit,
         spectra=spectra,
         recording=recording,
-        notices=(Notice("note", "band", text),),
+        notices=notices,
     )
 
 
