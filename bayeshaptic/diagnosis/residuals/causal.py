@@ -21,6 +21,7 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
+# Clean loops that they flag, and what rubs: docs/closed-loop.md.
 _FILTERS = 12  # of first and of second order, evenly over log frequency
 _DAMPED = 0.2  # damping ratio of those of second order
 _LEAST = 1e-8  # share of a change that is none of the parameters', from which on it is one
