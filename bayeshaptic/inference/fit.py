@@ -83,6 +83,21 @@ class Fit(Shown):
         return not self.reduced_chi_square <= max(MISFIT, self.by_chance)
 
     @property
+    def impossible(self) -> tuple[str, ...]:
+        """Masses, and the loop's delay, that end at a bound: no device is like that.
+
+        A delay of zero is that of a position which was written down before its command acted; a
+        damper may well be zero.  Of 240 fits to 120 open loops of the door nine end so, all of
+        a position a sample early, with limits 1.7 to 179 times the truth (docs/door.md).
+        """
+        return tuple(
+            name
+            for name, how in self.outcome.items()
+            if how == AT_BOUND
+            and (name == "delay_s" or self.model.parameter(name).dimension == "mass")
+        )
+
+    @property
     def sd(self) -> Floats:
         """Standard deviations, shape (P,); nan for parameters at a bound."""
         return np.sqrt(np.diag(self.covariance))

@@ -118,6 +118,12 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
         found += _in_closed_loop(analysis, verdict)
     if analysis.etfe.direct and _is_wide(analysis):
         found.append(_WIDE)
+    if analysis.sampled and analysis.fit.impossible:
+        found.append(
+            f"the best fit ends at a bound ({', '.join(analysis.fit.impossible)}), where no device "
+            "is: force and position may not be of the same sample, so that less delay is seen than "
+            "the loop has (a position written down a sample early)"
+        )
     recording = analysis.recording
     if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
         found.append(

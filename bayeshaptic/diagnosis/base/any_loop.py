@@ -9,7 +9,7 @@ from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.inference.fit import AT_BOUND, Fit
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
@@ -51,19 +51,15 @@ def in_any_loop(found: Opened, options: Options) -> Opened | None:
 def beyond_reach(fit: Fit) -> Notice | None:
     """That a fit ends where no device is; None where it does not.
 
-    A damper may be zero.  A delay of zero is that of a position which was written down too early,
-    and a mass at the end of its prior is none.
-
     Parameters
     ----------
     fit : Fit
     """
-    named = [n for n, how in fit.outcome.items() if how == AT_BOUND and not n.startswith("b")]
-    if not named:
+    if not fit.impossible:
         return None
     text = (
         "Of the base models, fitted so that feedback does not bias them, the best ends at a bound "
-        f"({', '.join(named)}): force and position may not be of the same sample."
+        f"({', '.join(fit.impossible)}): force and position may not be of the same sample."
     )
     return Notice("warning", "direct", text)
 
