@@ -87,8 +87,8 @@ class Fit(Shown):
         """Masses, and the loop's delay, that end at a bound: no device is like that.
 
         A delay of zero is that of a position which was written down before its command acted; a
-        damper may well be zero.  Of 240 fits to 120 open loops of the door nine end so, all of
-        a position a sample early, with limits 1.7 to 179 times the truth (docs/door.md).
+        damper may well be zero.  Of 194 fits to open loops 12 end so, all of a position a sample
+        early, with limits 1.7 to 179 times the truth (docs/door.md).
         """
         return tuple(
             name
