@@ -44,7 +44,7 @@ def is_stable(stiffness: float) -> bool:
 
 
 def test_the_device_is_found_and_nothing_else() -> None:
-    result = bh.close_loop(recorded(NOISE))
+    result = bh.close_loop(recorded(NOISE), delay_s=0.0)  # as the recording is made
     assert result.verdict == "consistent" and not result.effects
     head = headline(result)
     assert head.status == "safe" and head.risk == 0.01

@@ -86,9 +86,10 @@ class Fit(Shown):
     def impossible(self) -> tuple[str, ...]:
         """Masses, and the loop's delay, that end at a bound: no device is like that.
 
-        A delay of zero is that of a position which was written down before its command acted; a
-        damper may well be zero.  Of 194 fits to open loops 12 end so, all of a position a sample
-        early, with limits 1.7 to 179 times the truth (docs/door.md).
+        A delay of zero is that of a position which was written down before its command acted (a
+        loop that has none is told so, and then it is no parameter); a damper may well be zero.
+        Of 194 fits to open loops 12 end so, all of a position a sample early, with limits 1.7 to
+        179 times the truth (docs/door.md).
         """
         return tuple(
             name

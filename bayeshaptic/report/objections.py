@@ -14,6 +14,7 @@ from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
     misfit_factor,
@@ -118,11 +119,13 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
         found += _in_closed_loop(analysis, verdict)
     if analysis.etfe.direct and _is_wide(analysis):
         found.append(_WIDE)
-    if analysis.sampled and analysis.fit.impossible:
+    sensed = any(notice.topic == NO_LOOP for notice in analysis.notices)
+    if analysis.sampled and analysis.fit.impossible and not sensed:
         found.append(
             f"the best fit ends at a bound ({', '.join(analysis.fit.impossible)}), where no device "
             "is: force and position may not be of the same sample, so that less delay is seen than "
-            "the loop has (a position written down a sample early)"
+            "the loop has (a position written down a sample early); say the loop's delay with "
+            "--delay-s, also where it is zero"
         )
     recording = analysis.recording
     if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
