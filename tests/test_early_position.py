@@ -21,7 +21,7 @@ def test_a_delay_that_ends_at_zero_gets_no_stiffness(early: int, status: str) ->
         position_unit="rad",
     )
     closed = close_loop(recording, "free", hidden=False)
-    assert closed.analysis.fit.impossible == (("delay_s",) if early else ())
+    assert ("delay_s" in closed.analysis.fit.impossible) == bool(early)
     told = headline(closed)
     assert told.status == status
     assert ("ends at a bound" in told.sentence) == bool(early)
