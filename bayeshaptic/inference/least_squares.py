@@ -35,7 +35,7 @@ _KEPT_STARTS, _STEPS_TO_A_VALLEY = 48, 40
 CREEPS = 1e-4
 # Sets of starting points: where a model misfits its valleys are many, and one set of a held LHIfAM
 # with a second mode ended in a worse one for one to two seeds in six.
-_SETS = 4
+SETS = 4
 # Relative steps of cost within a valley: from 0.01 to 0.04 there are as many of them in each of 12
 # simulated recordings, most often two or more beside the deepest.
 _ONE_VALLEY = 0.02
@@ -52,6 +52,7 @@ def least_squares(
     seed: int = 0,
     start: Floats | None = None,
     shorter: Fit | None = None,
+    most_sets: int = SETS,
 ) -> Fit:
     """Fit `model` to `etfe` by weighted least squares from several starts.
 
@@ -70,6 +71,8 @@ def least_squares(
         Begin here and nowhere else.
     shorter : Fit, optional
         For a chain: what its starting points grow from, where just that was fitted before.
+    most_sets : int
+        Sets of starting points for a model that misfits.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def least_squares(
     if start is not None:
         return _fit(model, etfe, start)
     fit = _fit(model, etfe, _starts(model, etfe, seed, shorter))
-    for another in range(1, _SETS):
+    for another in range(1, most_sets):
         if not fit.misfits or shorter_chain(model) is not None:
             break
         rng = np.random.default_rng([seed, another])

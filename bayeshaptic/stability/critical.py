@@ -14,9 +14,10 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.model import Model
 from bayeshaptic.quantities import estimate, percent, quantity, rounded_down
 from bayeshaptic.shown import Shown, data_frame
-from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
-from bayeshaptic.stability.crossings import find_crossings, rational
+from bayeshaptic.stability.binding import BindingCrossing, group_crossings
+from bayeshaptic.stability.crossings import rational
 from bayeshaptic.stability.draws import vectors_of
+from bayeshaptic.stability.each_draw import limits_of
 from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
 from bayeshaptic.stability.tail import LowQuantile, low_quantile, quantiles
@@ -253,34 +254,11 @@ def _limits(
     approximation: str,
     before: CriticalStiffness | None,
 ) -> CriticalStiffness:
-    assert model.period_s is not None
     by_chain = vectors.reshape(chains, -1, vectors.shape[1])
-    samples, frequency = np.empty((2, *by_chain.shape[:2]))
-    known = 0
+    known = None
     if before is not None and before.chains == chains:
-        known = min(len(before.samples) // chains, by_chain.shape[1])
-        samples[:, :known] = before.samples.reshape(chains, -1)[:, :known]
-        frequency[:, :known] = before.frequency_hz.reshape(chains, -1)[:, :known]
-    fresh = by_chain[:, known:].reshape(-1, vectors.shape[1])
-    parts = [np.empty((2, 0))]
-    chunk = 4096
-    for start in range(0, len(fresh), chunk):
-        system = model.system(fresh[start : start + chunk])
-        found = find_crossings(system, model.period_s, approximation)
-        parts.append(np.stack([found.critical, found.binding_hz]))
-    new = np.concatenate(parts, axis=1).reshape(2, chains, -1)
-    samples[:, known:], frequency[:, known:] = new
-    samples, frequency = samples.ravel(), frequency.ravel()
-    kinds = np.concatenate(
-        [
-            binding_kinds(
-                model.system(vectors[start : start + chunk]),
-                frequency[start : start + chunk],
-                model.period_s,
-            )
-            for start in range(0, len(vectors), chunk)
-        ]
-    )
+        known = np.stack([before.samples, before.frequency_hz]).reshape(2, chains, -1)
+    samples, frequency, kinds = limits_of(model, by_chain, approximation, known)
     crossings, group = group_crossings(kinds, frequency)
     return CriticalStiffness(samples, frequency, model.stiffness_unit, crossings, group, chains)
 

@@ -9,6 +9,7 @@ doubted for it, whose intervals all lay wholly above the truth.
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtri
 
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.fit import Fit
@@ -40,10 +41,8 @@ def mode_above_band(fit: Fit, etfe: Etfe, limit: CriticalStiffness) -> tuple[Not
     own = dict(zip(model.names, theta, strict=True))
     if not {"m1", "m2", "kc", "bc"} <= own.keys():
         return ()
-    from scipy.stats import chi2
-
     top, mass = etfe.band_hz[1], own["m1"] + own["m2"]
-    least = fit.likelihood(theta[None])[0] - 0.5 * float(chi2.ppf(_CHANCE, model.size))
+    least = fit.likelihood(theta[None])[0] - 0.5 * float(chdtri(model.size, 1 - _CHANCE))
     low, high = (float(limit.quantile(p)) for p in (0.05, 0.95))
     for share in _LOADS:
         for factor in _ABOVE:

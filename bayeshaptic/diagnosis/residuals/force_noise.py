@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import percent, quantity
@@ -105,7 +105,7 @@ def noise_of_force(
         for level in _LEVELS * np.median(((noise - still) * centre_hz**falls / gain)[loud])
     )
     share = float(np.median((level * gain * centre_hz**-falls / answer)[loud]))
-    if least > chi2.isf(_MISSED, len(noise)) or share > _MOST:
+    if least > chdtri(len(noise), _MISSED) or share > _MOST:
         return None
     return NoiseOfForce(float(level), float(falls), share)
 
