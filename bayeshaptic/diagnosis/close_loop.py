@@ -13,7 +13,7 @@ import numpy as np
 from bayeshaptic.diagnosis.acceptance import verdict_of
 from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish, without_sampling
 from bayeshaptic.diagnosis.analysis import Analysis
-from bayeshaptic.diagnosis.base.any_loop import beyond_reach, in_any_loop, left_in_any_loop
+from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
 from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
@@ -146,10 +146,9 @@ def _whatever_loop(found: Opened, model: str | Model, options: Options) -> Close
     tests = residual_tests(begun.fit, begun.etfe)
     state = State(begun.etfe, begun.fit)
     traced = Traced(*verdict_of((), tests), state, tests, tests)
-    if traced.verdict == UNEXPLAINED:
-        return replace(found, notices=(*found.notices, left_in_any_loop(tests)))
-    if (beyond := beyond_reach(begun.fit)) is not None:
-        return replace(found, notices=(*found.notices, beyond))
+    if traced.verdict == UNEXPLAINED or begun.fit.impossible:
+        against = against_any_loop(begun.fit, tests, found.etfe.through_reference)
+        return replace(found, notices=(*found.notices, *against))
     if begun.fit.model.name == "rigid":
         return found
     nothing = EtfeCriticalStiffness(

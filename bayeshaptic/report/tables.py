@@ -191,7 +191,7 @@ def _excitation(analysis: Analysis) -> str:
     if analysis.etfe.through_reference:
         return "of a controller, read through what it followed"
     if analysis.etfe.direct:
-        return "of a controller that is not known"
+        return "of a controller, whichever it is"
     if told_too_little(analysis.notices):
         return "too little of a response"
     lines = analysis.etfe.period_lines

@@ -1,4 +1,4 @@
-"""A recording in closed loop of which nothing else is known: any controller is as good."""
+"""A recording in closed loop, whatever made it: any controller is as good."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ _WHATEVER = (
 def in_any_loop(found: Opened, options: Options) -> Opened | None:
     """What was opened, with the lines of the direct method; None where it is not for that.
 
-    It is for recordings with feedback, or where that cannot be decided: not for those in pieces,
-    nor for a device that was declared to be one mass, which is followed in time.
+    It is for recordings with feedback, or where that cannot be decided, also where a reference is
+    known: not for those in pieces, nor for a device that was declared to be one mass, which is
+    followed in time.
 
     Parameters
     ----------
@@ -35,46 +36,42 @@ def in_any_loop(found: Opened, options: Options) -> Opened | None:
     recording = found.etfe.unbroken
     if recording is None or found.one_mass or options.band_hz is not None:
         return None
-    if not has_feedback(found.notices) or told_too_little(found.notices):
+    through = found.etfe.through_reference
+    if not (through or has_feedback(found.notices)) or told_too_little(found.notices):
         return None
     try:
-        etfe = estimate_in_any_loop(recording)
+        etfe = estimate_in_any_loop(replace(recording, reference=None))
     except InputError:
         return None
-    how = "was" if is_certain(found.notices) else "may have been"
+    how = "was" if through or is_certain(found.notices) else "may have been"
     text = f"The force {how} computed from the motion, and the device is read from it {_WHATEVER}"
     kept = (n for n in found.notices if n.topic not in ("feedback", "band"))
     notices = (*kept, *etfe.notices, Notice("note", "feedback", text))
     return replace(found, etfe=etfe, notices=notices)
 
 
-def beyond_reach(fit: Fit) -> Notice | None:
-    """That a fit ends where no device is; None where it does not.
+def against_any_loop(fit: Fit, tests: Iterable[Test], through: bool) -> tuple[Notice, ...]:
+    """What stands against the fit there, of which nothing is read then.
 
     Parameters
     ----------
     fit : Fit
-    """
-    if not fit.impossible:
-        return None
-    text = (
-        "Of the base models, fitted so that feedback does not bias them, the best ends at a bound "
-        f"({', '.join(fit.impossible)}): force and position may not be of the same sample."
-    )
-    return Notice("warning", "direct", text)
-
-
-def left_in_any_loop(tests: Iterable[Test]) -> Notice:
-    """What no base model explains there.
-
-    Parameters
-    ----------
     tests : iterable of Test
-        Of which at least one is flagged.
+    through : bool
+        Whether the device is read through a reference instead: of that nothing is asked but that
+        no force acts, which all lines show better than those that the reference moves.
     """
-    worst = max((test for test in tests if test.flagged), key=lambda test: test.excess)
-    text = (
-        f"Of the base models, fitted so that feedback does not bias them, none leaves noise: "
-        f"{worst.text}."
-    )
-    return Notice("warning", "direct", text)
+    flagged = [test for test in tests if test.flagged]
+    if through:
+        flagged = [test for test in flagged if test.family == "nonlinear"]
+    if flagged:
+        why = f"none leaves noise: {max(flagged, key=lambda test: test.excess).text}"
+    elif fit.impossible and not through:
+        why = (
+            f"the best ends at a bound ({', '.join(fit.impossible)}): force and position may not "
+            "be of the same sample"
+        )
+    else:
+        return ()
+    text = f"Of the base models, fitted so that feedback does not bias them, {why}."
+    return (Notice("warning", "direct", text),)

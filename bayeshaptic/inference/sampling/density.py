@@ -22,7 +22,8 @@ class Density:
         phi = np.atleast_2d(phi)
         out = np.full(len(phi), -np.inf)
         inside = self.coordinates.inside(phi)
-        inside &= np.all(np.abs(self.coordinates.own(phi)) < 600, axis=1)
+        logarithms = np.where(self.coordinates.log, self.coordinates.own(phi), 0.0)
+        inside &= np.all(np.abs(logarithms) < 600, axis=1)  # further out they overflow
         if not inside.any():
             return out
         phi = phi[inside]

@@ -197,12 +197,14 @@ def credible(
 
     Read at the draws themselves: a histogram that is smoothed is wider than they are.
     """
-    from scipy.interpolate import RegularGridInterpolator
+    from scipy.ndimage import map_coordinates
 
-    height = RegularGridInterpolator(
-        (_middle(x_edges), _middle(y_edges)), _smooth(count), bounds_error=False, fill_value=0.0
-    )
-    return np.quantile(height(np.column_stack([x, y])), [1 - level for level in LEVELS])
+    places = [
+        (values - edges[0]) / (edges[1] - edges[0]) - 0.5  # in bins, from the middle of the first
+        for values, edges in ((x, x_edges), (y, y_edges))
+    ]
+    height = map_coordinates(_smooth(count), places, order=1, mode="constant")
+    return np.quantile(height, [1 - level for level in LEVELS])
 
 
 def _nothing() -> Figure:
