@@ -80,7 +80,7 @@ def close_loop(
     found = opened(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
     direct = _whatever_loop(found, model, chosen)
     if isinstance(direct, Closed):
-        return direct
+        return with_average(direct, prior, chosen) if chosen.hidden else direct
     found = direct
     in_time = has_feedback(found.notices) or told_too_little(found.notices)
     force = explain_force(found.etfe.recording) if in_time else None
