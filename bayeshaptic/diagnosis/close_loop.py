@@ -10,16 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.acceptance import verdict_of
-from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish, without_sampling
+from bayeshaptic.diagnosis.analyse import finish, without_sampling
 from bayeshaptic.diagnosis.analysis import Analysis
-from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
 from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
 from bayeshaptic.diagnosis.base.opened import Opened, opened
-from bayeshaptic.diagnosis.battery import residual_tests
-from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.by_all_lines import by_all_lines
+from bayeshaptic.diagnosis.closed import Closed, limit_alone
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
@@ -31,20 +29,19 @@ from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.excess import noise_besides
-from bayeshaptic.diagnosis.state import State, held_out_rms
+from bayeshaptic.diagnosis.state import held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.diagnosis.widening.rest import with_rest
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
-from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 from bayeshaptic.threads import single_threaded
 
 
@@ -78,7 +75,7 @@ def close_loop(
     chosen = options_from(options, changes)
     prior = HiddenPrior.from_table(chosen.effects)
     found = opened(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
-    direct = _whatever_loop(found, model, chosen)
+    direct = by_all_lines(found, model, chosen)
     if isinstance(direct, Closed):
         return with_average(direct, prior, chosen) if chosen.hidden else direct
     found = direct
@@ -130,42 +127,13 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
     return Closed(base, analysis, traced, _error(base), _error(analysis))
 
 
-def _whatever_loop(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
-    """By the direct method; or what was opened, and told what stands against that.
-
-    One mass is followed in time instead, with its friction, and so is whatever leaves more than
-    noise.
-    """
-    lines = in_any_loop(found, options)
-    if lines is None:
-        return found
-    try:
-        begun = fitted(lines, model, options.within(0.0, 0.3))
-    except InputError:
-        return found
-    tests = residual_tests(begun.fit, begun.etfe)
-    state = State(begun.etfe, begun.fit)
-    traced = Traced(*verdict_of((), tests), state, tests, tests)
-    if traced.verdict == UNEXPLAINED or begun.fit.impossible:
-        against = against_any_loop(begun.fit, tests, found.etfe.through_reference)
-        return replace(found, notices=(*found.notices, *against))
-    if begun.fit.model.name == "rigid":
-        return found
-    nothing = EtfeCriticalStiffness(
-        None, None, None, None, begun.fit.model.stiffness_unit, NO_WITNESS
-    )
-    analysis = finish(begun, begun.etfe, begun.fit, options.within(0.3, 0.95), witness=nothing)
-    error = _limit_alone(analysis)
-    return Closed(analysis, analysis, traced, error, error)
-
-
 def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:
     """By the motion in its loop; None where it cannot be followed."""
     analysis = analyse_in_loop(found, options.within(0.3, 0.95))
     if analysis is None:
         return None
     traced = in_the_loop(trace_force(analysis.etfe, analysis.fit, force), analysis)
-    error = _limit_alone(analysis)
+    error = limit_alone(analysis)
     return Closed(analysis, analysis, traced, error, error, force)
 
 
@@ -269,9 +237,3 @@ def _error(analysis: Analysis) -> dict[str, Any]:
         "critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)},
         "critical_stiffness_db": float(db) if db is not None and np.isfinite(db) else None,
     }
-
-
-def _limit_alone(analysis: Analysis) -> dict[str, Any]:
-    """Of an analysis that is not of the response, the limit; the rest is missing."""
-    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
-    return {"critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)}}

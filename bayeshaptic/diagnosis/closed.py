@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from bayeshaptic.diagnosis.analysis import Analysis, limit_line
 from bayeshaptic.diagnosis.feedback.explain import ForceExplained
 from bayeshaptic.diagnosis.state import Accepted
@@ -96,3 +98,14 @@ class Closed(Shown):
             f"added to the model {self.base.model.name}: {found}",
             limit_line(self.analysis),
         )
+
+
+def limit_alone(analysis: Analysis) -> dict[str, Any]:
+    """Errors of an analysis that is not compared with the response: its limit.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
+    return {"critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)}}

@@ -1,0 +1,65 @@
+"""The loop closed on a recording that was made in one, whatever controller made it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish
+from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
+from bayeshaptic.diagnosis.base.begun import fitted
+from bayeshaptic.diagnosis.base.opened import Opened
+from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.closed import Closed, limit_alone
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.traced import UNEXPLAINED
+from bayeshaptic.diagnosis.trials.any_loop import trace_in_any_loop, untraced
+from bayeshaptic.diagnosis.widening.rivals import with_rivals
+from bayeshaptic.errors import InputError
+from bayeshaptic.models import Model
+from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
+
+
+def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
+    """By the direct method; or what was opened, and told what stands against that.
+
+    One mass is followed in time instead, with its friction, and so is whatever leaves more than
+    noise beside linear effects.
+
+    Parameters
+    ----------
+    found : Opened
+    model : str or Model
+        As asked for.
+    options : Options
+    """
+    lines = in_any_loop(found, options)
+    if lines is None:
+        return found
+    try:
+        begun = fitted(lines, model, options.within(0.0, 0.3))
+    except InputError:
+        return found
+    tests = residual_tests(begun.fit, begun.etfe)
+    traced, began = untraced(State(begun.etfe, begun.fit), tests), time.perf_counter()
+    one_mass = begun.fit.model.name == "rigid"
+    if not one_mass:
+        trying = options.within(0.3, 0.5)
+        traced = trace_in_any_loop(traced, lambda title: trying.report(0.5, f"trying {title}"))
+    tracing_s = time.perf_counter() - began
+    fit = traced.state.fit
+    if traced.verdict == UNEXPLAINED or fit.impossible:
+        against = against_any_loop(fit, traced.after, found.etfe.through_reference)
+        return replace(found, notices=(*found.notices, *against))
+    if one_mass:
+        return found
+    nothing = EtfeCriticalStiffness(None, None, None, None, fit.model.stiffness_unit, NO_WITNESS)
+    base = finish(begun, begun.etfe, begun.fit, options.within(0.5, 0.7), witness=nothing)
+    analysis = base
+    if traced.state.accepted:
+        analysis = finish(begun, begun.etfe, fit, options.within(0.7, 0.95), witness=nothing)
+        limit, traced = with_rivals(analysis.limit, traced, options.seed)
+        seconds = {**analysis.seconds, "closing the loop": tracing_s}
+        analysis = replace(analysis, limit=limit, seconds=seconds)
+    return Closed(base, analysis, traced, limit_alone(base), limit_alone(analysis))
