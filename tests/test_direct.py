@@ -1,5 +1,7 @@
 """Closed loops of which nothing else is known: the direct method, on loops of the bench."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -8,12 +10,19 @@ from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals.causal import scores
 from bayeshaptic.recordings.read import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
 
 
-def loop(seed, held=False, friction=0.0, seconds=8.0):
-    """A bench in a loop of a P controller that follows noise, and what it recorded."""
+def loop(seed, held=False, friction=0.0, seconds=8.0, lacking=None, known=False):
+    """A bench in a loop of a P controller that follows noise, and what it recorded.
+
+    `lacking` is an effect that the model does not have; where what was followed is `known`, it is
+    written down, too.
+    """
     bench = Bench.from_device("phantom", held, "grasped" if held else "free")
+    if lacking:
+        bench = bench.with_effect(lacking)
     truth = bench.true_critical_stiffness()
     if friction:
         bench = bench.with_effect("coulomb_friction", force=friction * bench.force_rms)
@@ -27,7 +36,7 @@ def loop(seed, held=False, friction=0.0, seconds=8.0):
     recording = recording_from_arrays(
         made.force, made.position, bench.period_s, force_unit="Nm", position_unit="rad"
     )
-    return bench, truth, recording
+    return bench, truth, replace(recording, reference=wanted) if known else recording
 
 
 def test_every_line_counts_alike():
@@ -61,6 +70,34 @@ def test_the_score_of_a_causal_change_is_zero_where_the_response_is_biased():
     delayed = fit.response(nodes.ravel()).reshape(nodes.shape) * np.exp(-2j * np.pi * nodes * 1e-3)
     found = scores(fit, fit.windows, delayed[..., None])
     assert abs(found.score[0]) < 4 * np.sqrt(found.covariance[0, 0])
+
+
+def test_a_held_device_gets_a_limit_where_its_reference_is_known_too():
+    """The more is told, the more is known: through the reference alone a held one has none."""
+    bench, truth, recording = loop(3, held=True, known=True)
+    closed = close_loop(recording, hidden=False, delay_s=bench.delay_s)
+    assert closed.analysis.etfe.direct
+    told = headline(closed)
+    assert 0.5 * truth < told.stiffness < truth
+
+
+def test_an_effect_is_named_in_a_loop_of_which_nothing_is_known():
+    bench, truth, recording = loop(9, lacking="actuator_lag")
+    closed = close_loop(recording, hidden=False, held=False, delay_s=bench.delay_s)
+    assert closed.analysis.etfe.direct
+    (effect,) = closed.effects
+    assert "actuator_lag" in (effect.name, *effect.ties)
+    low, high = (float(closed.analysis.limit.quantile(p)) for p in (0.005, 0.995))
+    assert low <= truth <= high
+    assert closed.before["weighted_rms"] > 1.1 * closed.after["weighted_rms"]
+
+
+def test_what_could_hide_is_averaged_over_in_a_loop_too():
+    bench, _, recording = loop(4)
+    closed = close_loop(recording, held=False, delay_s=bench.delay_s)
+    hidden = closed.analysis.hidden
+    assert hidden is not None
+    assert closed.analysis.limit.quantile(0.05) < hidden.declared.quantile(0.05)
 
 
 def test_friction_in_a_loop_is_seen():

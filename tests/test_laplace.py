@@ -88,6 +88,19 @@ def test_a_fit_at_the_end_of_a_prior_still_finds_the_peak(on_a_ridge):
             assert efficiency(density, proposal, peak) > 0.2
 
 
+def test_only_a_logarithm_overflows(on_a_ridge) -> None:
+    """A mass of 10,000 times the spread of its prior is in its support."""
+    fit, here, _ = on_a_ridge
+    linear = np.flatnonzero(~here.log)[0]
+    scale = here.scale.copy()
+    scale[linear] = 1e-4 * fit.theta[linear]
+    low, high = here.low * here.scale / scale, here.high * here.scale / scale
+    far = replace(here, scale=scale, low=low, high=high)
+    phi = far.coordinate(fit.theta[None])
+    assert phi[0, linear] > 1000
+    assert np.isfinite(Density(fit.likelihood, far)(phi)[0])
+
+
 def test_of_two_springs_side_by_side_none_is_a_logarithm() -> None:
     """The data know their sum: a fit may leave one of them nothing, and its error is then nan."""
     plain = bh.grasped(device="lhifam")

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish
+from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
 from bayeshaptic.diagnosis.base.begun import fitted
 from bayeshaptic.diagnosis.base.opened import Opened
@@ -17,6 +21,7 @@ from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.diagnosis.trials.any_loop import trace_in_any_loop, untraced
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import Model
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
@@ -62,4 +67,10 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
         limit, traced = with_rivals(analysis.limit, traced, options.seed)
         seconds = {**analysis.seconds, "closing the loop": tracing_s}
         analysis = replace(analysis, limit=limit, seconds=seconds)
-    return Closed(base, analysis, traced, limit_alone(base), limit_alone(analysis))
+    return Closed(base, analysis, traced, _error(base, fit), _error(analysis, fit))
+
+
+def _error(analysis: Analysis, last: Fit) -> dict[str, Any]:
+    """The limit, and what a fit leaves over the noise: that is what the last fit leaves."""
+    left = analysis.fit.likelihood.noise_variance / last.likelihood.noise_variance
+    return {**limit_alone(analysis), "weighted_rms": float(np.sqrt(left.mean()))}

@@ -196,7 +196,8 @@ def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed
         return closed
     seconds = {**analysis.seconds, "what could hide": time.perf_counter() - began}
     analysis = replace(analysis, limit=found[0], hidden=found[1], seconds=seconds)
-    return replace(closed, analysis=analysis, after=_error(analysis))
+    after = _error(analysis)
+    return replace(closed, analysis=analysis, after={key: after[key] for key in closed.after})
 
 
 def _declared_alone(analysis: Analysis, error: Exception) -> Analysis:

@@ -269,16 +269,16 @@ def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: 
     if held is not None:
         said = "Somebody holds it, as was said. " if held else "Nobody holds it, as was said. "
     text = (
-        f"{said}Best by itself: {best} ({_WORDS[best]}, {chosen.model.size} parameters), "
-        f"reduced chi-square {_plain(chosen.reduced_chi_square)}."
+        f"{said}Best by itself: {best} ({_WORDS[best]}, {chosen.model.size} parameters)"
+        f"{_left(chosen, ', reduced chi-square ')}."
     )
     for name, other in candidates.items():
         if name == best:
             continue
         behind = other.score - candidates[best].score
         text += (
-            f" {name.capitalize()} ({other.fit.model.size} parameters) has "
-            f"{_plain(other.fit.reduced_chi_square)}, and an information criterion (BIC) "
+            f" {name.capitalize()} ({other.fit.model.size} parameters) has"
+            f"{_left(other.fit, ' ', ', and')} an information criterion (BIC) "
             f"{_plain(abs(behind))} {'worse' if behind > 0 else 'better'}."
         )
     if noise >= MISFIT:
@@ -288,6 +288,12 @@ def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: 
             "in for what is missing."
         )
     return text
+
+
+def _left(fit: Fit, before: str, after: str = "") -> str:
+    """What a fit leaves over the noise; nothing where it is the noise itself that it leaves."""
+    known = fit.windows.noise is None
+    return f"{before}{_plain(fit.reduced_chi_square)}{after}" if known else ""
 
 
 def _plain(value: float) -> str:

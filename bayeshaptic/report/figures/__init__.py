@@ -118,7 +118,7 @@ LOOP_PICTURES = (
         "loop_residual",
         loop_residual.draw,
         "Residual over frequency before and after",
-        shown=lambda closed: closed.verdict != "consistent",
+        shown=lambda closed: closed.verdict != "consistent" and not closed.analysis.etfe.direct,
     ),
     Picture("loop_tests", loop_tests.draw, "Every test of the residual before and after"),
     Picture(

@@ -141,12 +141,12 @@ def raised(closed: Closed) -> bool:
 
 
 def errors(closed: Closed) -> Rows:
-    """(what, before, after) of the error table of ``summary.json``."""
+    """(what, before, after) of the error table of ``summary.json``, without what is missing."""
     stated, unit = stated_errors(closed), closed.analysis.limit.unit
     before, after = stated["before"], stated["after"]
 
     def row(title: str, key: str, suffix: str, places: int | None = None) -> tuple[str, ...]:
-        return (title, *(_number(e[key], suffix, places) for e in (before, after)))
+        return (title, *(_number(e.get(key), suffix, places) for e in (before, after)))
 
     def limits(e: Mapping[str, Any]) -> str:
         q = e["critical_stiffness"]
@@ -154,7 +154,7 @@ def errors(closed: Closed) -> Rows:
             return _DASH
         return estimate(q["q50"], q["q05"], q["q95"], unit)
 
-    return (
+    rows = (
         row("residual over the noise, all data", "weighted_rms", ""),
         row("residual over the noise, data held out", "held_out_weighted_rms", ""),
         row("gain, model minus measurement (rms)", "gain_db_rms", " dB"),
@@ -162,6 +162,7 @@ def errors(closed: Closed) -> Rows:
         ("critical stiffness, median (90 %)", limits(before), limits(after)),
         row("median, model minus the measurement's own", "critical_stiffness_db", " dB", 2),
     )
+    return tuple(row for row in rows if set(row[1:]) != {_DASH})
 
 
 def estimates(closed: Closed) -> tuple[ParameterRow, ...]:

@@ -234,14 +234,17 @@ def _numbers(closed: Closed, effect: Accepted) -> str:
 
 
 def _error_change(closed: Closed) -> str:
-    before, after = (e["held_out_weighted_rms"] for e in (closed.before, closed.after))
+    key, what = "held_out_weighted_rms", "held-out error"
+    if key not in closed.before:  # in closed loop nothing can be held out
+        key, what = "weighted_rms", "error"
+    before, after = (e[key] for e in (closed.before, closed.after))
     if part(closed):
         return f"leaves {_times(after)} times the noise in the worst part"
     same = 0.005  # relative change of an error that is not worth a word
     if abs(after / before - 1) < same:
-        return f"left the held-out error at {_times(after)} times the noise"
+        return f"left the {what} at {_times(after)} times the noise"
     verb = "cut" if after < before else "raised"
-    return f"{verb} the held-out error from {_times(before)} to {_times(after)} times the noise"
+    return f"{verb} the {what} from {_times(before)} to {_times(after)} times the noise"
 
 
 def _noise_change(closed: Closed) -> str:
