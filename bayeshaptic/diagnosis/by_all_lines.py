@@ -19,10 +19,13 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.diagnosis.trials.any_loop import trace_in_any_loop, untraced
+from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import Model
+from bayeshaptic.numerics.spending import RATE, Meter, counting
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 
@@ -50,8 +53,11 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
     traced, began = untraced(State(begun.etfe, begun.fit), tests), time.perf_counter()
     one_mass = begun.fit.model.name == "rigid"
     if not one_mass:
-        trying = options.within(0.3, 0.5)
-        traced = trace_in_any_loop(traced, lambda title: trying.report(0.5, f"trying {title}"))
+        trying, meter = options.within(0.3, 0.5), Meter(options.budget_s * RATE)
+        with counting(meter):
+            traced = trace_in_any_loop(
+                traced, meter, lambda title: trying.report(0.5, f"trying {title}")
+            )
     tracing_s = time.perf_counter() - began
     fit = traced.state.fit
     if traced.verdict == UNEXPLAINED or fit.impossible:
@@ -63,10 +69,17 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
     base = finish(begun, begun.etfe, begun.fit, options.within(0.5, 0.7), witness=nothing)
     analysis = base
     if traced.state.accepted:
-        analysis = finish(begun, begun.etfe, fit, options.within(0.7, 0.95), witness=nothing)
-        limit, traced = with_rivals(analysis.limit, traced, options.seed)
-        seconds = {**analysis.seconds, "closing the loop": tracing_s}
-        analysis = replace(analysis, limit=limit, seconds=seconds)
+        etfe, seed = traced.state.etfe, options.seed
+        analysis = finish(begun, etfe, fit, options.within(0.7, 0.95), witness=nothing)
+        limit, traced = with_rivals(analysis.limit, traced, seed)
+        limit = with_discrepancy(limit, analysis.posterior, begun.fit, fit, traced, seed)
+        analysis = replace(
+            analysis,
+            limit=limit,
+            widened=with_law_error(analysis.posterior, begun.fit, fit, traced, seed),
+            recording=found.etfe.recording,
+            seconds={**analysis.seconds, "closing the loop": tracing_s},
+        )
     return Closed(base, analysis, traced, _error(base, fit), _error(analysis, fit))
 
 

@@ -109,7 +109,7 @@ class _Noise(NamedTuple):
 def _noise_of(fit: Fit, etfe: Etfe) -> _Noise | None:
     """The noise above a hand's; None where it does not tell of the device."""
     recording, spectra = etfe.unbroken, etfe.spectra
-    if recording is None or not isinstance(spectra, RandomSpectra):
+    if recording is None or etfe.direct or not isinstance(spectra, RandomSpectra):
         return None
     rounded = 0.25  # counts a sample; rounding a slower motion does not make white noise
     if _counts_a_sample(recording) < rounded:
