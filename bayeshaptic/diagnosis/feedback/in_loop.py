@@ -115,7 +115,7 @@ def _with_halves(recording: Recording) -> InLoop | None:
     power = _power(own)
     most = power + _APART**2 * _by_chance(halves, parts)
     misfit = _power(other) / most
-    if misfit > MISFIT:
+    if not misfit <= MISFIT:  # a number that is none, too: of a motion that runs away
         doubts += (
             "what one half of the recording says leaves "
             f"{pure(_power(other) / power, 3)} times the error on the other half that its own "
@@ -134,6 +134,8 @@ def _by_chance(halves: tuple[MotionFit, ...], parts: tuple[Recording, ...]) -> f
         loop = half.loop(part)
         values = loop.with_beginnings(loop.begun(half.inside, half.numbers), half.uneven)
         columns = loop.columns(values, half.uneven, loop.error(values, half.uneven))
+        if not np.isfinite(columns).all():  # with its own values it runs away: no chance does
+            return 0.0
         # Where the pieces begin, and hums, are fitted to each.
         begins = columns[:, len(NAMES) : loop.plain - len(half.numbers)]
         own = columns[:, : len(NAMES)]
