@@ -100,11 +100,21 @@ def test_what_could_hide_is_averaged_over_in_a_loop_too():
     assert closed.analysis.limit.quantile(0.05) < hidden.declared.quantile(0.05)
 
 
-def test_friction_in_a_loop_is_seen():
-    bench, _, recording = loop(7, friction=0.15)
+def test_friction_in_a_loop_is_taken_off():
+    """The command that was recorded drove the device, whatever made it."""
+    bench, truth, recording = loop(7, friction=0.15)
     closed = close_loop(recording, hidden=False, held=False, delay_s=bench.delay_s)
-    assert not closed.analysis.etfe.direct
-    assert any(notice.topic == "direct" for notice in closed.analysis.notices)
+    assert closed.analysis.etfe.direct
+    (effect,) = closed.effects
+    assert effect.name == "coulomb_friction"
+    found = effect.estimates["friction_force"]
+    assert abs(found.mean - 0.15 * bench.force_rms) < 3 * found.sd
+    low, high = (float(closed.analysis.limit.quantile(p)) for p in (0.005, 0.995))
+    assert low <= truth <= high
+    before = float(closed.base.limit.quantile(0.5))
+    assert abs(np.log(float(closed.analysis.limit.quantile(0.5)) / truth)) < 0.5 * abs(
+        np.log(before / truth)
+    )
 
 
 def test_a_device_that_is_declared_to_be_one_mass_is_followed_in_time():

@@ -82,6 +82,9 @@ def _round(before: Traced, meter: Meter, tick: Tick | None) -> Traced | None:
     if chosen is None:
         return None
     state, tests = acceptance.with_ties(chosen, open_), left[id(chosen)]
+    *earlier, own = state.accepted
+    evidence = f"raises the log likelihood of all windows by {chosen.gain_fit:.0f}"
+    state = replace(state, accepted=(*earlier, replace(own, evidence=evidence)))
     number = len(state.accepted)
     verdict, kind = acceptance.verdict_of(state.accepted, tests)
     return replace(
