@@ -32,6 +32,7 @@ from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.types import Tick
 
 _MOST = 2  # effects
+_FRICTION = "friction_force"  # the strength of every law of dry friction
 _STARTS = 6  # of the sieve, from which a candidate is fitted in full
 
 
@@ -79,7 +80,7 @@ def _round(before: Traced, meter: Meter, tick: Tick | None) -> Traced | None:
         lambda trial: acceptance.excess(left[id(trial)]),
         lambda trial: worth(trial.state.fit),
     )
-    if chosen is None:
+    if chosen is None or not _is_known_to_hold(chosen):
         return None
     state, tests = acceptance.with_ties(chosen, open_), left[id(chosen)]
     *earlier, own = state.accepted
@@ -101,6 +102,15 @@ def _round(before: Traced, meter: Meter, tick: Tick | None) -> Traced | None:
         rejected=tuple(t for t in open_ if t is not chosen),
         path=(*before.path, state),
     )
+
+
+def _is_known_to_hold(trial: Trial) -> bool:
+    """Whether limits with such an effect were right in simulated loops.
+
+    With linear ones and dry friction they were.  The one loop with a spring that hardens, which was
+    named as such, had 1.6 times its limit: other forces are told, and not taken off.
+    """
+    return trial.accepted.family == "linear" or _FRICTION in trial.accepted.estimates
 
 
 def _left(state: State) -> tuple[Test, ...]:

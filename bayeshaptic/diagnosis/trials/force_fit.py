@@ -60,6 +60,8 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     for _ in range(rounds):
         logs = form.logs(best)
         step, along = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near, along)
+        if not np.isfinite([*step.theta, *step.logs]).all():  # slopes of a motion that runs away
+            break
         factor, point = _advanced(bench, form, best, step)
         gained = point.gain_fit - best.gain_fit
         if gained > 0:
