@@ -229,7 +229,8 @@ class MassInLoop:
         for i in range(2 * WAVES):
             more = uneven.copy()
             more[i] += 1e-3 * size
-            out[:, self.plain + i] = (error - self.error(values, more)) / (1e-3 * size)
+            with np.errstate(invalid="ignore"):  # of a motion that runs away
+                out[:, self.plain + i] = (error - self.error(values, more)) / (1e-3 * size)
         return out
 
     def _begins(self, values: Floats, uneven: Floats) -> Iterator[tuple[slice, Ints, Floats]]:
@@ -270,7 +271,8 @@ class MassInLoop:
         up[moved] += step
         down[moved] = np.maximum(down[moved] - step, self.lowest[moved])
         span = up[moved[0]] - down[moved[0]]
-        return (self.error(down, uneven) - self.error(up, uneven)) / span
+        with np.errstate(invalid="ignore"):  # of a motion that runs away
+            return np.asarray((self.error(down, uneven) - self.error(up, uneven)) / span)
 
     def answer(self, values: Floats, uneven: Floats, error: Floats, force: Floats) -> Floats:
         """How the simulated position moves with the strength of a force, shape (N,)."""
