@@ -11,7 +11,7 @@ import scipy.stats
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
-from bayeshaptic.stability import critical
+from bayeshaptic.stability import each_draw
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.stability.tail import low_quantile
 
@@ -36,18 +36,35 @@ def test_what_has_been_searched_is_not_searched_again(monkeypatch):
     first = critical_stiffness(Chains(whole.model, whole.chains[:, :25]))
     plain = critical_stiffness(whole)
     searched = []
-    search = critical.find_crossings
+    search = each_draw.find_crossings
 
     def counted(system, *arguments):
         searched.append(system.batch)
         return search(system, *arguments)
 
-    monkeypatch.setattr(critical, "find_crossings", counted)
+    monkeypatch.setattr(each_draw, "find_crossings", counted)
     grown = critical_stiffness(whole, before=first)
     assert sum(searched) == 15 * 16
     assert grown.samples == pytest.approx(plain.samples, rel=1e-11)
     assert grown.frequency_hz == pytest.approx(plain.frequency_hz, rel=1e-9)
     assert np.array_equal(grown.group, plain.group) and grown.crossings == plain.crossings
+
+
+def test_a_walker_that_stays_is_not_searched_again(monkeypatch):
+    moving = independent(20)
+    stays = Chains(moving.model, np.repeat(moving.chains, 3, axis=1))
+    searched = []
+    search = each_draw.find_crossings
+
+    def counted(system, *arguments):
+        searched.append(system.batch)
+        return search(system, *arguments)
+
+    monkeypatch.setattr(each_draw, "find_crossings", counted)
+    found = critical_stiffness(stays)
+    assert sum(searched) == 20 * 16
+    each = critical_stiffness(moving).samples.reshape(16, 20)
+    assert np.array_equal(found.samples, np.repeat(each, 3, axis=1).ravel())
 
 
 def test_the_rule_asks_for_more_until_the_limit_is_known():
