@@ -31,18 +31,25 @@ def independent(steps: int, walkers: int = 8, sd: float = 0.02, device: str = "p
     return Chains(model, model.values * np.exp(sd * noise))
 
 
-def test_what_has_been_searched_is_not_searched_again(monkeypatch):
-    whole = independent(40)
-    first = critical_stiffness(Chains(whole.model, whole.chains[:, :25]))
-    plain = critical_stiffness(whole)
-    searched = []
+@pytest.fixture
+def searched(monkeypatch) -> list[int]:
+    """How many draws each search was for."""
+    counts: list[int] = []
     search = each_draw.find_crossings
 
     def counted(system, *arguments):
-        searched.append(system.batch)
+        counts.append(system.batch)
         return search(system, *arguments)
 
     monkeypatch.setattr(each_draw, "find_crossings", counted)
+    return counts
+
+
+def test_what_has_been_searched_is_not_searched_again(searched):
+    whole = independent(40)
+    first = critical_stiffness(Chains(whole.model, whole.chains[:, :25]))
+    plain = critical_stiffness(whole)
+    searched.clear()
     grown = critical_stiffness(whole, before=first)
     assert sum(searched) == 15 * 16
     assert grown.samples == pytest.approx(plain.samples, rel=1e-11)
@@ -50,17 +57,9 @@ def test_what_has_been_searched_is_not_searched_again(monkeypatch):
     assert np.array_equal(grown.group, plain.group) and grown.crossings == plain.crossings
 
 
-def test_a_walker_that_stays_is_not_searched_again(monkeypatch):
+def test_a_walker_that_stays_is_not_searched_again(searched):
     moving = independent(20)
     stays = Chains(moving.model, np.repeat(moving.chains, 3, axis=1))
-    searched = []
-    search = each_draw.find_crossings
-
-    def counted(system, *arguments):
-        searched.append(system.batch)
-        return search(system, *arguments)
-
-    monkeypatch.setattr(each_draw, "find_crossings", counted)
     found = critical_stiffness(stays)
     assert sum(searched) == 20 * 16
     each = critical_stiffness(moving).samples.reshape(16, 20)

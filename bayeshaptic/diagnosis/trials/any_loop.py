@@ -14,17 +14,9 @@ from dataclasses import replace
 from bayeshaptic.diagnosis import acceptance, thresholds
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.diagnosis.state import (
-    Accepted,
-    Change,
-    State,
-    Trial,
-    describe_gain,
-    log_likelihoods,
-    worth,
-)
+from bayeshaptic.diagnosis.state import State, Trial, log_likelihoods, worth
 from bayeshaptic.diagnosis.traced import EXPLAINED, Candidate, Traced
-from bayeshaptic.diagnosis.trials.linear import Sieved, sieve
+from bayeshaptic.diagnosis.trials.linear import Sieved, accepted_with, sieve
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.screening import starting_bases
@@ -149,14 +141,6 @@ def _try(state: State, one: Sieved) -> Trial:
     fit = least_squares(model, state.etfe, start=one.starts[:_STARTS])
     before = log_likelihoods(state.model, state.fit.windows, state.fit.theta)
     gain_fit, gain_choose = (log_likelihoods(model, fit.windows, fit.theta) - before).tolist()
-    accepted = Accepted(
-        effect.name,
-        effect.title,
-        effect.family,
-        describe_gain(gain_choose),
-        parameters=tuple(parameter.name for parameter in effect.parameters),
-        told_apart_by=effect.told_apart_by,
-        change=Change(effect),
-    )
+    accepted = accepted_with(effect, gain_choose)
     changed = replace(state, fit=fit, accepted=(*state.accepted, accepted))
     return Trial(accepted, changed, gain_fit, gain_choose, len(effect.parameters))

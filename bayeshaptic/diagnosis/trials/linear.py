@@ -215,6 +215,26 @@ def _looked_further(sight: Sight, meter: Meter) -> Mapping[int, Optimum]:
     return found.optima
 
 
+def accepted_with(effect: LinearEffect, gain_choose: float) -> Accepted:
+    """What an effect would be as a part of the explanation.
+
+    Parameters
+    ----------
+    effect : LinearEffect
+    gain_choose : float
+        In log likelihood, on the windows to choose by.
+    """
+    return Accepted(
+        effect.name,
+        effect.title,
+        effect.family,
+        describe_gain(gain_choose),
+        parameters=tuple(parameter.name for parameter in effect.parameters),
+        told_apart_by=effect.told_apart_by,
+        change=Change(effect),
+    )
+
+
 def _try(state: State, windows: Windows, one: Sieved, base: Floats, first: Optimum | None) -> Trial:
     """The trial of a candidate, followed to an optimum, or as the sieve left it."""
     effect, model = one.effect, state.model.with_effect(one.effect)
@@ -222,15 +242,7 @@ def _try(state: State, windows: Windows, one: Sieved, base: Floats, first: Optim
     if first is not None:
         theta, windows = _around(model, state.etfe, first)
     gain_fit, gain_choose = (log_likelihoods(model, windows, theta) - base).tolist()
-    accepted = Accepted(
-        effect.name,
-        effect.title,
-        effect.family,
-        describe_gain(gain_choose),
-        parameters=tuple(p.name for p in effect.parameters),
-        told_apart_by=effect.told_apart_by,
-        change=Change(effect),
-    )
+    accepted = accepted_with(effect, gain_choose)
     size, changed = len(effect.parameters), state
     if first is not None and thresholds.convincing(gain_fit, gain_choose, size):
         changed = replace(state, fit=least_squares(model, state.etfe, start=theta))
