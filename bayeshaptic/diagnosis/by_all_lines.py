@@ -32,8 +32,8 @@ from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
     """By the direct method; or what was opened, and told what stands against that.
 
-    One mass is followed in time instead, with its friction, and so is whatever leaves more than
-    noise beside linear effects.
+    One mass is followed in time instead, with its friction; whatever leaves more than noise beside
+    linear effects and dry friction goes the next way.
 
     Parameters
     ----------

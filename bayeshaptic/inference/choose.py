@@ -159,8 +159,8 @@ def choose_model(
     fits: dict[str, Fit] = {}
     for name in names[held]:
         # Where a simpler one leaves noise, no deeper valley of a richer one would be chosen.
-        reached = any(fit.reduced_chi_square < _NOISE for fit in fits.values())
-        fits[name] = fitted(name, most_sets=1 if reached else SETS)
+        noise_reached = any(fit.reduced_chi_square < _NOISE for fit in fits.values())
+        fits[name] = fitted(name, most_sets=1 if noise_reached else SETS)
     best, candidates, noise = _compared(fits)
     # Where two masses that nobody holds explain it, a third has nothing to explain.
     if held is None and (fits[best].misfits or candidates[best].held):
@@ -265,9 +265,8 @@ def deviance(fit: Fit, noise: float) -> tuple[float, float]:
 
 def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: bool | None) -> str:
     chosen = candidates[best].fit
-    said = ""
-    if held is not None:
-        said = "Somebody holds it, as was said. " if held else "Nobody holds it, as was said. "
+    who = {None: "", True: "Somebody holds it, as was said. "}
+    said = who.get(held, "Nobody holds it, as was said. ")
     text = (
         f"{said}Best by itself: {best} ({_WORDS[best]}, {chosen.model.size} parameters)"
         f"{_left(chosen, ', reduced chi-square ')}."
@@ -291,7 +290,7 @@ def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: 
 
 
 def _left(fit: Fit, before: str, after: str = "") -> str:
-    """What a fit leaves over the noise; nothing where it is the noise itself that it leaves."""
+    """What a fit leaves over the noise; nothing where that is the noise itself."""
     known = fit.windows.noise is None
     return f"{before}{_plain(fit.reduced_chi_square)}{after}" if known else ""
 

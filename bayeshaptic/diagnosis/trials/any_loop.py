@@ -4,7 +4,8 @@ In closed loop a window by itself is biased, and the sum over all of them is not
 (`recordings/response/estimators/direct.py`): nothing can be held out (`diagnosis/state.py`).  The
 command that was recorded is what drove the device, whatever made it, so that a force inside it is
 simulated as in open loop.  In simulated loops the right linear effect gained 55 to 1100 in log
-likelihood, the best of those that lacked none at most 13.
+likelihood, the best of those that lacked none at most 13.  Of 100 clean loops one has an effect
+named, by 39: its fit had ended in another valley.
 """
 
 from __future__ import annotations
