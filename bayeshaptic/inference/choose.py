@@ -29,7 +29,7 @@ from bayeshaptic.types import Floats
 # Information criteria nearer than this, odds of twenty to one, leave open which model it is.
 UNDECIDED = 6.0
 _CHAIN = "chain-2"
-_NOISE = 1.1  # reduced chi-square that clean recordings stay below (see `MISFIT`)
+_NOISE = 1.1  # reduced chi-square: 5 of 80 clean recordings lie above, and only take longer
 _WORDS = {
     "rigid": "one rigid mass",
     "free": "two masses and a transmission, held by nobody",
