@@ -27,7 +27,7 @@ window.addEventListener("load", () => {
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     const node = walker.currentNode;
-    if (!node.data.trim() || node.parentElement.closest("script")) continue;
+    if (!node.data.trim() || node.parentElement.closest("script, svg")) continue;
     if (folded(node.parentElement)) continue;
     const range = document.createRange();
     range.selectNodeContents(node);

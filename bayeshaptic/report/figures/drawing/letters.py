@@ -1,7 +1,6 @@
-"""Texts as pixels and as outlines, each set once: most of a report's texts come several times.
+"""Texts as pixels, each set once: most of a report's texts come several times.
 
-matplotlib sets every text three times, to measure it and for each of the two formats, and draws
-letter by letter: half of what a figure costs.
+matplotlib sets every text anew, to measure it and to draw it, letter by letter.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 from matplotlib.backends.backend_agg import RendererAgg, get_hinting_flag
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextToPath
 
 from bayeshaptic.types import Bytes
 
@@ -88,36 +86,3 @@ def in_pixels(
     pen.copy_properties(gc)
     pen.set_alpha(1.0)  # it is in the image
     renderer.draw_image(pen, column, renderer.height - row - 1, upwards)
-
-
-class Outlines(TextToPath):
-    """Texts as outlines of letters, each set once."""
-
-    def get_glyphs_with_font(
-        self,
-        font: Any,
-        s: str,
-        glyph_map: Any = None,
-        return_new_glyphs_only: bool = False,
-        **_: Any,
-    ) -> tuple[Any, Any, Any]:
-        """Places of the letters, and the outlines: of those that are not in `glyph_map`."""
-        places, outlines = _outlined(font, s)
-        known = {} if glyph_map is None else glyph_map
-        new = {name: path for name, path in outlines.items() if name not in known}
-        return places, new if return_new_glyphs_only else {**known, **new}, []
-
-    def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> Any:
-        """Width, height and descent in points."""
-        return _outlined_size(s, prop.copy(), ismath)
-
-
-@lru_cache(_KEPT)
-def _outlined(font: Any, text: str) -> tuple[Any, Any]:
-    places, outlines, _rectangles = TextToPath().get_glyphs_with_font(font, text)
-    return places, outlines
-
-
-@lru_cache(_KEPT)
-def _outlined_size(text: str, font: FontProperties, ismath: Any) -> Any:
-    return TextToPath().get_text_width_height_descent(text, font, ismath)
