@@ -26,7 +26,7 @@ from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.recordings.response.windows import Windows, remembered
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Complexes, Floats
 
@@ -56,9 +56,9 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
         return ()
     tests = []
     frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    at_lines = line_transform(etfe, recording)
+    at_lines, response = line_transform(etfe, recording), remembered(fit.response)
     for name, (inputs, rms) in columns(fit, recording, frequency_hz, at_lines).items():
-        windows = etfe.spectra.windows(fit.response, inputs)
+        windows = etfe.spectra.windows(response, inputs)
         strength, sd, freedom = common_coefficient(windows, len(inputs))
         score = as_normal(abs(strength / sd), freedom) if sd > 0 else 0.0
         tests.append(force_test(name, score, ForceSeen(strength, sd, rms)))
@@ -220,9 +220,13 @@ def _drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Floa
     """Position and velocity of what `drift_velocity` tells."""
     steady = np.ones(len(besides))
     x, v = linear_motion(system, steady, period_s)
-    columns = np.stack([steady, x, v], axis=1)
-    weights = np.linalg.lstsq(columns, besides, rcond=None)[0]
-    return columns @ weights, np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
+    columns = np.stack([steady, x, v])
+    size = np.linalg.norm(columns, axis=1)
+    # Normal equations of three columns in one scale; motions alike to a ten-millionth are one.
+    alike = 1e-14
+    normal = columns @ columns.T / np.outer(size, size)
+    weights = np.linalg.lstsq(normal, columns @ besides / size, rcond=alike)[0] / size
+    return weights @ columns, np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
 
 
 def moved_besides(fit: Fit, recording: Recording) -> float:

@@ -9,7 +9,7 @@ from bayeshaptic.diagnosis.residuals.columns import line_transform
 from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.windows import Windows
+from bayeshaptic.recordings.response.windows import Windows, remembered
 
 _KNOTS = 6  # of the change over log frequency
 SHAPES = {"a steady change": lambda t: t, "a change and back": lambda t: 1.5 * t**2 - 0.5}
@@ -28,11 +28,12 @@ def drift_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     at_lines = line_transform(etfe, recording)
     force = recording.force - recording.force.mean()
     time = np.linspace(-1, 1, recording.samples)
-    response = fit.response(etfe.spectra.frequency_hz)  # type: ignore[attr-defined]
+    response = remembered(fit.response)
+    answers = response(etfe.spectra.frequency_hz)  # type: ignore[attr-defined]
     tests = []
     for name, shape in SHAPES.items():
-        column = response * at_lines(force * shape(time))
-        score, where = _smooth_score(etfe.spectra.windows(fit.response, column[None]))
+        column = answers * at_lines(force * shape(time))
+        score, where = _smooth_score(etfe.spectra.windows(response, column[None]))
         text = f"{name} of the response during the recording ({score:.1f} standard deviations)"
         tests.append(Test(name, "time-varying", score, thresholds.normal(), where, text))
     return tuple(tests)

@@ -12,6 +12,19 @@ Reference = Callable[[NDArray[Any]], NDArray[Any]]
 """A frequency response: frequencies in Hz, shape (L,), to complex values, shape (L,)."""
 
 
+def remembered(reference: Reference) -> Reference:
+    """The same response, for several sets of windows in a row: what is known is not asked again."""
+    known: dict[bytes, NDArray[Any]] = {}
+
+    def answer(frequency_hz: NDArray[Any]) -> NDArray[Any]:
+        points = frequency_hz.tobytes()
+        if points not in known:
+            known[points] = reference(frequency_hz)
+        return known[points]
+
+    return answer
+
+
 @dataclass(frozen=True)
 class Windows:
     r"""Windows of neighbouring DFT lines, each compressed to k linear combinations and a scatter.
