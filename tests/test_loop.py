@@ -70,7 +70,7 @@ def test_candidates_begin_afresh_only_while_nothing_explains(monkeypatch) -> Non
     assert followed > 1
     assert "anew" not in calls
     calls.clear()
-    monkeypatch.setattr(linear, "MISFIT", 0.0)  # nothing explains
+    monkeypatch.setattr(linear.Sight, "explains", False)
     linear.linear_trials(State(etfe, fit), Meter())
     assert calls == ["refine"] * (1 + followed) + ["anew"] * followed
 
@@ -179,7 +179,7 @@ def test_forces_come_after_a_linear_effect_that_leaves_noise_at_first_sight(monk
 
     assert forces(99.0) == 0
     assert forces(10.0) == 1  # a force bends the response by as much
-    monkeypatch.setattr(linear, "MISFIT", 0.0)  # nothing linear leaves noise
+    monkeypatch.setattr(linear.Sight, "explains", False)  # nothing linear leaves noise
     assert forces(99.0) == 1
 
 
@@ -228,6 +228,26 @@ def test_two_modes_are_two_second_modes() -> None:
     hertz = sorted([values["mode_hz"], values["mode_hz_2"]])
     assert hertz == pytest.approx([60.0, 110.0], rel=0.01)
     assert found.verdict == "explained"
+
+
+def test_a_mass_does_not_stand_in_for_the_ground() -> None:
+    """Of a device without a file the transmission becomes the spring, its far mass the ground."""
+    bench = Bench.from_device("phantom", held=False).with_effect("centring_stiffness")
+    low, high = bench.band_hz
+    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, 10.0), seed=8)
+    etfe = estimate_etfe(
+        recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    )
+    fit = least_squares(build_model("free", delay_s=bench.delay_s), etfe)
+    assert fit.impossible == ("m2",)
+    found = trace(etfe, fit)
+    assert (found.verdict, [e.name for e in found.state.accepted]) == (
+        "explained",
+        ["centring_stiffness"],
+    )
+    known = dict(zip(found.state.model.names, found.state.fit.theta, strict=True))
+    assert known["m2"] == pytest.approx(bench.values["m2"], rel=0.05)
+    assert not found.state.fit.impossible
 
 
 def test_what_a_budget_does_not_allow_is_said() -> None:

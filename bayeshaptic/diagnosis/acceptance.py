@@ -58,6 +58,11 @@ def choose(
     return min(close, key=lambda trial: (trial.size, -trial.score))
 
 
+def possible(trials: list[Trial]) -> list[Trial]:
+    """Those whose fit a device can have; all where none is: see `Fit.impossible`."""
+    return [trial for trial in trials if not trial.state.fit.impossible] or trials
+
+
 def rivals_of(trials: Sequence[Trial]) -> list[Trial]:
     """The convincing trials that come near the best one in score, best first."""
     good = sorted((t for t in trials if t.convincing), key=lambda trial: -trial.score)

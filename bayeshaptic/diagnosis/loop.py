@@ -234,7 +234,7 @@ class Loop:
             return left[id(trial)]
 
         near = [t for t in trials if t.score > 0 and not _raises(self.state, t.state)]
-        open_ = [trial for trial in near if trial.convincing]
+        open_ = acceptance.possible([trial for trial in near if trial.convincing])
         chosen = acceptance.choose(
             open_,
             lambda trial: acceptance.excess(remaining(trial)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -91,12 +91,8 @@ class Fit(Shown):
         Of 194 fits to open loops 12 end so, all of a position a sample early, with limits 1.7 to
         179 times the truth (docs/door.md).
         """
-        return tuple(
-            name
-            for name, how in self.outcome.items()
-            if how == AT_BOUND
-            and (name == "delay_s" or self.model.parameter(name).dimension == "mass")
-        )
+        ends = [name for name, how in self.outcome.items() if how == AT_BOUND]
+        return impossible_at_bounds(self.model, ends)
 
     @property
     def sd(self) -> Floats:
@@ -152,6 +148,17 @@ class Fit(Shown):
         )
 
 
+def impossible_at_bounds(model: Model, ends: Iterable[str]) -> tuple[str, ...]:
+    """Which of the parameters that end at a bound no device has there: see `Fit.impossible`."""
+    return tuple(n for n in ends if n == "delay_s" or model.parameter(n).dimension == "mass")
+
+
+def ends_at_bounds(phi: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
+    """Which coordinates of a fit, shape (P,), lie at a bound of its search."""
+    width = high - low
+    return (phi - low < 1e-6 * width) | (high - phi < 1e-6 * width)
+
+
 def search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
     """The coordinates of a fit, and its bounds in them."""
     here = coordinates(model)
@@ -184,8 +191,7 @@ def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) 
     likelihood = Likelihood(model, windows)
     phi = here.coordinate(theta[None])
     slope = jacobian(weighted_residuals(likelihood, here), phi)[0]
-    width = high - low
-    bound = (phi[0] - low < 1e-6 * width) | (high - phi[0] < 1e-6 * width)
+    bound = ends_at_bounds(phi[0], low, high)
     chi_square = float(likelihood.reduced_chi_square(theta[None])[0])
     covariance = np.full((model.size, model.size), np.nan)
     inner = np.flatnonzero(~bound)

@@ -12,6 +12,8 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.inference.fit import (
     MISFIT,
     Fit,
+    ends_at_bounds,
+    impossible_at_bounds,
     search_box,
     summarise,
     weighted_residuals,
@@ -163,12 +165,20 @@ class Optimum:
     elsewhere : ndarray, shape (V, P)
         The best points of the other valleys in which several ended, that with most of them first.
     reduced_chi_square : float
+    impossible : tuple of str
+        As of a `Fit`.
     """
 
     theta: Floats
     agreeing: int
     elsewhere: Floats
     reduced_chi_square: float
+    impossible: tuple[str, ...] = ()
+
+    @property
+    def explains(self) -> bool:
+        """Whether it leaves noise, and is one that a device can have."""
+        return self.reduced_chi_square <= MISFIT and not self.impossible
 
 
 def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
@@ -196,15 +206,18 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
     best = np.argmin(cost + penalty(phi))
     agreeing = int(np.sum(cost < cost[best] + 0.5))
     left = float(cost[best] / windows.target.size)
-    return Optimum(here.natural(phi)[best], agreeing, elsewhere, left)
+    ends = np.array(model.names)[ends_at_bounds(phi[best], low, high)]
+    impossible = impossible_at_bounds(model, ends.tolist())
+    return Optimum(here.natural(phi)[best], agreeing, elsewhere, left, impossible)
 
 
 def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Optimum:
     """`refine`, and from starting points of the model's own where what is left is not noise."""
-    return anew(model, etfe, windows, refine(model, windows, start))
+    found = refine(model, windows, start)
+    return anew(model, etfe, windows, found) or found
 
 
-def anew(model: Model, etfe: Etfe, windows: Windows, found: Optimum) -> Optimum:
+def anew(model: Model, etfe: Etfe, windows: Windows, found: Optimum | None) -> Optimum | None:
     """What starting points of the model's own lead to, or `found` where that is as good.
 
     A fit without an effect may be bent so far that no value of the effect beside it leads on.  Of a
@@ -212,12 +225,16 @@ def anew(model: Model, etfe: Etfe, windows: Windows, found: Optimum) -> Optimum:
     points that no fit has bent led there in nine of ten.  Both in one set crowd each other out.
     Not with dynamic links, of which so many responses would be dear (not measured).  Where more
     than this effect is lacking a valley that is a little deeper is but bent in another way: the far
-    one must halve what is left.
+    one must halve what is left, or be one that a device can have where `found` is not.
     """
-    if found.reduced_chi_square <= MISFIT or not model.system(found.theta).rational:
+    if found is not None and found.explains:
         return found
-    other = refine(model, windows, starting_points(model, etfe, np.random.default_rng(0)))
-    return other if 2 * other.reduced_chi_square < found.reduced_chi_square else found
+    start = starting_points(model, etfe, np.random.default_rng(0))
+    if not model.system(start[:1]).rational:
+        return found
+    other = refine(model, windows, start)
+    better = found is None or 2 * other.reduced_chi_square < found.reduced_chi_square
+    return other if better or other.explains else found
 
 
 def polish(model: Model, windows: Windows, theta: Floats) -> Floats:
