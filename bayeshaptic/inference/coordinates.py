@@ -63,8 +63,9 @@ class Coordinates:
         """Where each coordinate ends below, shape (P,); -inf of a logarithm."""
         return np.where(self.log, -np.inf, self.low)
 
-    def natural(self, phi: Floats) -> Floats:
-        own = self.own(phi)
+    def natural(self, phi: Floats, own: Floats | None = None) -> Floats:
+        """Theta; `own` of the same phi where it is known, here and below."""
+        own = self.own(phi) if own is None else own
         with np.errstate(over="ignore"):  # far outside, where the density is none
             theta = np.where(self.log, np.exp(np.where(self.log, own, 0.0)), own * self.scale)
         if self.near_zero:
@@ -119,9 +120,9 @@ class Coordinates:
                 own[..., self.near_zero] = np.log1p(small / self.floor)
         return own
 
-    def log_jacobian(self, phi: Floats) -> Floats:
+    def log_jacobian(self, phi: Floats, own: Floats | None = None) -> Floats:
         """log |d theta / d phi| up to a constant, shape (B,)."""
-        own = self.own(phi)
+        own = self.own(phi) if own is None else own
         total = np.sum(np.where(self.log, own, 0.0), axis=-1)
         if self.beside is None:
             return total
@@ -130,9 +131,9 @@ class Coordinates:
             given = (self.floor * np.exp(own[..., self.near_zero])) @ self._given_up
             return np.asarray(total - np.log1p(given / other))
 
-    def inside(self, phi: Floats) -> NDArray[np.bool_]:
+    def inside(self, phi: Floats, own: Floats | None = None) -> NDArray[np.bool_]:
         """Which vectors lie in the support of the priors, shape (B,)."""
-        own = self.own(phi)
+        own = self.own(phi) if own is None else own
         return np.all((own >= self.low) & (own <= self.high), axis=-1)
 
 

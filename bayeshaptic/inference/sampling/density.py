@@ -21,14 +21,16 @@ class Density:
     def __call__(self, phi: Floats) -> Floats:
         phi = np.atleast_2d(phi)
         out = np.full(len(phi), -np.inf)
-        inside = self.coordinates.inside(phi)
-        logarithms = np.where(self.coordinates.log, self.coordinates.own(phi), 0.0)
-        inside &= np.all(np.abs(logarithms) < 600, axis=1)  # further out they overflow
+        here = self.coordinates
+        own = here.own(phi)
+        inside = here.inside(phi, own)
+        largest = 600.0  # of a logarithm: further out they overflow
+        inside &= ~np.any((np.abs(own) >= largest) & here.log, axis=1)
         if not inside.any():
             return out
-        phi = phi[inside]
-        theta = self.coordinates.natural(phi)
-        value = self.likelihood.model.log_prior(theta) + self.coordinates.log_jacobian(phi)
+        phi, own = phi[inside], own[inside]
+        theta = here.natural(phi, own)
+        value = self.likelihood.model.log_prior(theta) + here.log_jacobian(phi, own)
         with np.errstate(all="ignore"):  # far-away proposals may overflow: they are refused
             value += self.likelihood(theta)
         out[inside] = np.where(np.isfinite(value), value, -np.inf)
