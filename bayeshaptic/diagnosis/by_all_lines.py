@@ -33,7 +33,7 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
     """By the direct method; or what was opened, and told what stands against that.
 
     One mass is followed in time instead, with its friction; whatever leaves more than noise beside
-    linear effects and dry friction goes the next way.
+    linear effects and dry friction goes the next way; of friction a small rest may stay.
 
     Parameters
     ----------
@@ -60,7 +60,8 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
             )
     tracing_s = time.perf_counter() - began
     fit = traced.state.fit
-    if traced.verdict == UNEXPLAINED or fit.impossible:
+    refused = traced.verdict == UNEXPLAINED and not traced.state.accepted
+    if refused or fit.impossible:
         against = against_any_loop(fit, traced.after, found.etfe.through_reference)
         return replace(found, notices=(*found.notices, *against))
     if one_mass:

@@ -139,3 +139,12 @@ def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dic
         "evidence": effect.evidence,
         "ties": list(effect.ties),
     }
+
+
+def share_left(traced: Traced, family: str) -> float:
+    """What tests of a class still see after an effect of it was taken off, over what they saw."""
+    before, after = (
+        max((test.statistic for test in tests if test.family == family), default=0.0)
+        for tests in (traced.before, traced.after)
+    )
+    return float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 1.0

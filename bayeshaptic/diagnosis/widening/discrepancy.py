@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayeshaptic.diagnosis.residuals.excess import changing_share, noise_besides
-from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
+from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced, share_left
 from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
@@ -61,8 +61,12 @@ def with_discrepancy(
     found = {effect.family for effect in traced.state.accepted}
     flagged = {test.family for test in traced.after if test.flagged}
     left = flagged if traced.verdict == UNEXPLAINED else set()
-    if "linear" in left:
+    if "linear" in left and not traced.state.etfe.direct:
         limit = _with_linear(limit, posterior, fit, rng)
+    elif "linear" in left:  # windows that feedback biases do not show how the response deviates
+        rest = _rest(base, fit, traced, "linear")
+        factor = np.exp(rest * rng.uniform(-1.0, 1.0, size=len(limit.samples)))
+        limit = replace(limit, samples=limit.samples * factor)
     # A law of a force is never quite right, even where what it leaves would pass for noise.
     up = 0.25  # of the least way down, and up as well: a remainder biases either way
     for family in sorted((found & {"nonlinear"}) | (left - {"linear"})):
@@ -123,15 +127,6 @@ def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
     moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
     farthest = 2.3  # log stiffness: a factor of ten
     return share_left(traced, family) * min(moved, farthest)
-
-
-def share_left(traced: Traced, family: str) -> float:
-    """What tests of a class still see after an effect of it was taken off, over what they saw."""
-    before, after = (
-        max((test.statistic for test in tests if test.family == family), default=0.0)
-        for tests in (traced.before, traced.after)
-    )
-    return float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 1.0
 
 
 def _downwards(fit: Fit, traced: Traced, family: str) -> float:

@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayeshaptic.diagnosis.state import Accepted
-from bayeshaptic.diagnosis.traced import Traced
-from bayeshaptic.diagnosis.widening.discrepancy import share_left
+from bayeshaptic.diagnosis.traced import Traced, share_left
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.types import Floats
