@@ -11,15 +11,17 @@ from fake_analysis import _tests, fake_closed
 
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
-from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.diagnosis.traced import Traced, share_left
+from bayeshaptic.diagnosis.trials.any_loop import _leaves_little
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, _further, drift_trials
-from bayeshaptic.diagnosis.widening.discrepancy import share_left, with_discrepancy
+from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import read_recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.binding import BindingCrossing, moved
 from bayeshaptic.stability.critical import critical_stiffness
 
@@ -152,6 +154,43 @@ def test_what_is_left_is_a_share(before: float, after: float, share: float) -> N
     traced = fake_closed("explained", "nonlinear").traced
     traced = replace(traced, before=_tests(before, "nonlinear"), after=_tests(after, "nonlinear"))
     assert share_left(traced, "nonlinear") == share
+
+
+def in_a_loop(before: float, after: float, family: str = "linear") -> Closed:
+    """Dry friction was taken off, and a test of `family` still sees something."""
+    closed = fake_closed("explained", "nonlinear")
+    kinds = _tests(0.0)
+    traced = replace(
+        with_effects(closed.traced, limit_log_sd=0.0),
+        verdict="unexplained",
+        before=tuple(replace(test, statistic=before) for test in kinds),
+        after=tuple(replace(t, statistic=after * (t.family == family)) for t in kinds),
+    )
+    return replace(closed, traced=traced)
+
+
+def test_what_friction_leaves_in_a_loop_widens_the_limit_by_its_share(monkeypatch) -> None:
+    """Windows that feedback biases do not show how the response deviates."""
+    closed = in_a_loop(100.0, 20.0)
+    fit = closed.analysis.fit
+    base = too_damped(fit)
+    monkeypatch.setattr(Etfe, "direct", True)
+    ratio = log_ratios(closed, closed.traced, base)
+    width = 0.2 * abs(np.log(limit_of(base) / limit_of(fit)))
+    assert np.abs(ratio).max() <= width
+    assert np.quantile(ratio, [0.05, 0.95]) == pytest.approx([-0.9 * width, 0.9 * width], rel=0.05)
+
+
+def test_a_small_rest_of_friction_may_stay() -> None:
+    threshold = in_a_loop(100.0, 20.0).traced.after[0].threshold
+    seen = 12 * threshold
+    assert _leaves_little(in_a_loop(seen, 2 * threshold).traced)
+    assert not _leaves_little(in_a_loop(seen, 4 * threshold).traced)  # too far over the threshold
+    assert not _leaves_little(in_a_loop(4 * threshold, 2 * threshold).traced)  # too large a share
+    assert not _leaves_little(in_a_loop(seen, 2 * threshold, "nonlinear").traced)
+    twice = in_a_loop(seen, 2 * threshold).traced
+    state = replace(twice.state, accepted=2 * twice.state.accepted)
+    assert not _leaves_little(replace(twice, state=state))
 
 
 def test_where_nothing_was_found_the_limit_falls_and_its_upper_end_stays() -> None:
