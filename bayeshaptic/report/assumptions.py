@@ -159,7 +159,12 @@ def _widening(closed: Closed | None) -> tuple[str, ...]:
             "goes on to change, so that the limit is up to "
             f"{pure(-100 * math.expm1(-further), 2)} % lower: as far again as in the recording."
         )
-    if closed.verdict == "unexplained":
+    if closed.verdict == "unexplained" and closed.analysis.etfe.direct:
+        found.append(
+            "The limit is widened by what the friction that was found leaves unexplained: by that "
+            "share of how far it moved the limit. This is an estimate, not a bound."
+        )
+    elif closed.verdict == "unexplained":
         found.append(
             "The limit is widened by what is left unexplained. Where the rest is linear, the "
             "response is multiplied by a random smooth deviation as large as the residual shows; "
