@@ -97,7 +97,7 @@ def run(job: Job, known: str) -> Outcome:
         before["q05"] <= truth <= before["q95"],
         after["q05"] <= truth <= after["q95"],
         _db(before["q50"], truth),
-        closed.after["held_out_weighted_rms"],
+        closed.after.get("held_out_weighted_rms", np.nan),  # none where it was taken for a loop
         took,
         max(test.excess for test in closed.traced.before),
         _size_error(bench, closed),
@@ -215,7 +215,7 @@ def _row(name: str, outcomes: list[Outcome]) -> str:
         f"{share([o.verdict == 'explained' for o in outcomes]):>6s} {worst:+12.2f} "
         f"{share([o.before_covers for o in outcomes]):>14s} "
         f"{share([o.after_covers for o in outcomes]):>6s} "
-        f"{np.median([o.held_out for o in outcomes]):9.2f} {size:>7s} "
+        f"{np.nanmedian([o.held_out for o in outcomes]):9.2f} {size:>7s} "
         f"{np.median([o.seconds for o in outcomes]):6.1f}"
     )
 
