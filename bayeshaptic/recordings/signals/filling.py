@@ -7,11 +7,12 @@ a fraction of an encoder count.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
+from scipy.linalg import cho_solve, solveh_banded
 
 from bayeshaptic.types import Bools, Floats
 
@@ -147,6 +148,29 @@ def fill_both(
     return position, force, np.concatenate(variance)
 
 
+def _regression(design: Floats, target: Floats, ridge: Floats) -> Floats:
+    """Coefficients by least squares, each held to zero by its number in `ridge`.
+
+    By normal equations, in a quarter of the time, where these are not lost in rounding: the counts
+    of an encoder keep its lags apart, and a simulated motion without any does not.
+    """
+    normal = design.T @ design + np.diag(ridge**2)
+    size = np.sqrt(np.diag(normal))
+    apart = 1e-5  # what is left of a column, over all of it, beside those before
+    with suppress(np.linalg.LinAlgError):
+        # Of a column of zeros, a force that is none, this fails.
+        triangle = np.linalg.cholesky(
+            normal / np.maximum(np.outer(size, size), np.finfo(float).tiny)
+        )
+        if np.diag(triangle).min() > apart:
+            return np.asarray(cho_solve((triangle, True), design.T @ target / size) / size)
+    own = np.flatnonzero(ridge)
+    held = np.zeros((len(own), len(ridge)))
+    held[np.arange(len(own)), own] = ridge[own]
+    stacked = np.concatenate([design, held]), np.append(target, np.zeros(len(own)))
+    return np.asarray(np.linalg.lstsq(*stacked, rcond=1e-13)[0])
+
+
 def fit_predictor(
     position: Floats, force: Floats, missing: Bools, order: int = ORDER
 ) -> Predictor | None:
@@ -171,7 +195,7 @@ def fit_predictor(
     rows_a_column = 8
     if len(rows) < rows_a_column * columns:
         return None
-    most_rows = 10_000  # a hundred a coefficient: on more the error is a two-hundredth less
+    most_rows = 20_000  # a regression on more gains nothing
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), most_rows)).astype(int)]
     centre = float(position[~missing].mean())
     lags = np.arange(order + 1)
@@ -183,11 +207,10 @@ def fit_predictor(
     design[:, -1] = 1.0
     target = (position[rows] - centre) / sizes[0]
     # Where the force has no power its coefficients are anything; they had better be zero.
-    ridge = np.zeros((order + 1, columns))
+    ridge = np.zeros(columns)
     unseen = 1e-8  # power of the force, over all of it, below which nothing is learnt from it
-    ridge[:, order:-1] = np.eye(order + 1) * np.sqrt(unseen) * np.linalg.norm(design[:, order])
-    stacked = np.concatenate([design, ridge]), np.append(target, np.zeros(order + 1))
-    found = np.linalg.lstsq(*stacked, rcond=1e-13)[0]
+    ridge[order:-1] = np.sqrt(unseen) * np.linalg.norm(design[:, order])
+    found = _regression(design, target, ridge)
     spread = 1.4826 * float(np.median(np.abs(target - design @ found)))
     past = np.concatenate([[1.0], -found[:order]])
     return Predictor(
