@@ -19,7 +19,7 @@ from bayeshaptic.diagnosis.trials import linear, windows
 from bayeshaptic.effects.laws import BESIDE
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.coordinates import coordinates
-from bayeshaptic.inference.fit import Fit, summarise, weighted_residuals
+from bayeshaptic.inference.fit import Fit, runs_away, summarise, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.gauss_newton import jacobian
@@ -248,6 +248,14 @@ def test_a_mass_does_not_stand_in_for_the_ground() -> None:
     known = dict(zip(found.state.model.names, found.state.fit.theta, strict=True))
     assert known["m2"] == pytest.approx(bench.values["m2"], rel=0.05)
     assert not found.state.fit.impossible
+
+
+@pytest.mark.parametrize(
+    "ends, away", [((), False), (("m2",), True), (("m2", "delay_s"), False), (("delay_s",), False)]
+)
+def test_a_delay_at_its_bound_is_not_explained_away(ends: tuple[str, ...], away: bool) -> None:
+    """Force and position are not of one sample then: another fit would hide it."""
+    assert runs_away(ends) == away
 
 
 def test_what_a_budget_does_not_allow_is_said() -> None:

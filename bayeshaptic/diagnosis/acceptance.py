@@ -59,8 +59,8 @@ def choose(
 
 
 def possible(trials: list[Trial]) -> list[Trial]:
-    """Those whose fit a device can have; all where none is: see `Fit.impossible`."""
-    return [trial for trial in trials if not trial.state.fit.impossible] or trials
+    """Those in whose fit no mass has run away; all where it has in each: see `Fit.run_away`."""
+    return [trial for trial in trials if not trial.state.fit.run_away] or trials
 
 
 def rivals_of(trials: Sequence[Trial]) -> list[Trial]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -95,6 +95,11 @@ class Fit(Shown):
         return impossible_at_bounds(self.model, ends)
 
     @property
+    def run_away(self) -> bool:
+        """Whether a mass has run away to a bound: see `runs_away`."""
+        return runs_away(self.impossible)
+
+    @property
     def sd(self) -> Floats:
         """Standard deviations, shape (P,); nan for parameters at a bound."""
         return np.sqrt(np.diag(self.covariance))
@@ -151,6 +156,15 @@ class Fit(Shown):
 def impossible_at_bounds(model: Model, ends: Iterable[str]) -> tuple[str, ...]:
     """Which of the parameters that end at a bound no device has there: see `Fit.impossible`."""
     return tuple(n for n in ends if n == "delay_s" or model.parameter(n).dimension == "mass")
+
+
+def runs_away(impossible: Collection[str]) -> bool:
+    """Whether a mass has become the ground, or nothing, of a device that another fit may be like.
+
+    Not where the delay ends at zero as well: force and position are not of one sample then, which
+    no other fit mends, and one without a bound would hide it.
+    """
+    return bool(impossible) and "delay_s" not in impossible
 
 
 def ends_at_bounds(phi: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from bayeshaptic.inference.fit import (
     Fit,
     ends_at_bounds,
     impossible_at_bounds,
+    runs_away,
     search_box,
     summarise,
     weighted_residuals,
@@ -177,8 +178,8 @@ class Optimum:
 
     @property
     def explains(self) -> bool:
-        """Whether it leaves noise, and is one that a device can have."""
-        return self.reduced_chi_square <= MISFIT and not self.impossible
+        """Whether it leaves noise, and no mass has run away."""
+        return self.reduced_chi_square <= MISFIT and not runs_away(self.impossible)
 
 
 def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
@@ -225,7 +226,7 @@ def anew(model: Model, etfe: Etfe, windows: Windows, found: Optimum | None) -> O
     points that no fit has bent led there in nine of ten.  Both in one set crowd each other out.
     Not with dynamic links, of which so many responses would be dear (not measured).  Where more
     than this effect is lacking a valley that is a little deeper is but bent in another way: the far
-    one must halve what is left, or be one that a device can have where `found` is not.
+    one must halve what is left, or have masses where those of `found` ran away.
     """
     if found is not None and found.explains:
         return found

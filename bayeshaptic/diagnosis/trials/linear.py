@@ -97,7 +97,7 @@ class Sight:
 
     @property
     def explains(self) -> bool:
-        """Whether one of them leaves noise, and a device can be like that."""
+        """Whether one of them leaves noise, and no mass has run away in it."""
         return any(one.explains for one in self.optima.values())
 
 
@@ -202,11 +202,11 @@ def _looked_further(sight: Sight, meter: Meter) -> Mapping[int, Optimum]:
     """The optima, also from points that no fit has bent where nothing explains it, until one does.
 
     Whatever explains it was reached from the present fit, and then no way is barred.  From a fit
-    that no device can have, such as one in which a mass has become the ground, hardly any leads on:
-    of such, those that were left aside at first sight are followed as well.
+    in which a mass has run away to be the ground, hardly any leads on: there those that were left
+    aside at first sight are followed as well.
     """
     state, part = sight.state, sight.windows.part(share(sight.windows, FIT))
-    found, bent = sight, bool(state.fit.impossible)
+    found, bent = sight, state.fit.run_away
     for number, one in enumerate(sight.found):
         optimum = sight.optima.get(number)
         if found.explains:
