@@ -27,6 +27,7 @@ from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.signals.filling import _regression
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability import critical_stiffness
 
@@ -272,3 +273,23 @@ def test_sweeps_that_nearly_repeat_are_no_tones(seed: int) -> None:
         )
         band = estimate_etfe(recording).band_hz
         assert len(find_tones(recording, band, rigid.response).tones) == tones
+
+
+@pytest.mark.parametrize("count, force", [(1e-4, True), (1e-4, False), (0.0, True)])
+def test_a_regression_is_that_of_least_squares_whichever_way_it_is_solved(
+    count: float, force: bool
+) -> None:
+    """Behind counts, without a force, and of a motion that its lags foretell to the last digit."""
+    rng = np.random.default_rng(0)
+    push = rng.standard_normal(4000) * force
+    motion = lfilter(*butter(2, 0.04), rng.standard_normal(4000))
+    motion = count * np.round(motion / count) if count else np.sin(0.05 * np.arange(4000.0))
+    rows, lags = np.arange(20, 4000), np.arange(1, 21)
+    design = np.column_stack([motion[rows[:, None] - lags], push[rows[:, None] - lags]])
+    ridge = np.r_[np.zeros(20), np.full(20, 1e-4 * np.linalg.norm(push))]
+    found = _regression(design, motion[rows], ridge)
+    stacked = np.concatenate([design, np.diag(ridge)]), np.r_[motion[rows], np.zeros(40)]
+    best = np.linalg.lstsq(*stacked, rcond=1e-13)[0]
+    # What they foretell is asked for: of lags that say the same the coefficients are anything.
+    assert design @ found == pytest.approx(design @ best, abs=1e-6 * np.std(motion))
+    assert np.isfinite(found).all()

@@ -53,8 +53,9 @@ class _Canvas(FigureCanvasBase):
 class _Vector(RendererSVG):
     """Writes paths to the hundredth of a point, which is enough, and texts as texts.
 
-    A text can be searched for and read out, and is 40 bytes; as outlines it is a kilobyte and a
-    fifth of what a picture costs.  It is as wide as it was laid out whatever font the reader has.
+    A text can be searched for and read out, and is some 150 bytes; as outlines it is a kilobyte,
+    and a fifth of what a picture costs.  It is as wide as it was laid out whatever font the reader
+    has.
     """
 
     def draw_text(
