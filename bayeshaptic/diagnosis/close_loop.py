@@ -87,7 +87,7 @@ def close_loop(
     if force is not None or is_certain(begun.notices):
         return _refused(begun, force, chosen)
     began = time.perf_counter()
-    begun, traced = traced_as_of_the_loop(found, begun, model, chosen.within(0.05, 0.4))
+    begun, traced = traced_as_of_the_loop(begun, model, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
     if traced.verdict == UNEXPLAINED and begun.etfe.through_reference:
         one_mass = _one_mass_instead(measurement, begun, model, chosen)

@@ -176,6 +176,16 @@ def delay_prior(delay_s: float | None, delay_sd_s: float | None, period_s: float
     return Normal(delay_s, delay_sd_s, low=0.0) if delay_sd_s else None
 
 
+def with_unknown_delay(model: Model) -> Model:
+    """A model, with its sampling period, whose loop delay is inferred, whatever was known of it."""
+    assert model.period_s is not None
+    belief = delay_prior(None, None, model.period_s)
+    delay = Parameter("delay_s", *QUANTITIES["delay_s"], prior=belief)
+    others = tuple(p for p in model.parameters if p.name != "delay_s")
+    fixed = {name: value for name, value in model.fixed.items() if name != "delay_s"}
+    return replace(model, parameters=(*others, delay), fixed=fixed)
+
+
 def _build(
     structure: Structure,
     device: str | Device | None,

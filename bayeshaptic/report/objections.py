@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.diagnosis.base.alignment import MOVED
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
 from bayeshaptic.diagnosis.result import Result
@@ -126,6 +127,12 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             "is: force and position may not be of the same sample, so that less delay is seen than "
             "the loop has (a position written down a sample early); say the loop's delay with "
             "--delay-s, also where it is zero"
+        )
+    moved = any(notice.topic == MOVED for notice in analysis.notices)
+    if moved and "delay_s" in analysis.model.names:
+        found.append(
+            "the position was written down before its command acts, and by how many samples only "
+            "the loop's delay would tell: say it with --delay-s, or record again"
         )
     recording = analysis.recording
     if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):

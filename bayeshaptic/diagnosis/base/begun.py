@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from bayeshaptic.devices import Device
+from bayeshaptic.diagnosis.base.alignment import rows_of_one_sample
 from bayeshaptic.diagnosis.base.asked import base_model
 from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
@@ -25,8 +26,12 @@ _MOST_ROUNDS = 8  # fits to what the last one makes of the samples
 
 @dataclass(frozen=True)
 class Begun(Opened):
-    """With a base model fitted to it: what an analysis, or the loop, begins with."""
+    """With a base model fitted to it: what an analysis, or the loop, begins with.
 
+    `measured` is the response as it was measured, `etfe` what the fit makes of that.
+    """
+
+    measured: Etfe
     fit: Fit
     choice: Choice | None
 
@@ -44,9 +49,18 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
         fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
-        begun = Begun(**{**vars(found), "seconds": clock.seconds}, fit=fit, choice=choice)
+        moved = rows_of_one_sample(found, fit)
+        if moved is not None:
+            recording, notice = moved
+            found = opened(recording, model, options)
+            found = replace(found, notices=(*found.notices, notice))
+            fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
+        seconds = {**found.seconds, **clock.seconds}
+        begun = Begun(
+            **{**vars(found), "seconds": seconds}, measured=found.etfe, fit=fit, choice=choice
+        )
         for _ in range(_MOST_ROUNDS):
-            etfe = as_of_the_loop(found.etfe, begun.fit)
+            etfe = as_of_the_loop(begun.measured, begun.fit)
             if hardly_differ(etfe, begun.etfe):
                 break
             begun = refitted(begun, etfe, model, options)

@@ -16,7 +16,6 @@ import numpy as np
 from bayeshaptic.diagnosis.base.begun import Begun, refitted
 from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn
-from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import Choice, ScoredFit, information_criterion
@@ -31,23 +30,20 @@ _OWN = 0.6  # of the budget for the base model that was chosen, where others are
 
 
 def traced_as_of_the_loop(
-    found: Opened, begun: Begun, model: str | Model, options: Options
+    begun: Begun, model: str | Model, options: Options
 ) -> tuple[Begun, Traced]:
     """The loop closed; again where what was found changes what is between the samples.
 
     Parameters
     ----------
-    found : Opened
-        As it was measured.
     begun : Begun
-        With the base model fitted to what that makes of it.
     model : str or Model
         As asked for.
     options : Options
     """
     begun, traced = traced_from_best_base(begun, options)
     for _ in range(_MOST_AGAIN):
-        etfe = as_of_the_loop(found.etfe, traced.state.fit)
+        etfe = as_of_the_loop(begun.measured, traced.state.fit)
         if hardly_differ(etfe, begun.etfe):
             break
         again = refitted(begun, etfe, model, options)

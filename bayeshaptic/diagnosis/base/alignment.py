@@ -1,0 +1,109 @@
+"""Whether force and position of a row are of one sample, as far as the best fit tells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis.base.opened import Opened
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import Model
+from bayeshaptic.models.build import with_unknown_delay
+from bayeshaptic.quantities import pure
+from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+
+MOVED = "rows moved"  # topic of the notice
+# The reduced chi-square with one more sample must fall to this share.
+_FALLS = 0.8
+_SAME = 0.02  # relative difference of reduced chi-squares in one valley
+
+
+def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | None:
+    """The recording with every force beside the position that was read when it was commanded.
+
+    No device answers before it is told to.  Whatever a model lacks, it fits rows that are moved
+    by a sample as well, with a period more of delay.  Rows whose position was written down early
+    it fits far better so, since no delay is less than none.
+
+    Parameters
+    ----------
+    found : Opened
+    fit : Fit
+        Of the base model, to what was opened.
+
+    Returns
+    -------
+    recording : Recording
+        Shorter by the samples that it was moved.
+    notice : Notice
+        That it was.
+
+    None where the rows are as they should be, or nothing tells.
+    """
+    recording = found.etfe.recording
+    if recording is None or not (fit.misfits or fit.impossible) or not _tells(found, recording):
+        return None
+    model, left, early = with_unknown_delay(fit.model), fit.reduced_chi_square, 0
+    while True:
+        after = _left(model, with_rows_moved(recording, early + 1), found, left)
+        if not after < _FALLS * left:
+            break
+        left, early = after, early + 1
+    if early == 0:
+        return None
+    # A delay that was told may be wrong, and of a force that repeats a row less may be a period
+    # less: the same rows as recorded, with whatever delay.
+    as_recorded = _left(model, recording.part(early, recording.samples), found)
+    if not left < _FALLS**early * as_recorded:
+        return None
+    return with_rows_moved(recording, early), _notice(early, as_recorded, left)
+
+
+def with_rows_moved(recording: Recording, early: int) -> Recording:
+    """With the position of each row beside the force of the row `early` samples later."""
+    pieces = recording.pieces
+    ends = np.cumsum([piece.samples - early for piece in pieces])
+    return replace(
+        recording,
+        force=np.concatenate([piece.force[early:] for piece in pieces]),
+        position=np.concatenate([piece.position[:-early] for piece in pieces]),
+        joints=tuple(int(end) for end in ends[:-1]),
+    )
+
+
+def _tells(found: Opened, recording: Recording) -> bool:
+    """Whether the delay of the fit is that of an open loop, from a command to a position."""
+    closed = found.etfe.direct or found.etfe.through_reference or has_feedback(found.notices)
+    return not closed and recording.sensed is None
+
+
+def _left(model: Model, recording: Recording, found: Opened, known: float = np.nan) -> float:
+    """The reduced chi-square of the best fit; `known` is that of rows a sample apart.
+
+    What ends there at once is the same fit with another delay, and not looked for again.
+    """
+    try:
+        etfe = estimate_etfe(recording, found.etfe.band_hz)
+    except InputError:  # of a force that repeats too few periods are left
+        return np.inf
+    fit = least_squares(model, etfe, most_sets=1)
+    if fit.misfits and not abs(fit.reduced_chi_square / known - 1) < _SAME:
+        fit = least_squares(model, etfe)
+    return fit.reduced_chi_square
+
+
+def _notice(early: int, as_recorded: float, left: float) -> Notice:
+    samples = "one sample" if early == 1 else f"{early} samples"
+    text = (
+        f"The position answers {samples} before its command acts: with whatever delay, the best "
+        f"fit leaves a reduced chi-square of {pure(as_recorded)} as recorded, and {pure(left)} "
+        f"with each force beside the position {samples} before it. Everything here is read from "
+        "the rows moved so. Write force and position down at the same moment: the position that "
+        "was read, beside the force that was commanded then."
+    )
+    return Notice("warning", MOVED, text)

@@ -1,0 +1,106 @@
+"""A position written down before its command acts: less delay than none, and a limit too high."""
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.base.alignment import MOVED, rows_of_one_sample, with_rows_moved
+from bayeshaptic.diagnosis.base.opened import opened
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings.join import join_recordings
+from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report.headline import headline
+from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
+
+NOISE = WhiteNoise(0.05, 200.0, 0.7, 10.0)
+
+
+def recorded(
+    bench: Bench, early: int, excitation: WhiteNoise | Multisine = NOISE, seed: int = 3
+) -> Recording:
+    made = simulate(bench, excitation, seed=seed)
+    length = len(made.force) - early
+    return recording_from_arrays(
+        made.force[:length],
+        made.position[early:],
+        bench.period_s,
+        force_unit="Nm",
+        position_unit="rad",
+    )
+
+
+@pytest.mark.parametrize(("delay_s", "status"), [(None, "untrusted"), (150e-6, "caution")])
+def test_rows_are_moved_and_only_a_told_delay_says_by_how_many(
+    delay_s: float | None, status: str
+) -> None:
+    bench = Bench.from_device("phantom")
+    closed = close_loop(recorded(bench, 1), "free", hidden=False, delay_s=delay_s)
+    said = headline(closed)
+    assert said.status == status
+    assert any("written down before" in text or "one sample before" in text for text in _of(said))
+    low, high = closed.analysis.limit.quantile(0.005), closed.analysis.limit.quantile(0.995)
+    assert low < bench.true_critical_stiffness() < high
+
+
+def test_what_the_model_lacks_is_found_in_moved_rows() -> None:
+    # Unmoved this one was explained by five effects, with a stiffness 25 times the limit.
+    bench = Bench.from_device("phantom").with_effect("second_mode", frequency_hz=60.0)
+    closed = close_loop(recorded(bench, 1), "free", hidden=False, delay_s=150e-6)
+    assert [effect.name for effect in closed.effects] == ["second_mode"]
+    stiffness = headline(closed).stiffness
+    assert stiffness is not None and stiffness < bench.true_critical_stiffness()
+
+
+@pytest.mark.parametrize("delay_s", [None, 150e-6, 450e-6])
+def test_rows_of_one_sample_stay_whatever_the_model_lacks_and_was_told(
+    delay_s: float | None,
+) -> None:
+    bench = Bench.from_device("phantom").with_effect("second_mode", frequency_hz=60.0)
+    found = opened(recorded(bench, 0), "free", Options(delay_s=delay_s))
+    model = build_model("free", None, delay_s, period_s=found.etfe.period_s)
+    fit = least_squares(model, found.etfe)
+    assert fit.misfits
+    assert rows_of_one_sample(found, fit) is None
+
+
+def test_two_samples_are_two() -> None:
+    found = opened(recorded(Bench.from_device("phantom"), 2), "free", Options())
+    fit = least_squares(build_model("free", period_s=found.etfe.period_s), found.etfe)
+    moved = rows_of_one_sample(found, fit)
+    assert moved is not None
+    recording, notice = moved
+    assert recording.samples == found.etfe.recording.samples - 2  # type: ignore[union-attr]
+    assert notice.topic == MOVED and "2 samples before" in notice.text
+
+
+def test_a_period_less_of_a_force_that_repeats_is_no_better_fit() -> None:
+    # It begins at rest: the first of its periods is unlike the other, and a row less drops it.
+    bench = Bench.from_device("phantom").with_effect("coulomb_friction", force=0.005)
+    found = opened(recorded(bench, 0, Multisine(0.05, 2.0, 150.0, 2.0, 2)), "free", Options())
+    fit = least_squares(build_model("free", period_s=found.etfe.period_s), found.etfe)
+    assert fit.misfits
+    assert rows_of_one_sample(found, fit) is None
+
+
+def test_a_force_that_repeats_shows_it_as_well() -> None:
+    bench = Bench.from_device("phantom")
+    found = opened(recorded(bench, 1, Multisine(0.05, 2.0, 150.0, 2.0, 6)), "free", Options())
+    fit = least_squares(build_model("free", period_s=found.etfe.period_s), found.etfe)
+    moved = rows_of_one_sample(found, fit)
+    assert moved is not None and "one sample before" in moved[1].text
+
+
+def test_every_piece_is_moved_by_itself() -> None:
+    counts = np.arange(600.0)
+    one = recording_from_arrays(counts, 2 * counts, 1e-3, force_unit="N", position_unit="m")
+    moved = with_rows_moved(join_recordings([one, one]), 2)
+    assert moved.joints == (598,) and moved.samples == 1196
+    for piece in moved.pieces:
+        assert np.array_equal(2 * piece.force, piece.position + 4)
+
+
+def _of(said: object) -> tuple[str, ...]:
+    return (said.sentence, *said.details)  # type: ignore[attr-defined]
