@@ -1,18 +1,20 @@
 """Closing the loop on recordings it has never seen: names, classes, and the truth of K_CR.
 
     python -m benchmarks.blind [--each N] [--others N] [--clean N] [--pairs N] [--seed S]
-        [--known file|delay|nothing] [--drawn]
+        [--known file|delay|nothing] [--drawn] [--early N]
 
-Recordings come from the virtual bench, which shares no code with the models.  The base model is
-the device as declared, without the effect.  Strengths are the bench's typical ones, fixed by the
-device's motion; with --drawn devices, sizes and lengths are random.  --known says what the analysis
+Recordings come from the virtual bench, which shares no code with the models. The base model is the
+device as declared, without the effect. Strengths are the bench's typical ones, fixed by the
+device's motion; with --drawn devices, sizes and lengths are random. --known says what the analysis
 is told: the device's file; or the model, the delay and the encoder alone; or nothing but the
-encoder (then it chooses the model itself).  Printed for every effect: "clear", the largest test of
-the base model's residual over its threshold, in the recording where that is least (of clean ones:
-where it is most; an effect is clear from three times that on); how often the class and the name (or
-a declared tie that holds it) are right; the error of K_CR's median in dB; how often its 90 %
-interval covers the truth before and after the loop is closed; and the largest error of the effect's
-own size.
+encoder (then it chooses the model itself). --early N writes each position down N samples before its
+command acts, as a logger does that reads it after the next command. Printed for every effect:
+"clear", the largest test of the base model's residual over its threshold, in the recording where
+that is least (of clean ones: where it is most; an effect is clear from three times that on); how
+often the class and the name (or a declared tie that holds it) are right; the error of K_CR's median
+in dB; how often its 90 % interval covers the truth before and after the loop is closed; and the
+largest error of the effect's own size. Below: what was missed, and recommended stiffnesses above
+the truth.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
+from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench
 from benchmarks.recordings.blind import (
     CASES,
@@ -66,14 +69,19 @@ class Outcome:
     seconds: float
     clear: float
     size_error: float | None
+    stiffness: float | None
 
 
-def run(job: Job, known: str) -> Outcome:
+def run(job: Job, known: str, early: int = 0) -> Outcome:
     """Simulate, close the loop, compare."""
     warnings.simplefilter("ignore")
     device, held = CASES[job.case]
     bench = bench_of(job)
     recording = recorded(bench, seconds_of(job), job.seed)
+    if early:
+        recording = replace(
+            recording, force=recording.force[:-early], position=recording.position[early:]
+        )
     truth = bench.true_critical_stiffness()
     declared = "grasped" if held else "free"
     told = {
@@ -86,6 +94,7 @@ def run(job: Job, known: str) -> Outcome:
     closed = close_loop(recording, model, options, seed=job.seed)
     took = time.process_time() - began
     before, after = (e["critical_stiffness"] for e in (closed.before, closed.after))
+    stiffness = headline(closed).stiffness
     return Outcome(
         job,
         closed.verdict,
@@ -101,6 +110,7 @@ def run(job: Job, known: str) -> Outcome:
         took,
         max(test.excess for test in closed.traced.before),
         _size_error(bench, closed),
+        None if stiffness is None else stiffness / truth,
     )
 
 
@@ -118,10 +128,10 @@ def _db(value: float, truth: float) -> float:
     return float(20 * np.log10(max(value, 1e-12) / truth))
 
 
-def attempt(job: Job, known: str) -> Outcome | str:
+def attempt(job: Job, known: str, early: int) -> Outcome | str:
     """The outcome, or why the recording was refused."""
     try:
-        return run(job, known)
+        return run(job, known, early)
     except InputError as error:
         return f"  {job.case}, {', '.join(job.effects)}, seed {job.seed}: refused: {error}"
 
@@ -144,7 +154,7 @@ def main() -> None:
     sums: dict[str, list[Outcome]] = {"listed": [], "others": [], "pairs": []}
     with ProcessPoolExecutor(chosen.workers) as pool:
         flat = [job for jobs in groups.values() for job in jobs]
-        tell = partial(attempt, known=chosen.known)
+        tell = partial(attempt, known=chosen.known, early=chosen.early)
         results = iter(pool.map(tell, flat))  # rows are printed as their recordings are done
         for name, jobs in groups.items():
             answers = [next(results) for _ in jobs]
@@ -170,6 +180,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=90_000)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--known", choices=("file", "delay", "nothing"), default="file")
+    parser.add_argument("--early", type=int, default=0, help="samples that a position is early")
     parser.add_argument("--drawn", action="store_true", help="random devices, sizes and lengths")
     return parser.parse_args()
 
@@ -186,15 +197,22 @@ def _print_failures(every: list[Outcome], refused: list[str]) -> None:
     print(f"class or name missed: {len(missed)} of {len(every)}")
     for o in missed:
         print(
-            f"  {o.job.case}, {', '.join(o.job.effects)}, seed {o.job.seed}: {o.verdict}, "
-            f"{', '.join(o.found) or 'nothing'}, K_CR {o.error_db:+.2f} dB"
+            f"  {_of(o)}: {o.verdict}, {', '.join(o.found) or 'nothing'}, K_CR {o.error_db:+.2f} dB"
         )
     unsafe = [o for o in every if o.error_db > 1.5 and o.verdict != UNKNOWN]
     print(f"median over 1.5 dB too high and not called unexplained: {len(unsafe)} of {len(every)}")
     for o in unsafe:
-        print(
-            f"  {o.job.case}, {', '.join(o.job.effects)}, seed {o.job.seed}: {o.error_db:+.2f} dB"
-        )
+        print(f"  {_of(o)}: {o.error_db:+.2f} dB")
+    stated = [o for o in every if o.stiffness is not None]
+    above = [o for o in stated if o.stiffness is not None and o.stiffness > 1]
+    print(f"recommended stiffnesses: {len(stated)}, above the truth: {len(above)}")
+    for o in above:
+        print(f"  {_of(o)}: {o.stiffness:.4f} times")
+
+
+def _of(outcome: Outcome) -> str:
+    job = outcome.job
+    return f"{job.case}, {', '.join(job.effects)}, seed {job.seed}"
 
 
 def _row(name: str, outcomes: list[Outcome]) -> str:

@@ -93,6 +93,27 @@ def test_a_force_that_repeats_shows_it_as_well() -> None:
     assert moved is not None and "one sample before" in moved[1].text
 
 
+@pytest.mark.parametrize(("late", "delay_s", "noted"), [(1, 150e-6, True), (0, 50e-6, False)])
+def test_a_whole_period_more_than_was_told_may_be_the_logger(
+    late: int, delay_s: float, noted: bool
+) -> None:
+    bench = Bench.from_device("phantom")
+    made = simulate(bench, NOISE, seed=3)
+    length = len(made.force) - late
+    recording = recording_from_arrays(
+        made.force[late:],
+        made.position[:length],
+        bench.period_s,
+        force_unit="Nm",
+        position_unit="rad",
+    )
+    closed = close_loop(recording, "free", hidden=False, delay_s=delay_s)
+    assert [effect.name for effect in closed.effects] == ["extra_delay"]
+    told = [n for n in closed.analysis.notices if "written down one sample late" in n.text]
+    assert bool(told) == noted
+    assert headline(closed).status == "safe"
+
+
 def test_every_piece_is_moved_by_itself() -> None:
     counts = np.arange(600.0)
     one = recording_from_arrays(counts, 2 * counts, 1e-3, force_unit="N", position_unit="m")

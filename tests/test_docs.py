@@ -12,6 +12,7 @@ import pytest
 
 import bayeshaptic
 from bayeshaptic.cli import build_parser, main
+from bayeshaptic.diagnosis.base.alignment import MOVED
 from bayeshaptic.faq import entries, entry
 
 ROOT = Path(__file__).parents[1]
@@ -163,7 +164,7 @@ def test_every_warning_has_an_entry() -> None:
         for call in calls
         if len(call.args) > 2 and isinstance(call.args[1], ast.Constant)
     }
-    topics |= {"a person not yet seen", "device limit"}  # "No {part}: why" of a study
+    topics |= {"a person not yet seen", "device limit", MOVED}  # "No {part}: why" of a study
     assert {"feedback", "units", "misfit", "not steady"} <= topics
     for topic in sorted(topics):
         assert topic in entry(topic).title.split(", ") and entry(topic).paragraphs

@@ -534,8 +534,40 @@ def test_an_angle_that_begins_again_after_a_turn_is_counted_on(low: float) -> No
     read = recording_from_arrays(force, within, period_s=1e-3, position_unit="rad")
     np.testing.assert_allclose(read.position - read.position[0], angle - angle[0], atol=1e-9)
     assert any("jumps by a turn" in notice.text for notice in read.notices)
-    metres = recording_from_arrays(force, within, period_s=1e-3, position_unit="m")
-    np.testing.assert_array_equal(metres.position, within)
+    with pytest.raises(InputError, match="from one end of its range to the other, by some 6"):
+        recording_from_arrays(force, within, period_s=1e-3, position_unit="m")
+
+
+@pytest.mark.parametrize("encoder_resolution", [None, 2e-6])
+def test_a_counter_that_begins_again_is_counted_on(encoder_resolution: float | None) -> None:
+    rng = np.random.default_rng(5)
+    force = rng.normal(size=4000)
+    rows = np.arange(4000)
+    counts = np.round(4000 * np.sin(rows / 40) + 20 * rows + np.cumsum(force))
+    within = 2e-6 * (counts % 2**16)
+    read = recording_from_arrays(
+        force,
+        within,
+        period_s=1e-3,
+        position_unit="m",
+        encoder_resolution=encoder_resolution,
+    )
+    moved = read.position - read.position[0]
+    np.testing.assert_allclose(moved, 2e-6 * (counts - counts[0]), atol=1e-12)
+    assert any("a counter of 16 bits" in notice.text for notice in read.notices)
+
+
+def test_a_position_that_jumps_elsewhere_is_as_it_was() -> None:
+    """A new zero, a reading that falls out, and an encoder with as few counts as a step has."""
+    rng = np.random.default_rng(8)
+    force, way = rng.normal(size=2000), np.cumsum(rng.normal(size=2000))
+    new_zero, fallen = way.copy(), way.copy()
+    new_zero[900:] += 5 * np.ptp(way)
+    fallen[700] = -9 * np.ptp(way)
+    few = np.round(np.sin(np.arange(2000) / 50))
+    for kept in (new_zero, fallen, few):
+        read = recording_from_arrays(force, kept, period_s=1e-3, position_unit="m")
+        np.testing.assert_array_equal(read.position, kept)
 
 
 def test_an_angle_that_does_not_begin_again_is_as_it_was() -> None:

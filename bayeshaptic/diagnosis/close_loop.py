@@ -12,6 +12,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.analyse import finish, without_sampling
 from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.diagnosis.base.alignment import perhaps_late
 from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
@@ -114,7 +115,7 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
         )
     limit, traced = with_rivals(analysis.limit, traced, seed)
     limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, seed)
-    notices = analysis.notices + traced.notices
+    notices = analysis.notices + traced.notices + perhaps_late(state.fit)
     if state.etfe.through_reference:
         notices += mode_above_band(state.fit, state.etfe, analysis.limit)
     if (noise := noise_besides(state.fit, state.etfe)) is not None:

@@ -164,7 +164,8 @@ def recording_from_arrays(
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
     timing = sampling_period(stamps, period_s, where)
     unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind)
-    position, notices = unwrapped(position) if unit_of_position == "rad" else (position, ())
+    angle = unit_of_position == "rad"
+    position, notices = unwrapped(position, angle, encoder_resolution, where)
     if timing.rows is not None:
         from bayeshaptic.recordings.signals.gaps import put_back
 

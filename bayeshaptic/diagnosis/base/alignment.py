@@ -6,21 +6,44 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.base.opened import Opened
+from bayeshaptic.diagnosis.base.opened import Opened, opened
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model
 from bayeshaptic.models.build import with_unknown_delay
-from bayeshaptic.quantities import pure
+from bayeshaptic.quantities import percent, pure
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 
 MOVED = "rows moved"  # topic of the notice
 # The reduced chi-square with one more sample must fall to this share.
-_FALLS = 0.8
+_FALLS = 0.9
+_WHOLE = 0.05  # of a period: so near to whole ones is one delay in ten
+_LATER = "extra_delay_s"
 _SAME = 0.02  # relative difference of reduced chi-squares in one valley
+
+
+def realigned(found: Opened, fit: Fit, model: str | Model, options: Options) -> Opened | None:
+    """What was opened, with rows of one sample; None where they are, or nothing tells.
+
+    Parameters
+    ----------
+    found : Opened
+    fit : Fit
+        Of a model to what was opened, with linear effects or without.
+    model : str or Model
+        As asked for.
+    options : Options
+    """
+    moved = rows_of_one_sample(found, fit)
+    if moved is None:
+        return None
+    recording, notice = moved
+    again = opened(recording, model, options)
+    return replace(again, notices=(*again.notices, notice))
 
 
 def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | None:
@@ -34,7 +57,7 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
     ----------
     found : Opened
     fit : Fit
-        Of the base model, to what was opened.
+        Of a model to what was opened.
 
     Returns
     -------
@@ -74,6 +97,31 @@ def with_rows_moved(recording: Recording, early: int) -> Recording:
         position=np.concatenate([piece.position[:-early] for piece in pieces]),
         joints=tuple(int(end) for end in ends[:-1]),
     )
+
+
+def perhaps_late(fit: Fit) -> tuple[Notice, ...]:
+    """That a delay beyond the told one is whole periods, as of a position written down late.
+
+    Parameters
+    ----------
+    fit : Fit
+        With what was found.
+    """
+    if _LATER not in fit.model.names or fit.model.period_s is None:
+        return ()
+    place = fit.model.names.index(_LATER)
+    periods, sd = fit.theta[place] / fit.model.period_s, fit.sd[place] / fit.model.period_s
+    late = round(periods)
+    if late < 1 or not abs(periods - late) + sd < _WHOLE:
+        return ()
+    what = "one sampling period" if late == 1 else f"{late} sampling periods"
+    samples = "one sample" if late == 1 else f"{late} samples"
+    text = (
+        f"The delay beyond the one that was told is {what}, to {percent(_WHOLE)}: a position that "
+        f"was written down {samples} late looks just like that. If it was, the loop itself has no "
+        "such delay and a higher limit: write force and position down at the same moment."
+    )
+    return (Notice("note", "alignment", text),)
 
 
 def _tells(found: Opened, recording: Recording) -> bool:

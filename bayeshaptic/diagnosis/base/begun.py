@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from bayeshaptic.devices import Device
-from bayeshaptic.diagnosis.base.alignment import rows_of_one_sample
+from bayeshaptic.diagnosis.base.alignment import realigned
 from bayeshaptic.diagnosis.base.asked import base_model
 from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
@@ -49,12 +49,9 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
         fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
-        moved = rows_of_one_sample(found, fit)
-        if moved is not None:
-            recording, notice = moved
-            found = opened(recording, model, options)
-            found = replace(found, notices=(*found.notices, notice))
-            fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
+        again = realigned(found, fit, model, options)
+        if again is not None:
+            return fitted(again, model, options)
         seconds = {**found.seconds, **clock.seconds}
         begun = Begun(
             **{**vars(found), "seconds": seconds}, measured=found.etfe, fit=fit, choice=choice

@@ -8,23 +8,25 @@ compared with their effects.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.diagnosis.base.begun import Begun, refitted
+from bayeshaptic.diagnosis.base.alignment import realigned
+from bayeshaptic.diagnosis.base.begun import Begun, fitted, refitted
 from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import Choice, ScoredFit, information_criterion
-from bayeshaptic.inference.fit import MISFIT
+from bayeshaptic.inference.fit import MISFIT, Fit
 from bayeshaptic.models import Model
 
 # Differences of BIC: evidence "not worth more than a bare mention", and "very strong" evidence
 # (R. E. Kass and A. E. Raftery, JASA 90, 1995).
 _BARE_MENTION, _VERY_STRONG = 2.0, 10.0
+_SEVERAL = 2  # linear effects: one is no sign that rows are not of one sample
 _MOST_AGAIN = 2  # times that the loop is closed again
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
 
@@ -34,6 +36,9 @@ def traced_as_of_the_loop(
 ) -> tuple[Begun, Traced]:
     """The loop closed; again where what was found changes what is between the samples.
 
+    And where an effect that was found shows that force and position are not of one sample, which
+    others were added for then: what it does had hidden that.
+
     Parameters
     ----------
     begun : Begun
@@ -42,6 +47,10 @@ def traced_as_of_the_loop(
     options : Options
     """
     begun, traced = traced_from_best_base(begun, options)
+    for fit in _on_the_way(traced):
+        again = realigned(begun, fit, model, options)
+        if again is not None:
+            return traced_as_of_the_loop(fitted(again, model, options), model, options)
     for _ in range(_MOST_AGAIN):
         etfe = as_of_the_loop(begun.measured, traced.state.fit)
         if hardly_differ(etfe, begun.etfe):
@@ -49,6 +58,15 @@ def traced_as_of_the_loop(
         again = refitted(begun, etfe, model, options)
         begun, traced = traced_from_best_base(again, options)
     return begun, traced
+
+
+def _on_the_way(traced: Traced) -> Iterator[Fit]:
+    """The fits with some of the linear effects, where one was not enough."""
+    if len(traced.state.model.effects) < _SEVERAL:
+        return
+    for state in traced.path[1:]:
+        if len(state.accepted) == len(state.model.effects):
+            yield state.fit
 
 
 def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced]:

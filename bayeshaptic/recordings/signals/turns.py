@@ -1,37 +1,111 @@
-"""Angles that begin again after a turn: those of absolute encoders, compasses and arctangents."""
+"""Positions that begin again: angles after a turn, and counters after their last count."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from bayeshaptic.errors import Notice
-from bayeshaptic.types import Floats
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.types import Bools, Floats
 
 _TURN = 2 * np.pi
 # How far from a turn a jump may be, in fast steps elsewhere: what moves goes on across it.
 _STEPS = 5.0
+_OF_RANGE = 0.05  # such steps are smaller than this share of the range
+_FEWEST_BITS = 6  # of a counter
 
 
-def unwrapped(angle: Floats) -> tuple[Floats, tuple[Notice, ...]]:
-    """The angle in rad without its jumps by a turn, and a note of them; as it was without any.
+def unwrapped(
+    position: Floats, angle: bool, encoder_resolution: float | None, where: str
+) -> tuple[Floats, tuple[Notice, ...]]:
+    """The position without its jumps from one end to the other, and a note of them.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N,)
+    angle : bool
+        Whether it is one, in rad.
+    encoder_resolution : float or None
+    where : str
+        How messages begin.
+
+    Raises
+    ------
+    InputError
+        Where it jumps as a counter does, by what is neither a turn nor a power of two counts.
+    """
+    steps = np.diff(position)
+    if angle and (jumps := _by_a_turn(position, steps)) is not None:
+        return np.unwrap(position), (_note("The angle jumps by a turn", jumps),)
+    found = _from_end_to_end(position, steps)
+    if found is None:
+        return position, ()
+    jumps, size, most = found
+    count = encoder_resolution or increment_unit(position)
+    bits = round(math.log2(size / count)) if count else 0
+    if count is None or bits < _FEWEST_BITS or abs(2**bits * count - size) > most:
+        raise InputError(
+            f"{where}: the position jumps {_times(jumps)} from one end of its range to the other, "
+            f"by some {size:.4g}, the first time at {_first(jumps)}, as a counter does that begins "
+            "again; count on across the jumps first (numpy.unwrap with its period), or leave out "
+            "what lies beyond",
+            topic="columns",
+        )
+    text = f"The position jumps by {2**bits:,} counts, as a counter of {bits} bits does,"
+    return np.unwrap(position, period=2**bits * count), (_note(text, jumps),)
+
+
+def _by_a_turn(angle: Floats, steps: Floats) -> Bools | None:
+    """Where an angle jumps by a turn; None without any such jump.
 
     Jumps are by a turn where the angle stays within one, nothing else jumps by half of one, and
     what is left of each without the turn is a step as elsewhere. No device turns by half a turn
     between two samples: a reading that falls out does, and comes back by the same way.
     """
-    steps = np.diff(angle)
     jumps = np.abs(steps) > _TURN / 2
     if not jumps.any() or jumps.all():
-        return angle, ()
-    moves = np.abs(steps[~jumps & (steps != 0)])
-    most = _STEPS * float(np.quantile(moves, 0.95)) if len(moves) else 0.0
+        return None
+    most = _most(steps[~jumps])
     left = np.abs(steps[jumps] - _TURN * np.sign(steps[jumps]))
-    if np.ptp(angle) > _TURN + most or left.max() > most:
-        return angle, ()
-    count = int(np.count_nonzero(jumps))
-    where = f"row {int(np.flatnonzero(jumps)[0]) + 2}"
+    return None if np.ptp(angle) > _TURN + most or left.max() > most else jumps
+
+
+def _from_end_to_end(position: Floats, steps: Floats) -> tuple[Bools, float, float] | None:
+    """Where a position jumps over all of its range, by how much, and what steps are elsewhere.
+
+    A reading that falls out leaves from anywhere, and a new zero leads anywhere.
+    """
+    span = float(np.ptp(position))
+    jumps = np.abs(steps) > span / 2
+    if not jumps.any():
+        return None
+    most = _most(steps[~jumps])
+    ends = np.stack([position[:-1][jumps], position[1:][jumps]])
+    apart = np.minimum(ends - position.min(), position.max() - ends)
+    if not 0 < most < _OF_RANGE * span or apart.max() > most:
+        return None
+    return jumps, float(np.median(np.abs(steps[jumps]))), most
+
+
+def _most(steps: Floats) -> float:
+    """How far a fast step goes; zero where nothing moves."""
+    moves = np.abs(steps[steps != 0])
+    return _STEPS * float(np.quantile(moves, 0.95)) if len(moves) else 0.0
+
+
+def _note(what: str, jumps: Bools) -> Notice:
     text = (
-        f"The angle jumps by a turn {'once' if count == 1 else f'{count} times'}, the first time "
-        f"at {where}: it was counted on across it."
+        f"{what} {_times(jumps)}, the first time at {_first(jumps)}: it was counted on across it."
     )
-    return np.unwrap(angle), (Notice("note", "columns", text),)
+    return Notice("note", "columns", text)
+
+
+def _times(jumps: Bools) -> str:
+    count = int(np.count_nonzero(jumps))
+    return "once" if count == 1 else f"{count} times"
+
+
+def _first(jumps: Bools) -> str:
+    return f"row {int(np.flatnonzero(jumps)[0]) + 2}"
