@@ -183,6 +183,8 @@ def test_a_coarser_encoder_and_another_period_than_the_device_file_says() -> Non
     (notice,) = check_recording(coarse, lhifam)
     assert (notice.level, notice.topic) == ("note", "resolution")
     assert topics(check_recording(held(), replace(lhifam, period_s=2e-3))) == ["period"]
+    (notice,) = check_recording(held(), replace(lhifam, period_s=held().period_s / 4))
+    assert notice.topic == "period" and "one sample in 4 was written down" in notice.text
 
 
 def test_feedback_is_warned_of() -> None:

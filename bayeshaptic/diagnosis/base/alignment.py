@@ -19,7 +19,8 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 
 MOVED = "rows moved"  # topic of the notice
-# The reduced chi-square with one more sample must fall to this share.
+# The reduced chi-square must fall to this share; rows of one sample hardly change it. How many of
+# those are moved nevertheless: docs/door.md.
 _FALLS = 0.9
 _WHOLE = 0.05  # of a period: so near to whole ones is one delay in ten
 _LATER = "extra_delay_s"
@@ -71,20 +72,21 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
     recording = found.etfe.recording
     if recording is None or not (fit.misfits or fit.impossible) or not _tells(found, recording):
         return None
-    model, left, early = with_unknown_delay(fit.model), fit.reduced_chi_square, 0
+    model, best, early = _with_any_delay(fit.model), fit, 0
     while True:
-        after = _left(model, with_rows_moved(recording, early + 1), found, left)
-        if not after < _FALLS * left:
+        moved = _best(model, with_rows_moved(recording, early + 1), found, best)
+        if moved is None or not _falls(moved, best):
             break
-        left, early = after, early + 1
-    if early == 0:
+        best, early = moved, early + 1
+    if early == 0 or not _delay_s(best) < early * recording.period_s:
         return None
     # A delay that was told may be wrong, and of a force that repeats a row less may be a period
     # less: the same rows as recorded, with whatever delay.
-    as_recorded = _left(model, recording.part(early, recording.samples), found)
-    if not left < _FALLS**early * as_recorded:
+    as_recorded = _best(model, recording.part(early, recording.samples), found)
+    if as_recorded is None or not _falls(best, as_recorded):
         return None
-    return with_rows_moved(recording, early), _notice(early, as_recorded, left)
+    notice = _notice(early, as_recorded.reduced_chi_square, best.reduced_chi_square)
+    return with_rows_moved(recording, early), notice
 
 
 def with_rows_moved(recording: Recording, early: int) -> Recording:
@@ -130,19 +132,38 @@ def _tells(found: Opened, recording: Recording) -> bool:
     return not closed and recording.sensed is None
 
 
-def _left(model: Model, recording: Recording, found: Opened, known: float = np.nan) -> float:
-    """The reduced chi-square of the best fit; `known` is that of rows a sample apart.
+def _with_any_delay(model: Model) -> Model:
+    """The model with a delay that is inferred, whatever was known of it or added to it."""
+    for effect in model.effects:
+        if any(parameter.name == _LATER for parameter in effect.parameters):
+            model = model.without_effect(effect)
+    return with_unknown_delay(model)
+
+
+def _best(
+    model: Model, recording: Recording, found: Opened, known: Fit | None = None
+) -> Fit | None:
+    """The best fit, None where there is no response; `known` is that of rows a sample apart.
 
     What ends there at once is the same fit with another delay, and not looked for again.
     """
     try:
         etfe = estimate_etfe(recording, found.etfe.band_hz)
     except InputError:  # of a force that repeats too few periods are left
-        return np.inf
+        return None
     fit = least_squares(model, etfe, most_sets=1)
-    if fit.misfits and not abs(fit.reduced_chi_square / known - 1) < _SAME:
+    there = np.nan if known is None else known.reduced_chi_square
+    if fit.misfits and not abs(fit.reduced_chi_square / there - 1) < _SAME:
         fit = least_squares(model, etfe)
-    return fit.reduced_chi_square
+    return fit
+
+
+def _falls(after: Fit, before: Fit) -> bool:
+    return after.reduced_chi_square < _FALLS * before.reduced_chi_square
+
+
+def _delay_s(fit: Fit) -> float:
+    return float(fit.theta[fit.model.names.index("delay_s")])
 
 
 def _notice(early: int, as_recorded: float, left: float) -> Notice:

@@ -117,10 +117,17 @@ def _period(recording: Recording, device: Device | None) -> list[Notice]:
             "with the speed."
         )
         notices.append(Notice("warning", "time stamps", text))
-    if device is not None and device.period_s and abs(period / device.period_s - 1) > 0.01:
-        text = (
-            f"The recording's period is {period:g} s, the device's {device.period_s:g} s; K_CR "
-            "is that of a loop with the recording's period."
+    if device is None or not device.period_s or abs(period / device.period_s - 1) <= 0.01:
+        return notices
+    text = (
+        f"The recording's period is {period:g} s, the device's {device.period_s:g} s; K_CR is that "
+        "of a loop with the recording's period."
+    )
+    every = round(period / device.period_s)
+    if every > 1 and abs(period / device.period_s / every - 1) <= 0.01:
+        text += (
+            f" If the loop ran with the device's, one sample in {every} was written down: then the "
+            "forces between are missing, and nothing of this is true; write every sample down."
         )
-        notices.append(Notice("warning", "period", text))
+    notices.append(Notice("warning", "period", text))
     return notices
