@@ -70,7 +70,7 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
     None where the rows are as they should be, or nothing tells.
     """
     recording = found.etfe.recording
-    if recording is None or not (fit.misfits or fit.impossible) or not _tells(found, recording):
+    if recording is None or not fit.misfits or not _tells(found, recording):
         return None
     model, best, early = _with_any_delay(fit.model), fit, 0
     while True:
@@ -81,9 +81,9 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
     if early == 0 or not _delay_s(best) < early * recording.period_s:
         return None
     # A delay that was told may be wrong, and of a force that repeats a row less may be a period
-    # less: the same rows as recorded, with whatever delay.
+    # less: the same rows as recorded, with whatever delay, must leave more than noise.
     as_recorded = _best(model, recording.part(early, recording.samples), found)
-    if as_recorded is None or not _falls(best, as_recorded):
+    if as_recorded is None or not as_recorded.misfits or not _falls(best, as_recorded):
         return None
     notice = _notice(early, as_recorded.reduced_chi_square, best.reduced_chi_square)
     return with_rows_moved(recording, early), notice
