@@ -13,8 +13,10 @@ from bayeshaptic.types import Bools, Floats
 _TURN = 2 * np.pi
 # How far from a turn a jump may be, in fast steps elsewhere: what moves goes on across it.
 _STEPS = 5.0
-_OF_RANGE = 0.05  # such steps are smaller than this share of the range
+_OF_RANGE = 0.02  # five such steps are less than this share of the range
 _FEWEST_BITS = 6  # of a counter
+_FEWEST_STEPS = 100  # that tell what usual ones are
+_FEWEST_JUMPS = 3  # fewer may lead from one place of work to another
 
 
 def unwrapped(
@@ -34,7 +36,7 @@ def unwrapped(
     Raises
     ------
     InputError
-        Where it jumps as a counter does, by what is neither a turn nor a power of two counts.
+        Where it jumps so again and again, by what is neither a turn nor a power of two counts.
     """
     steps = np.diff(position)
     if angle and (jumps := _by_a_turn(position, steps)) is not None:
@@ -44,17 +46,24 @@ def unwrapped(
         return position, ()
     jumps, size, most = found
     count = encoder_resolution or increment_unit(position)
-    bits = round(math.log2(size / count)) if count else 0
-    if count is None or bits < _FEWEST_BITS or abs(2**bits * count - size) > most:
-        raise InputError(
-            f"{where}: the position jumps {_times(jumps)} from one end of its range to the other, "
-            f"by some {size:.4g}, the first time at {_first(jumps)}, as a counter does that begins "
-            "again; count on across the jumps first (numpy.unwrap with its period), or leave out "
-            "what lies beyond",
-            topic="columns",
-        )
-    text = f"The position jumps by {2**bits:,} counts, as a counter of {bits} bits does,"
-    return np.unwrap(position, period=2**bits * count), (_note(text, jumps),)
+    if count is not None and (bits := _bits(size / count, most / count)):
+        text = f"The position jumps by {2**bits:,} counts, as a counter of {bits} bits does,"
+        return np.unwrap(position, period=2**bits * count), (_note(text, jumps),)
+    if np.count_nonzero(jumps) < _FEWEST_JUMPS:
+        return position, ()
+    raise InputError(
+        f"{where}: the position jumps {_times(jumps)} from one end of its range to the other, by "
+        f"some {size:.4g}, the first time at {_first(jumps)}, as a counter does that begins again; "
+        "count on across the jumps first (numpy.unwrap with its period), or leave out what lies "
+        "beyond",
+        topic="columns",
+    )
+
+
+def _bits(counts: float, most: float) -> int:
+    """Of the counter that jumps by so many counts, up to `most`; 0 where none does."""
+    bits = round(math.log2(counts))
+    return bits if bits >= _FEWEST_BITS and abs(2**bits - counts) < most else 0
 
 
 def _by_a_turn(angle: Floats, steps: Floats) -> Bools | None:
@@ -77,6 +86,8 @@ def _from_end_to_end(position: Floats, steps: Floats) -> tuple[Bools, float, flo
 
     A reading that falls out leaves from anywhere, and a new zero leads anywhere.
     """
+    if np.count_nonzero(steps) < _FEWEST_STEPS:
+        return None
     span = float(np.ptp(position))
     jumps = np.abs(steps) > span / 2
     if not jumps.any():
