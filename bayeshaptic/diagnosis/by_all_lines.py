@@ -18,7 +18,7 @@ from bayeshaptic.diagnosis.closed import Closed, limit_alone
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
-from bayeshaptic.diagnosis.trials.any_loop import trace_in_any_loop, untraced
+from bayeshaptic.diagnosis.trials.all_lines import trace_by_all_lines, untraced
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
@@ -55,7 +55,7 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
     if not one_mass:
         trying, meter = options.within(0.3, 0.5), Meter(options.budget_s * RATE)
         with counting(meter):
-            traced = trace_in_any_loop(
+            traced = trace_by_all_lines(
                 traced, meter, lambda title: trying.report(0.5, f"trying {title}")
             )
     tracing_s = time.perf_counter() - began

@@ -45,7 +45,7 @@ def untraced(state: State, tests: tuple[Test, ...]) -> Traced:
     return Traced(*acceptance.verdict_of((), tests), state, tests, tests, path=(state,))
 
 
-def trace_in_any_loop(traced: Traced, meter: Meter, tick: Tick | None = None) -> Traced:
+def trace_by_all_lines(traced: Traced, meter: Meter, tick: Tick | None = None) -> Traced:
     """What is left explained by effects, if they leave noise, or next to it; otherwise as it is.
 
     Parameters
