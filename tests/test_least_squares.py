@@ -250,3 +250,12 @@ def test_valleys_where_several_starts_end_are_kept_beside_the_best():
     cost = np.array([10.0, 50.0, 50.4, 200.0, 90.2, 90.0, 90.5])
     np.testing.assert_array_equal(_other_valleys(ended, cost), [[5.01], [2.0]])
     assert _other_valleys(ended[:1], cost[:1]).shape == (0, 1)
+
+
+def test_a_mode_above_half_the_sampling_rate_is_found() -> None:
+    # A small motor on a stiff transmission: its mode, at 884 Hz, looks like one of 116 Hz.
+    values = {"m1": 0.05, "b1": 0.08, "bc": 6.3, "kc": 1.53e6, "m2": 6.5, "b2": 4.8}
+    bench = replace(Bench.from_device("lhifam"), values=values)
+    fit = least_squares(free(), measure(bench, seed=5, seconds=20.0))
+    assert not fit.misfits
+    assert fit.theta[fit.model.names.index("kc")] == pytest.approx(1.53e6, rel=0.01)

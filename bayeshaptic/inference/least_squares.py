@@ -62,7 +62,8 @@ def least_squares(
     The residual of every window is weighted by the noise that the window itself shows; priors only
     bound the search (at six standard deviations).  The windows are compressed anew around each
     fit, because only the ratio to a good first fit is smooth beside a resonance.  Where the model
-    misfits, another set of starting points follows, until two end alike.
+    misfits, another set of starting points follows, until two end alike; some of these have a mode
+    above half the sampling rate.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def least_squares(
         if not fit.misfits or shorter_chain(model) is not None:
             break
         rng = np.random.default_rng([seed, another])
-        other = _fit(model, etfe, starting_points(model, etfe, rng))
+        other = _fit(model, etfe, starting_points(model, etfe, rng, with_images=True))
         here, there = fit.reduced_chi_square, other.reduced_chi_square
         alike = abs(there - here) < _ONE_VALLEY * here
         if not alike:

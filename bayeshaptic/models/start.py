@@ -99,11 +99,18 @@ def _weak_prior(name: str, dimension: str, found: ResponseScales, period_s: floa
     return prior
 
 
-def starting_points(model: Model, etfe: Etfe, rng: np.random.Generator, count: int = 400) -> Floats:
+def starting_points(
+    model: Model,
+    etfe: Etfe,
+    rng: np.random.Generator,
+    count: int = 400,
+    with_images: bool = False,
+) -> Floats:
     """Starting vectors for a fit, natural values, shape (B, P).
 
     The device file's values where there are any, draws from the priors, and mechanisms with
     plausible modes: masses from the asymptotes, modes at the peaks or anywhere in the band.
+    `with_images` also modes above half the sampling rate, of which the band shows the images.
     """
     found = scales(etfe)
     drawn = np.stack([draw(model.prior(name), rng, count) for name in model.names], axis=1)
@@ -115,9 +122,25 @@ def starting_points(model: Model, etfe: Etfe, rng: np.random.Generator, count: i
         elif name == "delay_s":
             guessed[:, column] = rng.uniform(0, 2, count) * etfe.period_s
     points = [drawn[: count // 4], guessed]
+    if with_images and {"m1", "m2", "kc", "bc"} <= set(model.names):
+        points.append(_images(model.names, guessed, etfe.period_s, rng))
     if all(name in model.reference for name in model.names):
         points.insert(0, model.values[None, :])
     return np.concatenate(points)
+
+
+def _images(
+    names: tuple[str, ...], guessed: Floats, period_s: float, rng: np.random.Generator
+) -> Floats:
+    """The same points with a smaller motor, and the mode where sampling would show it as it was."""
+    images = guessed.copy()
+    m1, m2, kc, bc = (names.index(name) for name in ("m1", "m2", "kc", "bc"))
+    mode = np.sqrt(images[:, kc] * (1 / images[:, m1] + 1 / images[:, m2]))
+    above = 2 * np.pi / period_s + rng.choice([-1.0, 1.0], len(images)) * mode
+    images[:, m1] *= np.exp(rng.uniform(-3.5, 0.0, len(images)))
+    images[:, kc] = above**2 / (1 / images[:, m1] + 1 / images[:, m2])
+    images[:, bc] *= np.abs(above) / mode * images[:, m1] / guessed[:, m1]
+    return images
 
 
 def _plausible(
