@@ -22,6 +22,7 @@ MOVED = "rows moved"  # topic of the notice
 # The reduced chi-square must fall to this share; rows of one sample hardly change it. How many of
 # those are moved nevertheless: docs/door.md.
 _FALLS = 0.9
+_CLEAR = 0.1  # of a period less than no delay
 _WHOLE = 0.05  # of a period: so near to whole ones is one delay in ten
 _LATER = "extra_delay_s"
 _SAME = 0.02  # relative difference of reduced chi-squares in one valley
@@ -70,7 +71,7 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
     None where the rows are as they should be, or nothing tells.
     """
     recording = found.etfe.recording
-    if recording is None or not fit.misfits or not _tells(found, recording):
+    if recording is None or not (fit.misfits or fit.impossible) or not _tells(found, recording):
         return None
     model, best, early = _with_any_delay(fit.model), fit, 0
     while True:
@@ -78,12 +79,12 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
         if moved is None or not _falls(moved, best):
             break
         best, early = moved, early + 1
-    if early == 0 or not _delay_s(best) < early * recording.period_s:
+    if early == 0 or not _delay_s(best) < (early - _CLEAR) * recording.period_s:
         return None
     # A delay that was told may be wrong, and of a force that repeats a row less may be a period
-    # less: the same rows as recorded, with whatever delay, must leave more than noise.
+    # less: the same rows as recorded, with whatever delay.
     as_recorded = _best(model, recording.part(early, recording.samples), found)
-    if as_recorded is None or not as_recorded.misfits or not _falls(best, as_recorded):
+    if as_recorded is None or not _falls(best, as_recorded):
         return None
     notice = _notice(early, as_recorded.reduced_chi_square, best.reduced_chi_square)
     return with_rows_moved(recording, early), notice
