@@ -1,5 +1,7 @@
 """A position written down before its command acts: less delay than none, and a limit too high."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from bayeshaptic.diagnosis.base.alignment import MOVED, rows_of_one_sample, with
 from bayeshaptic.diagnosis.base.opened import opened
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.inference.choose import choose_model
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.join import join_recordings
@@ -64,6 +67,28 @@ def test_rows_of_one_sample_stay_whatever_the_model_lacks_and_was_told(
     fit = least_squares(model, found.etfe)
     assert fit.misfits
     assert rows_of_one_sample(found, fit) is None
+
+
+@pytest.mark.parametrize("delay_s", [None, 120e-6])
+def test_a_mode_too_many_does_not_hide_it(delay_s: float | None) -> None:
+    # A chain of three masses left nothing of rows as recorded: 5 times the limit, in green.
+    bench = replace(Bench.from_device("phantom", False, "rigid"), delay_s=120e-6)
+    found = opened(recorded(bench, 1), "auto", Options(delay_s=delay_s))
+    choice = choose_model(found.etfe, None, delay_s)
+    closed = close_loop(recorded(bench, 1), "auto", hidden=False, delay_s=delay_s)
+    assert closed.model.name == "rigid" and choice.fit.model.name != "rigid"
+    assert headline(closed).status == ("untrusted" if delay_s is None else "caution")
+    low, high = closed.analysis.limit.quantile(0.005), closed.analysis.limit.quantile(0.995)
+    assert low < bench.true_critical_stiffness() < high
+
+
+def test_a_mode_above_half_the_sampling_rate_does_not_hide_it() -> None:
+    # Its image was the lead that no delay leaves over: 5 times the limit, in green.
+    bench = Bench.from_device("phantom").with_effect("extra_delay")
+    closed = close_loop(recorded(bench, 1), "auto", hidden=False)
+    assert headline(closed).status == "untrusted"
+    low, high = closed.analysis.limit.quantile(0.005), closed.analysis.limit.quantile(0.995)
+    assert low < bench.true_critical_stiffness() < high
 
 
 def test_two_samples_are_two() -> None:

@@ -234,7 +234,7 @@ class Loop:
             return left[id(trial)]
 
         near = [t for t in trials if t.score > 0 and not _raises(self.state, t.state)]
-        open_ = acceptance.possible([trial for trial in near if trial.convincing])
+        open_ = acceptance.possible([t for t in near if t.convincing and t.all_along])
         chosen = acceptance.choose(
             open_,
             lambda trial: acceptance.excess(remaining(trial)),

@@ -152,6 +152,9 @@ class Trial:
         Gain in log likelihood on the windows that it was fitted to, and on those it was not.
     size : int
         Number of its parameters.
+    all_along : bool
+        Whether it explains what was seen in all of the recording: of another drift than it is, the
+        worst part alone may leave nothing.
     """
 
     accepted: Accepted
@@ -159,6 +162,7 @@ class Trial:
     gain_fit: float
     gain_choose: float
     size: int
+    all_along: bool = True
 
     @property
     def name(self) -> str:

@@ -90,7 +90,9 @@ def least_squares(
         if not fit.misfits or shorter_chain(model) is not None:
             break
         rng = np.random.default_rng([seed, another])
-        other = _fit(model, etfe, starting_points(model, etfe, rng, with_images=True))
+        # Of a position that is early an image takes up the lead that no delay leaves over.
+        images = "delay_s" not in fit.impossible
+        other = _fit(model, etfe, starting_points(model, etfe, rng, with_images=images))
         here, there = fit.reduced_chi_square, other.reduced_chi_square
         alike = abs(there - here) < _ONE_VALLEY * here
         if not alike:

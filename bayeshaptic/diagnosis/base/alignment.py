@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -22,13 +23,14 @@ MOVED = "rows moved"  # topic of the notice
 # The reduced chi-square must fall to this share; rows of one sample hardly change it. How many of
 # those are moved nevertheless: docs/door.md.
 _FALLS = 0.9
-_CLEAR = 0.1  # of a period less than no delay
 _WHOLE = 0.05  # of a period: so near to whole ones is one delay in ten
 _LATER = "extra_delay_s"
 _SAME = 0.02  # relative difference of reduced chi-squares in one valley
 
 
-def realigned(found: Opened, fit: Fit, model: str | Model, options: Options) -> Opened | None:
+def realigned(
+    found: Opened, fit: Fit, model: str | Model, options: Options, simpler: Iterable[Fit] = ()
+) -> Opened | None:
     """What was opened, with rows of one sample; None where they are, or nothing tells.
 
     Parameters
@@ -39,8 +41,13 @@ def realigned(found: Opened, fit: Fit, model: str | Model, options: Options) -> 
     model : str or Model
         As asked for.
     options : Options
+    simpler : iterable of Fit
+        Of simpler models. A mode too many takes up the lead of a position that is early, so that
+        nothing is left: then a model without it must leave nothing in moved rows.
     """
     moved = rows_of_one_sample(found, fit)
+    for other in simpler:
+        moved = moved or rows_of_one_sample(found, other, to_noise=True)
     if moved is None:
         return None
     recording, notice = moved
@@ -48,7 +55,9 @@ def realigned(found: Opened, fit: Fit, model: str | Model, options: Options) -> 
     return replace(again, notices=(*again.notices, notice))
 
 
-def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | None:
+def rows_of_one_sample(
+    found: Opened, fit: Fit, to_noise: bool = False
+) -> tuple[Recording, Notice] | None:
     """The recording with every force beside the position that was read when it was commanded.
 
     No device answers before it is told to.  Whatever a model lacks, it fits rows that are moved
@@ -60,6 +69,8 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
     found : Opened
     fit : Fit
         Of a model to what was opened.
+    to_noise : bool
+        Only where nothing but noise is left in them.
 
     Returns
     -------
@@ -79,7 +90,7 @@ def rows_of_one_sample(found: Opened, fit: Fit) -> tuple[Recording, Notice] | No
         if moved is None or not _falls(moved, best):
             break
         best, early = moved, early + 1
-    if early == 0 or not _delay_s(best) < (early - _CLEAR) * recording.period_s:
+    if early == 0 or not _delay_s(best) < early * recording.period_s or to_noise and best.misfits:
         return None
     # A delay that was told may be wrong, and of a force that repeats a row less may be a period
     # less: the same rows as recorded, with whatever delay.

@@ -49,7 +49,7 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
         fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
-        again = realigned(found, fit, model, options)
+        again = realigned(found, fit, model, options, choice.simpler if choice else ())
         if again is not None:
             return fitted(again, model, options)
         seconds = {**found.seconds, **clock.seconds}
