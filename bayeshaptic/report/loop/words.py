@@ -228,6 +228,7 @@ def _numbers(closed: Closed, effect: Accepted) -> str:
         shown += [
             f"{parameter_words(name)} {plus_minus(value.mean, value.sd, value.unit)}"
             for name, value in effect.estimates.items()
+            if name in shown_estimates(effect)
         ]
     most_numbers = 3
     return f" ({', '.join(shown[:most_numbers])})" if shown else ""
