@@ -90,12 +90,6 @@ class Choice(Shown):
             if other.held != chosen.held and abs(other.score - chosen.score) < UNDECIDED
         )
 
-    @property
-    def simpler(self) -> tuple[Fit, ...]:
-        """Fits of candidates with fewer parameters than the chosen one, simplest first."""
-        fits = sorted((other.fit for other in self.candidates.values()), key=lambda f: f.model.size)
-        return tuple(fit for fit in fits if fit.model.size < self.fit.model.size)
-
     def _lines(self) -> tuple[str, ...]:
         chosen = self.fit.model.name
         worse = ", ".join(

@@ -49,7 +49,7 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
         fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
-        again = realigned(found, fit, model, options, choice.simpler if choice else ())
+        again = realigned(found, fit, model, options, _simpler(choice))
         if again is not None:
             return fitted(again, model, options)
         seconds = {**found.seconds, **clock.seconds}
@@ -88,6 +88,13 @@ def _fit(
         return choice.fit, choice
     built = build_model(model, device, *delay, etfe.period_s, prior)
     return least_squares(built, etfe, seed=seed), None
+
+
+def _simpler(choice: Choice | None) -> tuple[Fit, ...]:
+    """Fits of candidates with fewer parameters than the chosen one, simplest first."""
+    fits = [other.fit for other in choice.candidates.values()] if choice else []
+    fits = [fit for fit in fits if choice and fit.model.size < choice.fit.model.size]
+    return tuple(sorted(fits, key=lambda fit: fit.model.size))
 
 
 def _lower_where_undecided(choice: Choice) -> Choice:

@@ -35,8 +35,9 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Tick
 
 PARTS = 3
-# Of what parts were off by, in reduced chi-squares over one: in 14 recordings drifts of another
-# kind leave 0.10 to 1 of it, the right ones at most 0.06, and that is less than noise.
+# Of what parts were off by, in reduced chi-squares over one: in the 11 recordings that this was
+# chosen on, drifts of another kind leave 0.10 to 1 of it; the right ones at most 0.06 and less than
+# noise, but for a step within a part (0.13, more than noise: refused). Rates are not counted.
 _LEFT = 0.3
 _KNOWN = 1.0  # log change from part to part: a parameter with more is one that parts do not see
 
