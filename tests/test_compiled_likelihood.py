@@ -9,7 +9,15 @@ import pytest
 from plain_response import plain_response
 
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform
+from bayeshaptic.models import (
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    MaybeZero,
+    NearZero,
+    Normal,
+    Uniform,
+)
 from bayeshaptic.models.build import build_model
 from bayeshaptic.models.joint_prior import joint_prior
 from bayeshaptic.models.prior import Prior
@@ -157,10 +165,12 @@ def test_priors_at_once_are_the_sum_of_each() -> None:
         Own(),
         Uniform(-1.0, 2.0),
         LogUniform(0.1, 5.0),
+        MaybeZero(2.0, 0.3),
+        MaybeZero(1.0),
     )
-    theta = RNG.normal(0.7, 0.4, (500, len(priors)))
+    theta = RNG.normal(0.7, 0.4, (1000, len(priors)))
     theta[0], theta[1] = 0.0, 0.1
     with np.errstate(all="ignore"):
         truth = np.sum([p.log_density(x) for p, x in zip(priors, theta.T, strict=True)], axis=0)
-    assert 50 < np.isfinite(truth).sum() < 450
+    assert 50 < np.isfinite(truth).sum() < 950
     np.testing.assert_allclose(joint_prior(priors)(theta), truth, rtol=1e-12)

@@ -67,7 +67,8 @@ class Coordinates:
         """Theta; `own` of the same phi where it is known, here and below."""
         own = self.own(phi) if own is None else own
         with np.errstate(over="ignore"):  # far outside, where the density is none
-            theta = np.where(self.log, np.exp(np.where(self.log, own, 0.0)), own * self.scale)
+            theta = own * self.scale
+            theta[..., self.log] = np.exp(own[..., self.log])
         if self.near_zero:
             theta[..., self.near_zero] = self._small(phi)
         return theta

@@ -66,10 +66,10 @@ def _normal_scores(values: Floats) -> Floats:
     order = np.argsort(flat)
     ordered = flat[order]
     begins = np.append(True, ordered[1:] != ordered[:-1])
-    first = np.flatnonzero(begins)
-    twice = first + np.append(first[1:], len(flat)) + 1  # the average rank, from one on
+    ends = np.append(np.flatnonzero(begins), len(flat))  # of runs of ties, one after the other
+    twice = ends[:-1] + ends[1:] + 1  # the average rank, from one on
     scores = np.empty(len(flat))
-    scores[order] = _scores_of(len(flat))[twice][np.cumsum(begins) - 1]
+    scores[order] = np.repeat(_scores_of(len(flat))[twice], np.diff(ends))
     return scores.reshape(values.shape)
 
 
@@ -88,30 +88,36 @@ def _rhat(chains: Floats) -> float:
 
 
 def _size(chains: Floats) -> float:
-    """Effective sample size; the autocorrelation is summed by Geyer's initial monotone sequence."""
+    """Effective sample size; the autocorrelation is summed by Geyer's initial monotone sequence.
+
+    Lag by lag, from the first on: of chains that mix a few say everything, and a transform would
+    take all of them.
+    """
     count, draws = chains.shape
     if np.ptp(chains) < np.finfo(float).resolution:
         return float(chains.size)
-    covariance = _autocovariance(chains)
-    within = covariance[0] * draws / (draws - 1.0)
-    total = covariance[0] + (chains.mean(axis=1).var(ddof=1) if count > 1 else 0.0)
-    correlation = 1.0 - (within - covariance) / total
-    correlation[0] = 1.0
-    most = max((draws - 3) // 2, 0)
-    pairs = correlation[: 2 * most].reshape(-1, 2).sum(axis=1)
-    ends = np.flatnonzero(pairs <= 0)
-    last = int(ends[0]) if len(ends) else most
-    time = 2 * np.minimum.accumulate(pairs[:last]).sum() + max(correlation[2 * last], 0.0) - 1.0
+    means = chains.mean(axis=1)
+    by_time = np.ascontiguousarray((chains - means[:, None]).T)
+    variance = np.vdot(by_time, by_time) / chains.size
+    within = variance * draws / (draws - 1.0)
+    total = variance + (means.var(ddof=1) if count > 1 else 0.0)
+
+    def correlation(lag: int) -> float:
+        if lag == 0:
+            return 1.0
+        covariance = np.vdot(by_time[:-lag], by_time[lag:]) / chains.size
+        return float(1.0 - (within - covariance) / total)
+
+    time, pair = -1.0, np.inf
+    for lag in range(0, 2 * max((draws - 3) // 2, 0), 2):
+        even = correlation(lag)
+        both = even + correlation(lag + 1)
+        if both <= 0:
+            break
+        pair = min(pair, both)
+        time += 2 * pair
+    else:
+        even = correlation(2 * max((draws - 3) // 2, 0))
+    time += max(even, 0.0)
     size = chains.size / max(time, 1 / np.log10(chains.size))
     return float(size) if np.isfinite(size) else 0.0
-
-
-def _autocovariance(chains: Floats) -> Floats:
-    """At every lag, the mean of all chains, shape (draw,)."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
-    draws = chains.shape[1]
-    length = next_fast_len(2 * draws)
-    spectrum = rfft(chains - chains.mean(axis=1, keepdims=True), length, axis=1)
-    power = np.einsum("cf,cf->f", spectrum.view(float), spectrum.view(float))
-    return irfft(power[::2] + power[1::2], length)[:draws] / chains.size

@@ -77,15 +77,18 @@ class Terms:
 
 
 class ByTerms(Prior):
-    """A prior whose density is of the form of `Terms`."""
+    """A prior whose density is a sum of densities of the form of `Terms`: of one, mostly."""
 
     @property
-    def terms(self) -> Terms:
-        """What the density is made of."""
+    def parts(self) -> tuple[Terms, ...]:
+        """What the density is the sum of."""
         raise NotImplementedError
 
     def log_density(self, x: ArrayLike) -> Floats:
-        return self.terms(x)
+        first, *others = (part(x) for part in self.parts)
+        for other in others:
+            first = np.logaddexp(first, other)
+        return first
 
 
 @dataclass(frozen=True)
@@ -103,11 +106,11 @@ class LogNormal(ByTerms):
             raise InputError(f"LogNormal needs median > 0 and log_sd > 0, got {self}.")
 
     @property
-    def terms(self) -> Terms:
+    def parts(self) -> tuple[Terms, ...]:
         constant = -np.log(self.log_sd) - _LOG_SQRT_2PI
         smallest = float(np.nextafter(0.0, 1.0))
         centre = float(np.log(self.median))
-        return Terms(smallest, np.inf, constant, centre, self.log_sd, True, 1.0)
+        return (Terms(smallest, np.inf, constant, centre, self.log_sd, True, 1.0),)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return self.median * np.exp(self.log_sd * ndtri(np.asarray(p, float)))
@@ -131,9 +134,9 @@ class HalfNormal(ByTerms):
             raise InputError(f"HalfNormal needs scale > 0, got {self}.")
 
     @property
-    def terms(self) -> Terms:
+    def parts(self) -> tuple[Terms, ...]:
         constant = np.log(2 / self.scale) - _LOG_SQRT_2PI
-        return Terms(0.0, np.inf, constant, sd=self.scale)
+        return (Terms(0.0, np.inf, constant, sd=self.scale),)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return self.scale * ndtri(0.5 + 0.5 * np.asarray(p, float))
@@ -165,9 +168,9 @@ class Normal(ByTerms):
         return float(ndtr((self.low - self.mean) / self.sd))
 
     @property
-    def terms(self) -> Terms:
+    def parts(self) -> tuple[Terms, ...]:
         constant = -np.log(self.sd) - _LOG_SQRT_2PI - np.log1p(-self._mass_below)
-        return Terms(self.low, np.inf, constant, self.mean, self.sd)
+        return (Terms(self.low, np.inf, constant, self.mean, self.sd),)
 
     def quantile(self, p: ArrayLike) -> Floats:
         below = self._mass_below
@@ -197,8 +200,8 @@ class Uniform(ByTerms):
         return (self.low, self.high)
 
     @property
-    def terms(self) -> Terms:
-        return Terms(self.low, self.high, -np.log(self.high - self.low))
+    def parts(self) -> tuple[Terms, ...]:
+        return (Terms(self.low, self.high, -np.log(self.high - self.low)),)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return self.low + (self.high - self.low) * np.asarray(p, float)
@@ -225,9 +228,9 @@ class LogUniform(ByTerms):
         return (self.low, self.high)
 
     @property
-    def terms(self) -> Terms:
+    def parts(self) -> tuple[Terms, ...]:
         constant = -np.log(np.log(self.high / self.low))
-        return Terms(self.low, self.high, constant, over_x=1.0)
+        return (Terms(self.low, self.high, constant, over_x=1.0),)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return self.low * (self.high / self.low) ** np.asarray(p, float)

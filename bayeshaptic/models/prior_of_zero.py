@@ -55,11 +55,11 @@ class NearZero(ByTerms):
             raise InputError(f"NearZero needs a rise of at least 0 and below 1; got {self}.")
 
     @property
-    def terms(self) -> Terms:
+    def parts(self) -> tuple[Terms, ...]:
         whole = _near_zero(self.floor / self.scale, self.rise)[0]
         constant = -np.log(whole) - self.rise * np.log(self.floor)
         over = 1 - self.rise
-        return Terms(0.0, np.inf, constant, sd=self.scale, over_x=over, shift=self.floor)
+        return (Terms(0.0, np.inf, constant, sd=self.scale, over_x=over, shift=self.floor),)
 
     def quantile(self, p: ArrayLike) -> Floats:
         _, factors, below = _near_zero(self.floor / self.scale, self.rise)
@@ -95,7 +95,7 @@ def weight_of_zero(prior: Prior) -> float:
 
 
 @dataclass(frozen=True)
-class MaybeZero(Prior):
+class MaybeZero(ByTerms):
     """Half-normal of `scale`, or zero: a slab and a spike, for dampers that may not be there.
 
     At zero lies as much probability as in `weight` of the standard deviations `seen` with which a
@@ -139,18 +139,14 @@ class MaybeZero(Prior):
         return odds / (1 + odds)
 
     @cached_property
-    def _parts(self) -> tuple[Terms, Terms]:
+    def parts(self) -> tuple[Terms, ...]:
         """Slab and spike, with their shares."""
-        slab, spike = HalfNormal(self.scale).terms, self.spike.terms
+        (slab,), (spike,) = HalfNormal(self.scale).parts, self.spike.parts
         with np.errstate(divide="ignore"):
             return (
                 replace(slab, constant=slab.constant + float(np.log1p(-self.zero))),
                 replace(spike, constant=spike.constant + float(np.log(self.zero))),
             )
-
-    def log_density(self, x: ArrayLike) -> Floats:
-        slab, spike = (part(x) for part in self._parts)
-        return np.logaddexp(slab, spike)
 
     def quantile(self, p: ArrayLike) -> Floats:
         return np.interp(np.asarray(p, float), *_maybe_zero(self))

@@ -20,7 +20,9 @@ ENSEMBLES = 4
 WALKERS = 64
 _WARM_UP = (2, 2, 4, 4, 6, 6, 6, 6)  # steps a parameter in each round
 _IDLE = 2  # rounds without a gain
-_WARM, _FROZEN = 0.6, 0.85  # of the moves that are independent proposals; the others differences
+# Of the moves that are independent proposals; the others are differences, which help where the
+# proposal misses something and else are little gained.
+_WARM, _FROZEN = 0.6, 0.95
 _MISSED = 2.0  # log of density over proposal, above the median, from which a place is missed
 # Degrees of freedom of what a proposal is made of, next to normal as posteriors are, and of what
 # covers its tails.  In eleven dimensions five throughout cost a third of what is accepted.
