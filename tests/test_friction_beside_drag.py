@@ -5,13 +5,18 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.residuals import residual
 from bayeshaptic.diagnosis.state import Accepted, Estimate
-from bayeshaptic.diagnosis.widening import discrepancy
-from bayeshaptic.diagnosis.widening.discrepancy import may_be_held_by_friction
+from bayeshaptic.diagnosis.widening import friction
+from bayeshaptic.diagnosis.widening.friction import (
+    may_be_held_by_friction,
+    with_friction_for_damping,
+)
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.objections import _rubs_otherwise
 
 
@@ -48,10 +53,33 @@ def test_noise_beside_a_force_may_be_friction_that_holds(
     share: float, held: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """55 times the limit was recommended: Stribeck's friction had been found, and held on."""
-    monkeypatch.setattr(discrepancy, "changing_share", lambda fit, etfe: share)
+    monkeypatch.setattr(friction, "changing_share", lambda fit, etfe: share)
     state = SimpleNamespace(fit=None, etfe=None)
     noise = residual.Test(EXCESS_NOISE, "nonlinear", 23.8, 9.0, 21.0, "")
     left = residual.Test("sign(v)", "nonlinear", 23.8, 9.0, None, "")
     assert may_be_held_by_friction(None, SimpleNamespace(state=state, after=(noise,))) == held  # type: ignore[arg-type]
     both = SimpleNamespace(state=state, after=(noise, left))
     assert not may_be_held_by_friction(None, both)  # type: ignore[arg-type]
+
+
+def test_damping_may_be_the_friction_that_would_make_the_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Friction of 0.1 N at 0.1 m/s is a damper of 0.8 N s/m."""
+    rng = np.random.default_rng(0)
+    velocity = 0.1 * rng.standard_normal(20_000)
+    recording = Recording(rng.standard_normal(20_000), np.cumsum(velocity) * 1e-3, 1e-3, "N", "m")
+    fit = SimpleNamespace(
+        model=SimpleNamespace(names=("m", "b", "kh")), theta=np.array([1.0, 2, 3])
+    )
+
+    def left(share: float) -> float:
+        monkeypatch.setattr(friction, "changing_share", lambda fit, etfe: share)
+        etfe = SimpleNamespace(unbroken=recording)
+        theta = with_friction_for_damping(fit, etfe)  # type: ignore[arg-type]
+        assert theta[0] == 1 and theta[2] == 3
+        return float(theta[1] / 2)
+
+    assert left(0.01) == pytest.approx(1 - 0.5 * 0.8, abs=0.01)
+    assert left(1e-6) == pytest.approx(1, abs=0.01)
+    assert left(0.5) == 0.2

@@ -13,7 +13,8 @@ from bayeshaptic.diagnosis.analysis import Analysis, limit_line
 from bayeshaptic.diagnosis.feedback.explain import ForceExplained
 from bayeshaptic.diagnosis.state import Accepted
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
-from bayeshaptic.diagnosis.widening.discrepancy import changing_at_limit, may_be_held_by_friction
+from bayeshaptic.diagnosis.widening.discrepancy import changing_at_limit
+from bayeshaptic.diagnosis.widening.friction import may_be_held_by_friction
 from bayeshaptic.models import Model
 from bayeshaptic.shown import Shown
 

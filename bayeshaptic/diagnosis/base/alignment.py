@@ -18,6 +18,7 @@ from bayeshaptic.quantities import percent, pure
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
 
 MOVED = "rows moved"  # topic of the notice
 # The reduced chi-square must fall to this share; rows of one sample hardly change it. How many of
@@ -86,7 +87,8 @@ def rows_of_one_sample(
         return None
     model, best, early = _with_any_delay(fit.model), fit, 0
     while True:
-        moved = _best(model, with_rows_moved(recording, early + 1), found, best)
+        there = with_rows_moved(recording, early + 1)
+        moved = _best(model, there, found, best, only_down=to_noise)
         if moved is None or not _falls(moved, best):
             break
         best, early = moved, early + 1
@@ -153,21 +155,36 @@ def _with_any_delay(model: Model) -> Model:
 
 
 def _best(
-    model: Model, recording: Recording, found: Opened, known: Fit | None = None
+    model: Model,
+    recording: Recording,
+    found: Opened,
+    known: Fit | None = None,
+    only_down: bool = False,
 ) -> Fit | None:
     """The best fit, None where there is no response; `known` is that of rows a sample apart.
 
-    What ends there at once is the same fit with another delay, and not looked for again.
+    What ends there at once is the same fit with another delay, and not looked for again.  With
+    `only_down` nothing is where the way from the known one does not lead down: with a period more
+    of delay it leaves the same, and only what wants less delay than none has anything to gain.
     """
     try:
         etfe = estimate_etfe(recording, found.etfe.band_hz)
     except InputError:  # of a force that repeats too few periods are left
+        return None
+    if only_down and known is not None and not _falls(_from(known, model, etfe), known):
         return None
     fit = least_squares(model, etfe, most_sets=1)
     there = np.nan if known is None else known.reduced_chi_square
     if fit.misfits and not abs(fit.reduced_chi_square / there - 1) < _SAME:
         fit = least_squares(model, etfe)
     return fit
+
+
+def _from(known: Fit, model: Model, etfe: Etfe) -> Fit:
+    """The fit of a model with any delay that begins at one to rows a sample less apart."""
+    values = {**known.model.fixed, **dict(zip(known.model.names, known.theta, strict=True))}
+    values["delay_s"] = values.get("delay_s", 0.0) + values.get(_LATER, 0.0) + etfe.period_s
+    return least_squares(model, etfe, start=np.array([values[name] for name in model.names]))
 
 
 def _falls(after: Fit, before: Fit) -> bool:

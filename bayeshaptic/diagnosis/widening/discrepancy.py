@@ -17,18 +17,15 @@ import numpy as np
 from bayeshaptic.diagnosis.residuals.excess import changing_share, noise_besides
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced, share_left
 from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern
+from bayeshaptic.diagnosis.widening.friction import with_friction_for_damping
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.stability.binding import moved
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
-# Share of the response that changes, in the slowest octave: 0.35 to 2.5 in eleven recordings
-# with friction of 0.6 to 1.3 of the rms force. Of less than a tenth of it tests of a force speak.
-_HELD_BY_FRICTION = 0.02
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -138,28 +135,15 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
         if trial.accepted.family == family
     ]
     raised = {test.name for test in traced.after if test.flagged}
-    holds = family == "nonlinear" and may_be_held_by_friction(fit, traced)
-    if holds or {VELOCITY, LOAD_VELOCITY} & variables(raised):
-        damped = np.array([n in GROUND_DAMPERS for n in fit.model.names])
-        damping_left = 0.2  # of the damping, if most of it is friction that was fitted as damping
-        less = np.where(damped, damping_left * fit.theta, fit.theta)
+    if {VELOCITY, LOAD_VELOCITY} & variables(raised):
+        others.append(critical_stiffness(fit.model, with_friction_for_damping(fit)).value)
+    elif family == "nonlinear" and EXCESS_NOISE in raised:
+        less = with_friction_for_damping(fit, traced.state.etfe)
         others.append(critical_stiffness(fit.model, less).value)
     if here == 0:  # never stable: it cannot go further down
         return _LEAST[family]
     lowest = min([here, *others])
     return max(_LEAST[family], float(np.log(here / max(lowest, 1e-3 * here))))
-
-
-def may_be_held_by_friction(fit: Fit, traced: Traced) -> bool:
-    """Whether nothing but noise is left of a force, as of friction that holds a mass mostly.
-
-    Parameters
-    ----------
-    fit : Fit
-    traced : Traced
-    """
-    left = {test.name for test in traced.after if test.flagged and test.family == "nonlinear"}
-    return left == {EXCESS_NOISE} and changing_share(fit, traced.state.etfe) > _HELD_BY_FRICTION
 
 
 def _blurred(share: float) -> float:

@@ -1,0 +1,68 @@
+"""What of a model's damping may be friction, by the noise that friction makes.
+
+The sign of a velocity of normal numbers goes with it as sqrt(2 / pi) over its rms, which looks like
+a damper; the rest of it is noise.  So a device whose noise is small has little friction, and one in
+which no law of a force was found, but noise is left, may owe that much of its damping to one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayeshaptic.diagnosis.residuals.excess import changing_share
+from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.models.structures import GROUND_DAMPERS
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.types import Floats
+
+# Share of the response that changes, in the slowest octave: 0.35 to 2.5 in eleven recordings
+# with friction of 0.6 to 1.3 of the rms force, about the square of that. Of less than a tenth of it
+# tests of a force speak.
+_HELD_BY_FRICTION = 0.02
+_VISCOUS = 0.2  # of the damping, if most of it is friction that was fitted as damping
+
+
+def may_be_held_by_friction(fit: Fit, traced: Traced) -> bool:
+    """Whether nothing but noise is left of a force, as of friction that holds a mass mostly.
+
+    Parameters
+    ----------
+    fit : Fit
+    traced : Traced
+    """
+    left = {test.name for test in traced.after if test.flagged and test.family == "nonlinear"}
+    return left == {EXCESS_NOISE} and changing_share(fit, traced.state.etfe) > _HELD_BY_FRICTION
+
+
+def with_friction_for_damping(fit: Fit, etfe: Etfe | None = None) -> Floats:
+    """The fitted parameters, shape (P,), with that part of the damping that is viscous at least.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe, optional
+        By whose noise friction is bounded; without one most of the damping may be friction.
+    """
+    damped = np.array([name in GROUND_DAMPERS for name in fit.model.names])
+    least = _VISCOUS
+    if etfe is not None:
+        least = max(least, 1.0 - _as_damper(fit, etfe) / max(fit.theta[damped].sum(), 1e-300))
+    return np.where(damped, least * fit.theta, fit.theta)
+
+
+def _as_damper(fit: Fit, etfe: Etfe) -> float:
+    """The damper that the friction looks like which would make all noise of the device."""
+    recording = etfe.unbroken
+    if recording is None:
+        return np.inf
+    steps = np.diff(recording.position)
+    # The difference of two rounded numbers.
+    rounding = max(increment_unit(recording.position) or 0.0, recording.encoder_resolution or 0.0)
+    moved = float(np.var(steps)) - rounding**2 / 6
+    if not moved > 0:
+        return np.inf
+    friction = float(np.sqrt(changing_share(fit, etfe))) * float(np.std(recording.force))
+    return float(np.sqrt(2 / np.pi)) * friction * recording.period_s / float(np.sqrt(moved))
