@@ -71,7 +71,14 @@ ALONG = (
     {"friction_ratio": 3.0, "way_middle": 2e-4, "way_span": 2e-3},
     MOTOR,
 )
-COMPILED = (*FORCES[:-1], ALONG)
+DAMPED_ALONG = (
+    "damping_along_the_way",
+    {},
+    3e6,
+    {"least_at": 0.4, "way_begins": -2e-3, "way_length": 4e-3},
+    MOTOR,
+)
+COMPILED = (*FORCES[:-1], ALONG, DAMPED_ALONG)
 OURS = {"hardening_connection": "hardening_spring"}
 BENCHS = {"rising_friction": "stribeck_friction"}  # with less at rest than in motion
 

@@ -25,7 +25,8 @@ def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
     dimension : str
         "mass", "damping", "stiffness", "force", "position", "time", "frequency", "number",
         "velocity", "cubic_stiffness" (force over position cubed), "drag" (force over velocity
-        squared), or "cubic_damping" (force over velocity cubed).
+        squared), "cubic_damping" (force over velocity cubed), or "damping_growth" (damping over
+        position squared).
     force_unit : {"N", "Nm", "A"}
         Without a torque constant a force is in amperes, and so a mass is in A s^2/rad.
     position_unit : {"m", "rad"}
@@ -45,6 +46,7 @@ def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
         "velocity": f"{position_unit}/s",
         "drag": f"{force} s^2/{position_unit}^2",
         "cubic_damping": f"{force} s^3/{position_unit}^3",
+        "damping_growth": f"{force} s/{position_unit}^3",
         "force": force,
     }[dimension]
 

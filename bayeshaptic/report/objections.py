@@ -10,7 +10,7 @@ from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
-from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt
@@ -221,7 +221,7 @@ def _rubs_otherwise(closed: Closed) -> bool:
     acts = any(effect.family == "nonlinear" for effect in closed.effects)
     if acts and closed.force is None and not closed.model.held:
         left |= {test.name for test in closed.traced.after if test.noticed}
-    return bool(variables(left) & {VELOCITY, LOAD_VELOCITY})
+    return bool(variables(left) & {VELOCITY, LOAD_VELOCITY, ALONG})
 
 
 def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:

@@ -52,6 +52,7 @@ SINGLE: dict[str, tuple[str, set[str]]] = {
     "coarse_command": ("nonlinear", {UNKNOWN}),
     "eccentric_encoder": ("nonlinear", {UNKNOWN}),
     "end_stops": ("nonlinear", {UNKNOWN}),
+    "tighter_away": ("nonlinear", {"damping_along_the_way"}),
 }
 LISTED = 15  # the first of them are those that the library promises
 PAIRS = (

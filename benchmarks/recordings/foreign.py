@@ -118,6 +118,31 @@ class VelocityCubed(Effect):
 
 
 @dataclass(frozen=True)
+class _Tighter(SmoothLaw):
+    growth: float
+
+    @staticmethod
+    def force(q: float, v: float, before: float, dq: float, constants: Sequence[float]) -> float:
+        return -constants[0] * q**2 * v
+
+
+@dataclass(frozen=True)
+class TighterAway(Effect):
+    """A damper that grows with the square of the way from where the device began."""
+
+    name: ClassVar[str] = "tighter_away"
+    growth: float = 1000.0
+
+    @classmethod
+    def typical(cls, scales: MotionScales) -> TighterAway:
+        damping = sum(scales.parameters.get(name, 0.0) for name in ("b1", "b2"))
+        return cls(0.5 * damping / scales.position**2)
+
+    def build(self, structure: Structure) -> None:
+        structure.laws.append(NodeLaw("m1", FRAME, _Tighter(self.growth)))
+
+
+@dataclass(frozen=True)
 class LoadFriction(Effect):
     """Dry friction on the far mass."""
 
@@ -172,6 +197,7 @@ EFFECTS: dict[str, type[Effect]] = {
         CoarseCommand,
         EccentricEncoder,
         VelocityCubed,
+        TighterAway,
         LoadFriction,
         LopsidedFriction,
         EndStops,

@@ -17,7 +17,14 @@ from scipy.special import ndtri, stdtr
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.laws import tested
-from bayeshaptic.effects.nonlinear.shapes import COMMAND, LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import (
+    ALONG,
+    COMMAND,
+    LOAD_VELOCITY,
+    POSITION,
+    STRETCH,
+    VELOCITY,
+)
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import LinearSystem
@@ -127,15 +134,17 @@ def columns(
         A signal, shape (N,), to its DFT there.
     """
     s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
-    found = {}
-    for over, motion in motions(fit, recording).items():
+    found, known = {}, motions(fit, recording)
+    velocity = known[VELOCITY] / known[VELOCITY].std()
+    for over, motion in known.items():
         response = response_to(fit, over, s)
         driven = _by_the_command(fit, recording, over)
+        times = velocity if over == ALONG else 1.0
         for shape in tested().values():
             if shape.over == over:
                 rms = float(motion.std())
                 made = [motion] if driven is None else [driven, motion]
-                added = [response * at_lines(shape.force(moved / rms)) for moved in made]
+                added = [response * at_lines(times * shape.force(moved / rms)) for moved in made]
                 found[shape.name] = np.stack(added), rms
     return found
 
@@ -159,7 +168,8 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
     The motion is that of the model: signs taken from an encoder are those of its noise.
     """
     _, velocity = driven_motion(fit, recording)
-    found = {VELOCITY: velocity, POSITION: recording.position - recording.position.mean()}
+    position = recording.position - recording.position.mean()
+    found = {VELOCITY: velocity, POSITION: position, ALONG: position}
     force = recording.force - recording.force.mean()
     system = fit.model.system(fit.theta)
     if len(system.mechanism.masses) > 1:

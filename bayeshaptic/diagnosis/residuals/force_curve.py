@@ -42,7 +42,9 @@ class ForceCurve:
     sd: Floats
 
 
-def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
+def force_curve(
+    fit: Fit, etfe: Etfe, over: str, motion: Floats, times: Floats | float = 1.0
+) -> ForceCurve:
     """The force that `fit` leaves over in `etfe`, as a curve over a motion.
 
     Parameters
@@ -50,9 +52,12 @@ def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
     fit : Fit
     etfe : Etfe
         Of a recording with random excitation.
-    over : {"velocity", "load velocity", "position", "stretch", "command"}
+    over : {"velocity", "load velocity", "position", "stretch", "command", "damping along the way"}
     motion : ndarray, shape (N,)
         As `motions` gives it.
+    times : ndarray, shape (N,), or float
+        What a value of the curve is multiplied by: of damping along the way the velocity over its
+        rms.
     """
     assert etfe.recording is not None
     low, high = np.quantile(motion, _EDGES)
@@ -62,7 +67,7 @@ def force_curve(fit: Fit, etfe: Etfe, over: str, motion: Floats) -> ForceCurve:
     s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     response = response_to(fit, over, s)
     at_lines = line_transform(etfe, etfe.recording)
-    columns = np.stack([response * at_lines(hat) for hat in hats])
+    columns = np.stack([response * at_lines(times * hat) for hat in hats])
     force, covariance = _weighted(fit, etfe, columns)
     # A constant force has no line in the band: what is drawn has mean zero over time.
     centre = np.eye(len(knots)) - np.mean(hats, axis=1)[None, :]

@@ -19,7 +19,7 @@ from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced, share_left
 from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern
 from bayeshaptic.diagnosis.widening.friction import with_friction_for_damping
 from bayeshaptic.effects.laws import variables
-from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import ALONG, EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.stability.binding import moved
@@ -135,7 +135,7 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
         if trial.accepted.family == family
     ]
     raised = {test.name for test in traced.after if test.flagged}
-    if {VELOCITY, LOAD_VELOCITY} & variables(raised):
+    if {VELOCITY, LOAD_VELOCITY, ALONG} & variables(raised):
         others.append(critical_stiffness(fit.model, with_friction_for_damping(fit)).value)
     elif family == "nonlinear" and EXCESS_NOISE in raised:
         less = with_friction_for_damping(fit, traced.state.etfe)

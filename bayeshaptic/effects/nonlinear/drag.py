@@ -1,4 +1,4 @@
-"""Resistance that grows with a power of the velocity: drag, and cubic damping."""
+"""Resistance that is no plain damper: drag, cubic damping, and a damper that changes on its way."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from bayeshaptic.effects.nonlinear.friction import FAINT_TO_STRONG, bodies, force_scale
-from bayeshaptic.effects.nonlinear.internal_force import Law, Place
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
-from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY, Shape, Usual
+from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY, Shape, Usual
 from bayeshaptic.effects.registry import register
 from bayeshaptic.models import Model
 
@@ -87,3 +87,56 @@ class CubicDamping(_PowerOfVelocity):
     )
     strength = ("cubic_damping", "cubic_damping")
     power = 3
+
+
+@register
+class DampingAlongTheWay(NonlinearEffect):
+    """A force -c (x - least)^2 v on the motor, as of a cable or a guide that is tighter elsewhere.
+
+    What the linear model keeps of the damping is that where there is least of it, and so is the
+    limit.  `least_at` is a share of the way that was recorded.
+    """
+
+    name = "damping_along_the_way"
+    title = "damping that changes along the way"
+    tests = (
+        Shape("x^2 v", "damping with the square of the position", ALONG, lambda x: -(x**2)),
+        Shape("x v", "damping that grows along the way", ALONG, lambda x: -x),
+    )
+    over = (ALONG,)
+    strength = ("damping_growth", "damping_growth")
+    dimensions: ClassVar[Mapping[str, str]] = {
+        "least_at": "number",
+        "way_begins": "position",
+        "way_length": "position",
+    }
+    tuned = ("least_at",)
+    most: ClassVar[Mapping[str, float]] = {"least_at": 1.0}
+
+    @classmethod
+    def candidates(
+        cls, model: Model, motion: Mapping[Place, Motion]
+    ) -> tuple[NonlinearEffect, ...]:
+        position = motion[MOTOR].position
+        way = {"way_begins": float(position.min()), "way_length": float(np.ptp(position))}
+        return tuple(cls(MOTOR, {"least_at": share, **way}) for share in (0.1, 0.3, 0.5, 0.7, 0.9))
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        away = motion.position - self._least
+        scale = force_scale(model, theta, motion) / motion.velocity.std()
+        return scale / np.mean(away**2) * FAINT_TO_STRONG
+
+    def law(self, strength: float, model: Model, theta: Floats) -> Law:
+        return Law(_along_the_way, (strength, self._least))
+
+    @property
+    def _least(self) -> float:
+        """Where there is least of it."""
+        return self.shape["way_begins"] + self.shape["least_at"] * self.shape["way_length"]
+
+
+def _along_the_way(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
+    """Implicit, so that it never reverses the motion."""
+    away = x - constants[1]
+    resistance = constants[0] * away * away
+    return -resistance * v / (1 + 0.5 * resistance * gain)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,13 +17,15 @@ if TYPE_CHECKING:
 
     from bayeshaptic.diagnosis.closed import Closed
     from bayeshaptic.diagnosis.residuals.force_curve import ForceCurve
+    from bayeshaptic.diagnosis.residuals.residual import Test
 
 _TITLES = {
     "velocity": "velocity",
-    "load velocity": "velocity of the load",
+    "load velocity": "velocity of\nthe load",
     "position": "position",
     "stretch": "stretch",
     "command": "command",
+    "damping along the way": "at the usual speed:\nposition",
 }
 _BEFORE: dict[str, Any] = {
     "color": style.OTHER,
@@ -58,7 +61,7 @@ def draw(closed: Closed) -> Figure:
     figure = style.new_figure(3.1)
     panels = figure.subplots(1, len(curves), sharey=True, squeeze=False)[0]
     for axes, (over, row) in zip(panels, curves.items(), strict=True):
-        _panel(axes, closed, over, row, force.factor)
+        _panel(axes, closed, over, row, force.factor, steps=4 if len(curves) < 5 else 2)
     panels[0].set_ylabel(f"force, {force.unit}", fontsize=style.FONT)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
@@ -75,7 +78,7 @@ def draw(closed: Closed) -> Figure:
 def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]]:
     from bayeshaptic.diagnosis.residuals.columns import motions
     from bayeshaptic.diagnosis.residuals.force_curve import force_curve
-    from bayeshaptic.effects.nonlinear.shapes import COMMAND
+    from bayeshaptic.effects.nonlinear.shapes import ALONG, COMMAND, VELOCITY
 
     base, analysis = closed.base, closed.analysis
     assert base.recording is not None
@@ -84,24 +87,27 @@ def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]
     same = analysis.etfe.recording is not None and (
         analysis.etfe.recording.samples == base.recording.samples
     )
-    for over, motion in motions(base.fit, base.recording).items():
-        if over == COMMAND and not _saturates(closed):
+    known = motions(base.fit, base.recording)
+    for over, motion in known.items():
+        if over == COMMAND and over not in _raised(closed.traced.after):
+            continue  # only where it is still in question
+        if over == ALONG and over not in _raised(closed.traced.before):
             continue
-        row = [(force_curve(base.fit, base.etfe, over, motion), _BEFORE)]
+        times = known[VELOCITY] / known[VELOCITY].std() if over == ALONG else 1.0
+        row = [(force_curve(base.fit, base.etfe, over, motion, times), _BEFORE)]
         if nonlinear and same:
-            row.append((force_curve(analysis.fit, base.etfe, over, motion), _FORCE))
+            row.append((force_curve(analysis.fit, base.etfe, over, motion, times), _FORCE))
         if closed.effects and same:
-            row.append((force_curve(analysis.fit, analysis.etfe, over, motion), _AFTER))
+            row.append((force_curve(analysis.fit, analysis.etfe, over, motion, times), _AFTER))
         found[over] = row
     return found
 
 
-def _saturates(closed: Closed) -> bool:
-    """Where something in the command, not in the motion, is still in question."""
+def _raised(tests: Sequence[Test]) -> set[str]:
+    """What the tests that are flagged are over."""
     from bayeshaptic.effects.laws import variables
-    from bayeshaptic.effects.nonlinear.shapes import COMMAND
 
-    return COMMAND in variables(test.name for test in closed.traced.after if test.flagged)
+    return variables(test.name for test in tests if test.flagged)
 
 
 def _panel(
@@ -110,6 +116,7 @@ def _panel(
     over: str,
     row: list[tuple[ForceCurve, dict[str, Any]]],
     factor: float,
+    steps: int,
 ) -> None:
     from matplotlib.ticker import MaxNLocator
 
@@ -118,7 +125,9 @@ def _panel(
     unit = etfe.force_unit if over == "command" else unit
     motion = scale(float(np.abs(row[0][0].motion).max()), unit)
     style.panel(axes, f"{_TITLES[over]}, {motion.unit}")
-    axes.xaxis.set_major_locator(MaxNLocator(4, symmetric=True))  # numbers of a stretch are long
+    axes.xaxis.set_major_locator(
+        MaxNLocator(steps, symmetric=True)
+    )  # numbers of a stretch are long
     axes.axhline(0, color=style.PRIOR, linewidth=0.7)
     vague = 6.0  # times the usual error of a curve: such a point would only hide the others
     for curve, look in row:
