@@ -263,11 +263,16 @@ def test_a_report_survives_its_average(
 
 
 @pytest.mark.parametrize(
-    ("name", "slope"), [("coulomb_friction", -np.sqrt(2 / np.pi)), ("cubic_damping", -3.0)]
+    ("name", "slope"),
+    [
+        ("coulomb_friction", -np.sqrt(2 / np.pi)),
+        ("cubic_damping", -3.0),
+        ("damping_along_the_way", -1.0),
+    ],
 )
 def test_a_force_stands_in_the_fit_as_its_describing_function(name: str, slope: float) -> None:
     shape = effect_class(name).tests[0]
-    assert slope_of(shape.force) == pytest.approx(slope, rel=0.02)
+    assert slope_of(shape) == pytest.approx(slope, rel=0.02)
 
 
 def test_what_a_test_says_of_a_strength_is_its_likelihood() -> None:

@@ -9,7 +9,7 @@ explains, is what the tests of the residual look for: they say how strong it may
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -21,6 +21,7 @@ from bayeshaptic.diagnosis.hidden.suspects import ForceSaid, Suspect
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.shapes import (
+    ALONG,
     COMMAND,
     LOAD_VELOCITY,
     POSITION,
@@ -37,6 +38,7 @@ from bayeshaptic.types import Floats
 # Between which masses a force acts, and whether it is a damper's.
 _ENDS = {
     VELOCITY: (MASSES[MOTOR], None, True),
+    ALONG: (MASSES[MOTOR], None, True),
     LOAD_VELOCITY: (MASSES[BODY], None, True),
     POSITION: (MASSES[MOTOR], None, False),
     STRETCH: (MASSES[MOTOR], MASSES[BODY], False),
@@ -103,7 +105,7 @@ def force_suspects(
         looked |= {shape.name for shape in places}
         if kind.name in found:
             continue
-        slopes = [slope_of(shape.force) for shape in places]
+        slopes = [slope_of(shape) for shape in places]
         pulls = [(s, a) for s, a in zip(places, slopes, strict=True) if abs(a) > least]
         for shape, slope in pulls:
             force = seen[shape.name]
@@ -149,18 +151,21 @@ def _said(test: Test) -> ForceSeen:
 
 
 def _power_of(shape: Shape) -> float:
-    """What power of its variable a force is; not a number where it is none."""
+    """What power of its variable a force is; not a number where it is none, or is of two."""
+    if shape.over == ALONG:
+        return np.nan
     one, two, four = np.abs(shape.force(np.array([1.0, 2.0, 4.0])))
     alike = min(one, two, four) > 0 and np.isclose(two / one, four / two, rtol=1e-6)
     return float(np.log2(two / one)) if alike else np.nan
 
 
 @cache
-def slope_of(force: Callable[[Floats], Floats]) -> float:
-    """E[f(z) z] of a standard normal z."""
+def slope_of(shape: Shape) -> float:
+    """E[f(z) z] of a standard normal z; of damping along the way E[f(z)], of its mean."""
     nodes = 200
     z, weight = hermegauss(nodes)
-    return float(np.sum(weight * force(z) * z) / weight.sum())
+    times = 1.0 if shape.over == ALONG else z
+    return float(np.sum(weight * shape.force(z) * times) / weight.sum())
 
 
 def _stand_in(name: str, shape: Shape, slope: float) -> LinearStandIn:

@@ -121,9 +121,9 @@ def columns(
 ) -> dict[str, tuple[Complexes, float]]:
     """Motions that nonlinear forces would add, at lines, (1 or 2, L); by name.
 
-    Each with the rms of the motion that the force is a function of.  Where a hand moves the device,
-    too, its own motion is in such a force and in what no response explains: what the command alone
-    would make of the force comes first, as an instrument.
+    Each with the rms of the motion that the force is a function of, or is multiplied by.  Where a
+    hand moves the device, too, its own motion is in such a force and in what no response explains:
+    what the command alone would make of the force comes first, as an instrument.
 
     Parameters
     ----------
@@ -135,17 +135,17 @@ def columns(
     """
     s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
     found, known = {}, motions(fit, recording)
-    velocity = known[VELOCITY] / known[VELOCITY].std()
+    fast = float(known[VELOCITY].std())
     for over, motion in known.items():
         response = response_to(fit, over, s)
         driven = _by_the_command(fit, recording, over)
-        times = velocity if over == ALONG else 1.0
+        times = known[VELOCITY] / fast if over == ALONG else 1.0
         for shape in tested().values():
             if shape.over == over:
                 rms = float(motion.std())
                 made = [motion] if driven is None else [driven, motion]
                 added = [response * at_lines(times * shape.force(moved / rms)) for moved in made]
-                found[shape.name] = np.stack(added), rms
+                found[shape.name] = np.stack(added), fast if over == ALONG else rms
     return found
 
 
