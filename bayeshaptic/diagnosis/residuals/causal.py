@@ -122,7 +122,8 @@ def _force_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
     frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     at_lines = line_transform(etfe, recording)
     found = []
-    for name, (inputs, rms) in columns(fit, recording, frequency_hz, at_lines).items():
+    moved = columns(fit, recording, frequency_hz, at_lines, in_loop=True)
+    for name, (inputs, rms) in moved.items():
         score, sd = _beside_linear(fit, etfe, smooth, inputs[0])
         found.append(force_test(name, abs(score), ForceSeen(score * sd, sd, rms)))
     time = np.linspace(-1.0, 1.0, recording.samples)

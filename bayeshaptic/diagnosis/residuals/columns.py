@@ -64,7 +64,8 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     tests = []
     frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     at_lines, response = line_transform(etfe, recording), remembered(fit.response)
-    for name, (inputs, rms) in columns(fit, recording, frequency_hz, at_lines).items():
+    made = columns(fit, recording, frequency_hz, at_lines, etfe.through_reference)
+    for name, (inputs, rms) in made.items():
         windows = etfe.spectra.windows(response, inputs)
         strength, sd, freedom = common_coefficient(windows, len(inputs))
         score = as_normal(abs(strength / sd), freedom) if sd > 0 else 0.0
@@ -118,6 +119,7 @@ def columns(
     recording: Recording,
     frequency_hz: Floats,
     at_lines: Callable[[Floats], Complexes],
+    in_loop: bool = False,
 ) -> dict[str, tuple[Complexes, float]]:
     """Motions that nonlinear forces would add, at lines, (1 or 2, L); by name.
 
@@ -132,11 +134,16 @@ def columns(
     frequency_hz : ndarray, shape (L,)
     at_lines : callable
         A signal, shape (N,), to its DFT there.
+    in_loop : bool
+        Damping along the way is left out: of it, alone, clean loops have scores three times too
+        large.
     """
     s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
     found, known = {}, motions(fit, recording)
     fast = float(known[VELOCITY].std())
     for over, motion in known.items():
+        if in_loop and over == ALONG:
+            continue
         response = response_to(fit, over, s)
         driven = _by_the_command(fit, recording, over)
         times = known[VELOCITY] / fast if over == ALONG else 1.0
@@ -151,11 +158,8 @@ def columns(
 
 def _by_the_command(fit: Fit, recording: Recording, over: str) -> Floats | None:
     """A velocity that the command alone makes, where a hand makes some of it; None elsewhere."""
-    if (
-        over not in (VELOCITY, LOAD_VELOCITY)
-        or not fit.model.held
-        or recording.reference is not None
-    ):
+    by_hand = fit.model.held and recording.reference is None
+    if not by_hand or over not in (VELOCITY, LOAD_VELOCITY):
         return None
     force = recording.force - recording.force.mean()
     mass = 1 if over == LOAD_VELOCITY else 0
