@@ -21,7 +21,7 @@ WALKERS = 64
 _WARM_UP = (2, 2, 4, 4, 6, 6, 6, 6)  # steps a parameter in each round
 _IDLE = 2  # rounds without a gain
 # Of the moves that are independent proposals; the others are differences, which help where the
-# proposal misses something and else are little gained.
+# proposal misses something and gain little elsewhere.
 _WARM, _FROZEN = 0.6, 0.95
 _MISSED = 2.0  # log of density over proposal, above the median, from which a place is missed
 # Degrees of freedom of what a proposal is made of, next to normal as posteriors are, and of what
