@@ -7,16 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linear_bench import PHANTOM_HELD, Device, tremor
 from scipy.stats import chi2
+from under_a_hand import scores_under_a_hand
 
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals import residual
-from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
-from bayeshaptic.inference.least_squares import least_squares
-from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.objections import _rubs_otherwise
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
@@ -46,29 +42,12 @@ def test_it_is_found_and_the_limit_is_that_where_there_is_least(held: bool) -> N
 
 
 def test_a_hand_that_moves_the_device_feigns_none() -> None:
-    device, period_s, samples, count = Device(PHANTOM_HELD), 1e-3, 15_000, 6e-5
-    model = build_model("grasped", "phantom")
-    scores: dict[str, list[float]] = {"x^2 v": [], "x v": []}
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        force = 0.03 * rng.standard_normal(samples)
-        hand = 0.01 * tremor(rng, samples, period_s)
-        position = device.simulate(force) + device.simulate(hand, 2)
-        recording = recording_from_arrays(
-            force=force,
-            position=np.round(position / count) * count,
-            period_s=period_s,
-            force_unit="Nm",
-            position_unit="rad",
-        )
-        etfe = estimate_etfe(recording)
-        fit = least_squares(model, etfe, start=model.values)
-        for test in nonlinear_tests(fit, etfe):
-            if test.name in scores:
-                scores[test.name].append(test.statistic)
-    for name, found in scores.items():
-        assert len(found) == 8
-        assert np.sum(np.square(found)) < chi2.ppf(0.999, 8), name
+    found = scores_under_a_hand(
+        ("x^2 v", "x v"), lambda rng: 0.03 * rng.standard_normal(15_000), recordings=8
+    )
+    for name, scores in found.items():
+        assert len(scores) == 8
+        assert np.sum(np.square(scores)) < chi2.ppf(0.999, 8), name
 
 
 def test_no_stiffness_where_damping_changes_along_the_way_as_no_law_says() -> None:

@@ -125,9 +125,8 @@ def _panel(
     unit = etfe.force_unit if over == "command" else unit
     motion = scale(float(np.abs(row[0][0].motion).max()), unit)
     style.panel(axes, f"{_TITLES[over]}, {motion.unit}")
-    axes.xaxis.set_major_locator(
-        MaxNLocator(steps, symmetric=True)
-    )  # numbers of a stretch are long
+    # Numbers of a stretch are long.
+    axes.xaxis.set_major_locator(MaxNLocator(steps, symmetric=True))
     axes.axhline(0, color=style.PRIOR, linewidth=0.7)
     vague = 6.0  # times the usual error of a curve: such a point would only hide the others
     for curve, look in row:
