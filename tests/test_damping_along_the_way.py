@@ -21,7 +21,7 @@ from benchmarks.recordings.foreign import TighterAway
 
 @pytest.mark.parametrize("held", [True, False])
 def test_it_is_found_and_the_limit_is_that_where_there_is_least(held: bool) -> None:
-    """The held one's limit had been said to be 1.2 times as high, in green; the free one's 1.5."""
+    """Of the held one 1.21 times the limit had been recommended, of the free one 1.26, in green."""
     plain = Bench.from_device("phantom", held=held)
     effect = TighterAway.typical(plain.scales())
     bench = plain.with_effect(effect)

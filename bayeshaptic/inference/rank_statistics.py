@@ -109,7 +109,8 @@ def _size(chains: Floats) -> float:
         return float(1.0 - (within - covariance) / total)
 
     time, pair = -1.0, np.inf
-    for lag in range(0, 2 * max((draws - 3) // 2, 0), 2):
+    last = 2 * max((draws - 3) // 2, 0)
+    for lag in range(0, last, 2):
         even = correlation(lag)
         both = even + correlation(lag + 1)
         if both <= 0:
@@ -117,7 +118,7 @@ def _size(chains: Floats) -> float:
         pair = min(pair, both)
         time += 2 * pair
     else:
-        even = correlation(2 * max((draws - 3) // 2, 0))
+        even = correlation(last)
     time += max(even, 0.0)
     size = chains.size / max(time, 1 / np.log10(chains.size))
     return float(size) if np.isfinite(size) else 0.0
