@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfilt
+from along_the_way import DELAY_S, guided
 from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
@@ -42,8 +42,7 @@ from bayeshaptic.rig.effects.nonlinear import Drag
 from bayeshaptic.stability import critical_stiffness
 from bayeshaptic.types import Floats
 from benchmarks.recordings.foreign import LoadFriction, TanhSaturation, VelocityCubed
-from benchmarks.strangers.device import Masses
-from benchmarks.strangers.motion import STEPS, Forces, Motion
+from benchmarks.strangers.motion import Forces
 
 LHIFAM = Bench.from_device("lhifam")
 SECONDS, SEED = 10.0, 3
@@ -344,33 +343,18 @@ def test_friction_on_the_other_mass_is_put_there() -> None:
     assert best.accepted.estimates["friction_force"].mean == pytest.approx(0.5, rel=0.1)
 
 
-def guided(tighter: float) -> tuple[State, float]:
-    """Two masses of another simulation, whose motor rubs more along the way, and their limit."""
-    pair = Masses([0.19, 5.2])
-    pair.tie(0, None, 0.1, 0.0)
-    pair.tie(0, 1, 15.0, 55.3e3)
-    pair.tie(1, None, 6.8, 0.0)
-    device, period, delay = pair.states(), 1e-3, 2e-4
-    transition, entry, entries = device.held(period / STEPS)
-    samples = int(SECONDS / period)
-    none = np.zeros(samples)
-    motion = Motion(
-        transition[None], samples, entry, entries, device.c, round(delay / period * STEPS)
-    )
-    noise = np.random.default_rng(1).normal(size=samples)
-    force = 4.0 * sosfilt(butter(2, [0.3, 300.0], "band", fs=1 / period, output="sos"), noise)
-    position = motion.under(force, none, Forces(friction=0.4, tighter=tighter))
-    count = 3e-6
-    recording = recording_from_arrays(force, count * np.round(position / count), period_s=period)
+def rubbing(tighter: float) -> tuple[State, float]:
+    """A motor that rubs more along the way, and its limit."""
+    recording, limit = guided(Forces(friction=0.4, tighter=tighter), SECONDS)
     etfe = estimate_etfe(recording)
-    state = State(etfe, least_squares(build_model("free", "lhifam"), etfe))
-    return state, device.critical_stiffness(period, delay)
+    model = build_model("free", "lhifam", delay_s=DELAY_S)
+    return State(etfe, least_squares(model, etfe)), limit
 
 
 def test_friction_that_changes_along_the_way_is_sized(monkeypatch: pytest.MonkeyPatch) -> None:
     only(monkeypatch, "coulomb_friction", "friction_along_the_way")
     tighter = 50.0
-    state, truth = guided(tighter)
+    state, truth = rubbing(tighter)
     best = max(nonlinear_trials(state, {"sign(v)"}, Meter()), key=lambda trial: trial.score)
     assert best.name == "friction_along_the_way" and best.convincing
     position = state.etfe.unbroken.position

@@ -14,6 +14,7 @@ from bayeshaptic.diagnosis.residuals.residual import (
     frequency_tests,
     smooth_columns,
 )
+from bayeshaptic.diagnosis.residuals.ripples import ripple_tests
 from bayeshaptic.diagnosis.samples.mend import SampleLook, measurement_tests
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -54,6 +55,7 @@ def model_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
         *nonlinear_tests(fit, etfe),
         *drift_tests(fit, etfe),
         *excess_noise_test(fit, etfe),
+        *ripple_tests(fit, etfe),
     )
 
 

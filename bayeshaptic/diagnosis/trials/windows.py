@@ -16,6 +16,7 @@ from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.diagnosis.trials.force_bench import with_forces
 from bayeshaptic.diagnosis.trials.linear import Sight, first_sight, linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import found_anew, nonlinear_trials, reconsidered
+from bayeshaptic.diagnosis.trials.ripples import ripple_trials
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.numerics.spending import Meter
@@ -105,6 +106,7 @@ class WindowTrials:
             explained = seen and any(trial.convincing for trial in found) and _bends(tests)
         if "time-varying" in families:
             found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
+        found += map(_on_other_samples, ripple_trials(state, raised, meter, tick))
         now = patient or _looks_like_a_force(tests) or "linear" not in families
         if "nonlinear" in families and now and not explained:
             found += nonlinear_trials(state, raised, meter, tick)

@@ -1,0 +1,233 @@
+"""Does the force ripple along the way, as a motor's torque does over its poles?
+
+A motor pulls towards its poles with or without a current (cogging), and gives a little more of what
+is commanded at one place than at another (a gain that ripples).  A linear model knows the mean; the
+rest looks like noise of the force.  What the model leaves, taken back to the force, goes with
+sin N x and cos N x then, x the position, or with these times the command.  Gathered along the way
+it has a line at N: a periodogram over position in the place of time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.columns import common_coefficient, line_transform
+from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.quantities import percent, quantity
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.response.windows import remembered
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.types import Floats
+
+# Slower ones are a spring, or a gain that changes along the way, of which the motion sees less than
+# a period, and what a response that is a little off feigns: of a normal motion e^(-8) is left.
+_SLOWEST = 4.0  # radians over the rms of the position
+_PLACES, _FINEST = 4096, 8  # along the way; and places, or counts of the encoder, in a period
+_AROUND = 51  # lines whose power together is the noise of the one in their middle
+_LOOKS = 3  # peaks of the periodogram that are looked at closely
+_FINER = 9  # steps between two of its places
+
+
+@dataclass(frozen=True)
+class Wave:
+    """What ripples.
+
+    Attributes
+    ----------
+    test : str
+        The name of the test that looks for it.
+    effect, title : str
+    of_the_gain : bool
+        Or of a force besides the command.
+    """
+
+    test: str
+    effect: str
+    title: str
+    of_the_gain: bool
+
+    def on(self, force: Floats) -> Floats:
+        """What its waves are multiplied by, shape (N,)."""
+        return force if self.of_the_gain else np.ones(len(force))
+
+
+WAVES = (
+    Wave("gain along the way", "gain_along_the_way", "a gain that ripples along the way", True),
+    Wave("force along the way", "cogging", "cogging: a force that ripples along the way", False),
+)
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """A ripple sine sin(rate x) + cosine cos(rate x), x the position less its mean.
+
+    Attributes
+    ----------
+    rate : float
+        Radians a unit of the position.
+    sine, cosine, sd : float
+        Of a force, or shares of the mean gain; and the standard deviation of either.
+    log_chance : float
+        -log10 of the chance that noise looks like this anywhere.
+    """
+
+    rate: float
+    sine: float
+    cosine: float
+    sd: float
+    log_chance: float
+
+    @property
+    def size(self) -> float:
+        return float(np.hypot(self.sine, self.cosine))
+
+    def at(self, place: Floats) -> Floats:
+        """The ripple at positions less their mean, shape (N,)."""
+        turned = self.rate * place
+        return np.asarray(self.sine * np.sin(turned) + self.cosine * np.cos(turned))
+
+
+def ripple_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """Whether a ripple stands out of the noise; none without a recording.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+        Of a recording that does not repeat.
+    """
+    recording = etfe.unbroken
+    if recording is None:
+        return ()
+    tests = []
+    for wave in WAVES:
+        found = find_ripple(wave, fit, etfe)
+        text, score = f"nothing like {wave.title} stands out", 0.0
+        if found is not None:
+            score = found.log_chance
+            size = quantity(found.size, recording.force_unit)
+            period = quantity(2 * np.pi / found.rate, recording.position_unit)
+            text = (
+                f"{wave.title} by {percent(found.size) if wave.of_the_gain else size}, once in "
+                f"{period} (the odds of noise like that: 1 in 10^{score:.0f})"
+            )
+        tests.append(Test(wave.test, "nonlinear", score, thresholds.LOG_CHANCE, None, text))
+    return tuple(tests)
+
+
+def find_ripple(wave: Wave, fit: Fit, etfe: Etfe) -> Ripple | None:
+    """The ripple that stands out most; None where the periodogram has no line.
+
+    A line of it is looked at again beside what any smooth response explains: a response that is a
+    little off, under a sweep or tones, makes lines as well.
+
+    Parameters
+    ----------
+    wave : Wave
+    fit : Fit
+    etfe : Etfe
+    """
+    recording = etfe.unbroken
+    if recording is None or recording.position.std() == 0:
+        return None
+    place = place_of_action(fit, recording)
+    product = _product(wave, fit, etfe, recording)
+    rates, power = _periodogram(place, product, increment_unit(recording.position) or 0.0)
+    if not len(rates):
+        return None
+    # Two degrees of freedom: the chance of a power is its exponential.
+    independent = (rates[-1] - rates[0]) * np.ptp(place) / (2 * np.pi)
+    least = np.log(independent) + thresholds.LOG_CHANCE * np.log(10)
+    looked = []
+    for _ in range(_LOOKS):
+        top = int(np.argmax(power))
+        if power[top] < least:
+            break
+        rate = _finer(place, product, rates, top)
+        looked.append(_looked_at(wave, fit, etfe, place, rate, independent))
+        power[max(top - _FINER, 0) : top + _FINER] = 0.0
+    return max(looked, key=lambda ripple: ripple.log_chance, default=None)
+
+
+def place_of_action(fit: Fit, recording: Recording) -> Floats:
+    """Where the motor is in the middle of a command's hold, less the mean position, shape (N,).
+
+    Parameters
+    ----------
+    fit : Fit
+    recording : Recording
+    """
+    delay_s = float(fit.model.system(fit.theta).delay_s[0])
+    rows = np.arange(recording.samples)
+    middle = rows + delay_s / recording.period_s + 0.5
+    position = recording.position - recording.position.mean()
+    return np.interp(middle, rows, position)
+
+
+def _product(wave: Wave, fit: Fit, etfe: Etfe, recording: Recording) -> Floats:
+    """What a unit of force more, at each sample, would explain of what the fit leaves.
+
+    Times what the wave is multiplied by.
+    """
+    force = recording.force - recording.force.mean()
+    frequency = np.asarray(np.fft.rfftfreq(recording.samples, recording.period_s), float)
+    inside = (frequency >= etfe.band_hz[0]) & (frequency <= etfe.band_hz[1])
+    response = np.zeros(len(frequency), complex)
+    response[inside] = fit.response(frequency[inside])
+    position = np.fft.rfft(recording.position - recording.position.mean())
+    left = np.where(inside, position - response * np.fft.rfft(force), 0.0)
+    power = uniform_filter1d(np.abs(left) ** 2, _AROUND)
+    seen = uniform_filter1d(inside.astype(float), _AROUND)
+    weight = np.where(inside & (power > 0), seen / np.maximum(power, 1e-300), 0.0)
+    more = np.fft.irfft(weight * np.conj(response) * left, recording.samples)
+    product = wave.on(force) * more
+    return np.asarray(product - product.mean())
+
+
+def _periodogram(place: Floats, product: Floats, count: float) -> tuple[Floats, Floats]:
+    """Rates along the way, and power there over its mean in noise.
+
+    None of an encoder's counts, whose rounding has their period.
+    """
+    span = float(np.ptp(place))
+    bins = np.minimum((place - place.min()) / span * _PLACES, _PLACES - 1).astype(int)
+    along = np.bincount(bins, weights=product, minlength=_PLACES)
+    finer = 4  # steps for each independent rate
+    power = np.abs(np.fft.rfft(along, finer * _PLACES)) ** 2 / np.sum(product**2)
+    rates = 2 * np.pi * np.arange(len(power)) / (finer * span)
+    fastest = 2 * np.pi / (_FINEST * max(span / _PLACES, count))
+    wanted = (rates * place.std() > _SLOWEST) & (rates < fastest)
+    return rates[wanted], power[wanted]
+
+
+def _finer(place: Floats, product: Floats, rates: Floats, top: int) -> float:
+    """The rate of a line, between its neighbours."""
+    near = np.linspace(rates[max(top - 1, 0)], rates[min(top + 1, len(rates) - 1)], 2 * _FINER + 1)
+    power = [abs(np.sum(product * np.exp(-1j * rate * place))) for rate in near]
+    return float(near[int(np.argmax(power))])
+
+
+def _looked_at(
+    wave: Wave, fit: Fit, etfe: Etfe, place: Floats, rate: float, independent: float
+) -> Ripple:
+    """A ripple of this rate beside what a smooth response explains in each window."""
+    recording = etfe.unbroken
+    assert recording is not None
+    force = recording.force - recording.force.mean()
+    at_lines, response = line_transform(etfe, recording), remembered(fit.response)
+    answers = response(etfe.spectra.frequency_hz)  # type: ignore[attr-defined]
+    sizes, sds, square = [], [], 0.0
+    for turn in (np.sin, np.cos):
+        column = answers * at_lines(wave.on(force) * turn(rate * place))
+        size, sd, _ = common_coefficient(etfe.spectra.windows(response, column[None]))
+        sizes.append(size)
+        sds.append(sd)
+        square += (size / sd) ** 2 if sd > 0 else 0.0
+    log_chance = 0.5 * square / np.log(10) - np.log10(independent)
+    return Ripple(rate, sizes[0], sizes[1], max(sds), max(float(log_chance), 0.0))

@@ -1,0 +1,112 @@
+"""Trying ripples along the way: the recording with the force that the motor gave."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis.residuals.ripples import (
+    WAVES,
+    Ripple,
+    Wave,
+    find_ripple,
+    place_of_action,
+)
+from bayeshaptic.diagnosis.state import (
+    Accepted,
+    Estimate,
+    State,
+    Trial,
+    describe_gain,
+    log_likelihoods,
+)
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import compress
+from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.types import Floats, Tick
+
+_SIZE = 3  # parameters: the period, and both parts of the ripple
+_MOST = 0.9  # of the mean gain, or of the limit, that a ripple may be
+
+
+def ripple_trials(
+    state: State, raised: set[str], meter: Meter, tick: Tick | None = None
+) -> list[Trial]:
+    """One trial for each ripple that a test has raised.
+
+    Parameters
+    ----------
+    state : State
+    raised : set of str
+        Names of tests.
+    meter : Meter
+    tick : callable, optional
+        Called with the title of each.
+    """
+    recording = state.etfe.recording
+    trials = []
+    for wave in WAVES:
+        if recording is None or wave.test not in raised or not meter.affords(wave.title):
+            continue
+        if tick:
+            tick(wave.title)
+        ripple = find_ripple(wave, state.fit, state.etfe)
+        if ripple is not None and (trial := _try(state, recording, wave, ripple)) is not None:
+            trials.append(trial)
+    return trials
+
+
+def _try(state: State, recording: Recording, wave: Wave, ripple: Ripple) -> Trial | None:
+    lowered = _lowered(state, wave, ripple)
+    if lowered is None:
+        return None
+    given = _given(state, recording, wave, ripple)
+    etfe = estimate_etfe(replace(recording, force=given), state.etfe.band_hz)
+    fit = least_squares(state.model, etfe, start=state.fit.theta)
+    before, after = (
+        log_likelihoods(one.model, compress(of, one.response), one.theta)
+        for of, one in ((state.etfe, state.fit), (etfe, fit))
+    )
+    gains = after - before
+    unit = "" if wave.of_the_gain else recording.force_unit
+    accepted = Accepted(
+        wave.effect,
+        wave.title,
+        "nonlinear",
+        f"{wave.title} {describe_gain(float(gains[1]))}; the limit is that of the worst place",
+        {
+            "ripple": Estimate(ripple.size, ripple.sd, unit),
+            "ripple_period": Estimate(
+                2 * np.pi / ripple.rate, float("nan"), recording.position_unit
+            ),
+        },
+        limit_log_sd=ripple.sd / (1 + ripple.size) if wave.of_the_gain else 0.0,
+        limit_log_fall=lowered,
+    )
+    changed = State(etfe, fit, (*state.accepted, accepted))
+    return Trial(accepted, changed, float(gains[0]), float(gains[1]), _SIZE)
+
+
+def _given(state: State, recording: Recording, wave: Wave, ripple: Ripple) -> Floats:
+    """The force of the motor, shape (N,).
+
+    Of a gain over the largest: there the loop is nearest to instability, and the critical
+    stiffness in units of the command is lowest.
+    """
+    at = ripple.at(place_of_action(state.fit, recording))
+    if wave.of_the_gain:
+        return np.asarray(recording.force * (1 + at) / (1 + ripple.size))
+    return np.asarray(recording.force + at)
+
+
+def _lowered(state: State, wave: Wave, ripple: Ripple) -> float | None:
+    """How much log K_CR is lower where cogging is stiffest; None of what is no ripple any more."""
+    if wave.of_the_gain:
+        return 0.0 if ripple.size < _MOST else None
+    limit = float(critical_stiffness(state.model, state.fit.theta).value)
+    stiffness = ripple.size * ripple.rate
+    return -float(np.log1p(-stiffness / limit)) if stiffness < _MOST * limit else None
