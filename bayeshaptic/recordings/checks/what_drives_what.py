@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.quantities import percent
+from bayeshaptic.recordings.feedback import UNDECIDED
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import Causality, causality
+from bayeshaptic.recordings.signals.controller import share_by_a_law
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 
 
@@ -30,8 +33,13 @@ def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> 
         raise _turned_round(where)
     if found.relay:
         raise _relay(recording, where)
-    if found.has_feedback or found.doubtful:
-        return [_feedback(found, against)]
+    if found.has_feedback:
+        return [_feedback(found.evidence, against)]
+    if not measured and (share := share_by_a_law(recording)) > 0:
+        law = f"in {percent(share)} of the samples a linear law of the positions makes it exactly"
+        return [_feedback(law, against)]
+    if found.doubtful:
+        return [_doubt(found.evidence)]
     own = recording.sensed is None or recording.sensed.derivatives == 0
     if own and rough.is_velocity(recording.period_s):
         raise _velocity(where)
@@ -75,26 +83,28 @@ def _velocity(where: str) -> InputError:
     )
 
 
-def _feedback(found: Causality, against: bool) -> Notice:
-    """That the force was computed from the motion, or may have been."""
-    if found.has_feedback:
-        text = (
-            f"The force was computed from the motion ({found.evidence}): the recording was made in "
-            "closed loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force "
-            "that does not depend on the motion."
+def _feedback(evidence: str, against: bool) -> Notice:
+    """That the force was computed from the motion."""
+    text = (
+        f"The force was computed from the motion ({evidence}): the recording was made in closed "
+        "loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force that does "
+        "not depend on the motion."
+    )
+    if against:
+        text += (
+            " The position goes against the force: if this was an open loop, one of them has the "
+            "opposite sign; turn it round with --columns, as in position=NAME*-1."
         )
-        if against:
-            text += (
-                " The position goes against the force: if this was an open loop, one of them has "
-                "the opposite sign; turn it round with --columns, as in position=NAME*-1."
-            )
-    else:
-        text = (
-            f"It cannot be decided whether the force was computed from the motion "
-            f"({found.evidence}, more than chance but little). If the recording was made in closed "
-            "loop, the ETFE, the fit and K_CR are biased: record again with a force that does not "
-            "depend on the motion, and longer."
-        )
+    return Notice("warning", "feedback", text)
+
+
+def _doubt(evidence: str) -> Notice:
+    """That it may have been."""
+    text = (
+        f"It {UNDECIDED} whether the force was computed from the motion ({evidence}, more than "
+        "chance but little). If the recording was made in closed loop, the ETFE, the fit and K_CR "
+        "are biased: record again with a force that does not depend on the motion, and longer."
+    )
     return Notice("warning", "feedback", text)
 
 

@@ -28,6 +28,9 @@ _EXACT = 1e-5
 _OUT, _SHARE = 30.0, 1e-3
 _FEWEST_CHANGES = 8
 _MOST_AT_LIMIT = 1e-3  # of the samples: a command that was cut off obeys no law there
+# A law of the positions holds in most samples, and leaves half of those at most in which no law of
+# the command's own past holds: steps and pauses are laws of that kind.
+_MOST, _HALF = 0.5, 0.5
 
 
 def controller_reference(recording: Recording) -> Floats | None:
@@ -48,24 +51,58 @@ def _cut_off(force: Floats) -> bool:
     return max(at) > max(_MOST_AT_LIMIT, 2 / len(force))
 
 
+def share_by_a_law(recording: Recording) -> float:
+    """In which share of the samples a linear law makes the force of the positions, exactly.
+
+    Zero where it is less than half, where the force's own past says it as well, or where nothing
+    changes that a controller may follow: positions without noise are an exact law of the force.
+
+    Parameters
+    ----------
+    recording : Recording
+    """
+    piece = max(recording.pieces, key=lambda one: one.samples)
+    found, by_itself = _left_over(piece), _left_over(piece, own=True)
+    if found is None or by_itself is None:
+        return 0.0
+    left, own = (float(np.mean(np.abs(part) > _EXACT)) for part in (found, by_itself))
+    changes = int(np.count_nonzero(_changes(found)))
+    if left > 1 - _MOST or left > _HALF * own or changes < _FEWEST_CHANGES:
+        return 0.0
+    return 1 - left
+
+
 def _left(piece: Recording) -> Floats | None:
+    left = _left_over(piece)
+    if left is None or np.count_nonzero(_changes(left)) < _FEWEST_CHANGES:
+        return None
+    found = np.zeros(piece.samples)
+    found[_LAGS + 2 :] = np.where(_changes(left), left, 0.0)
+    return found
+
+
+def _changes(left: Floats) -> Bools:
+    """Where what a controller follows steps or bends."""
+    size = np.abs(left)
+    most = max(_OUT * float(np.quantile(size, 0.9)), _SHARE * float(size.max()))
+    return np.asarray(size > most)
+
+
+def _left_over(piece: Recording, own: bool = False) -> Floats | None:
+    """What the sparsest law leaves of second differences of the force, over their size.
+
+    With `own` a law of the force's past alone; None where one of them does not move.
+    """
     force, position = (np.diff(signal, 2) for signal in (piece.force, piece.position))
     commanded, moved = float(np.std(force)), float(np.std(position))
     if commanded == 0 or moved == 0:
         return None
     rows = len(force) - _LAGS
     columns = [force[_LAGS - lag : _LAGS - lag + rows] / commanded for lag in range(1, _LAGS + 1)]
-    columns += [position[_LAGS - lag : _LAGS - lag + rows] / moved for lag in range(_LAGS + 1)]
+    if not own:
+        columns += [position[_LAGS - lag : _LAGS - lag + rows] / moved for lag in range(_LAGS + 1)]
     design, target = np.stack(columns, axis=1), force[_LAGS:] / commanded
-    law = _sparsest(design[:_FITTED], target[:_FITTED])
-    left = target - design @ law
-    size = np.abs(left)
-    changes = size > max(_OUT * float(np.quantile(size, 0.9)), _SHARE * float(size.max()))
-    if np.count_nonzero(changes) < _FEWEST_CHANGES:
-        return None
-    found = np.zeros(piece.samples)
-    found[_LAGS + 2 :] = np.where(changes, left, 0.0)
-    return found
+    return np.asarray(target - design @ _sparsest(design[:_FITTED], target[:_FITTED]))
 
 
 def _sparsest(design: Floats, target: Floats) -> Floats:
