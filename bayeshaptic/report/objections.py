@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bayeshaptic.diagnosis.base.alignment import MOVED
 from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
 from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
+from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
@@ -51,6 +52,11 @@ def why_none(result: Result) -> tuple[str, ...]:
         found.append(
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part"
+        )
+    if closed and GAIN.test in _left(closed):
+        found.append(
+            "the gain of the actuator ripples along the way, which was not taken off, and where it "
+            "is largest the limit is lower by that"
         )
     if closed and closed.may_be_held_by_friction:
         found.append(

@@ -1,11 +1,13 @@
 """Is there a force that is not linear in a motion that repeats?  How strong may one be, unseen?
 
-The columns are those of `bayeshaptic.diagnosis.residuals.columns`, averaged over the periods.  A
-line has no neighbours that only noise moves, so what a force adds is looked for beside what the
-model's parameters and any smooth change of the response can do.
+The columns are those of `bayeshaptic.diagnosis.residuals.columns`, averaged over the periods, and
+ripples along the way.  A line has no neighbours that only noise moves, so what a force adds is
+looked for beside what the model's parameters and any smooth change of the response can do.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +19,15 @@ from bayeshaptic.diagnosis.residuals.residual import (
     as_rows,
     beside_parameters,
     smooth_columns,
+)
+from bayeshaptic.diagnosis.residuals.ripples import (
+    STEPS,
+    WAVES,
+    Ripple,
+    Wave,
+    place_of_action,
+    rates_along,
+    ripple_test,
 )
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -40,25 +51,73 @@ def force_tests(fit: Fit, etfe: Etfe, period: Period) -> tuple[Test, ...]:
     def at_lines(signal: Floats) -> Complexes:
         return period.at_lines(period.transform(period.average(signal)))
 
-    own, residual = beside_parameters(fit)
-    smooth = smooth_columns(fit)[0]
-    freedom = len(residual) - own.shape[1] - smooth.shape[1]
-
-    def left_of(rows: Floats) -> Floats:
-        rows = rows - own @ (own.T @ rows)
-        return np.asarray(rows - smooth @ (smooth.T @ rows))
-
-    noise = max(1.0, float(np.linalg.norm(left_of(residual))) / np.sqrt(max(freedom, 1)))
+    beside = _beside(fit)
     tests = []
     for name, (inputs, rms) in columns(fit, recording, frequency_hz, at_lines).items():
         rows = as_rows(fit, inputs.T[:, None])
-        left = left_of(rows)
+        left = beside.left_of(rows)
         instrument, column = left[:, 0], left[:, -1]
         size = float(np.linalg.norm(instrument))
         if size <= ROUNDING * float(np.linalg.norm(rows[:, 0])):
             continue
-        along = float(instrument @ residual) / size
+        along = float(instrument @ beside.residual) / size
         answers = max(float(instrument @ column) / size, WEAK * size)
-        seen = ForceSeen(along / answers, noise / answers, rms)
-        tests.append(force_test(name, abs(along) / noise, seen))
+        seen = ForceSeen(along / answers, beside.noise / answers, rms)
+        tests.append(force_test(name, abs(along) / beside.noise, seen))
+    tests += [ripple_test(wave, _ripple(wave, fit, etfe, period), recording) for wave in WAVES]
     return tuple(tests)
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """What is explained already, the residual, and its size: 1 is noise.
+
+    `own` are orthonormal columns of what the parameters can do, `smooth` of what else is smooth.
+    """
+
+    own: Floats = field(repr=False)
+    smooth: Floats = field(repr=False)
+    residual: Floats = field(repr=False)
+
+    def left_of(self, rows: Floats) -> Floats:
+        rows = rows - self.own @ (self.own.T @ rows)
+        return np.asarray(rows - self.smooth @ (self.smooth.T @ rows))
+
+    @property
+    def noise(self) -> float:
+        freedom = len(self.residual) - self.own.shape[1] - self.smooth.shape[1]
+        left = float(np.linalg.norm(self.left_of(self.residual)))
+        return max(1.0, left / np.sqrt(max(freedom, 1)))
+
+
+def _beside(fit: Fit) -> _Beside:
+    own, residual = beside_parameters(fit)
+    return _Beside(own, smooth_columns(fit)[0], residual)
+
+
+def _ripple(wave: Wave, fit: Fit, etfe: Etfe, period: Period) -> Ripple | None:
+    """The ripple that stands out most of the lines."""
+    recording = etfe.unbroken
+    assert recording is not None
+    place = period.average(place_of_action(fit, recording))
+    rates = rates_along(place, recording)
+    if not len(rates):
+        return None
+    turned = np.outer(rates, place)
+    times = wave.on(period.average(recording.force - recording.force.mean()))
+    waves = times * np.stack([np.sin(turned), np.cos(turned)], axis=1)  # (R, 2, N)
+    lines = period.at_lines(period.transform(waves.reshape(-1, period.samples)))
+    response = fit.response(fit.windows.frequency_hz[:, 0])
+    beside = _beside(fit)
+    left = beside.left_of(as_rows(fit, (response * lines).T[:, None]))
+    pairs = left.reshape(len(left), len(rates), 2)
+    normal = np.einsum("nri,nrj->rij", pairs, pairs)
+    normal += 1e-12 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+    along = np.einsum("nri,n->ri", pairs, beside.residual)
+    sizes = np.linalg.solve(normal, along[:, :, None])[:, :, 0]
+    square = np.einsum("ri,ri->r", sizes, along) / beside.noise**2
+    best = int(np.argmax(square))
+    sd = beside.noise * float(np.sqrt(np.linalg.inv(normal[best]).diagonal().max()))
+    log_chance = 0.5 * square[best] / np.log(10) - np.log10(len(rates) / STEPS)
+    sine, cosine = sizes[best].tolist()
+    return Ripple(float(rates[best]), sine, cosine, sd, max(float(log_chance), 0.0))

@@ -29,6 +29,8 @@ from bayeshaptic.types import Floats
 # a period, and what a response that is a little off feigns: of a normal motion e^(-8) is left.
 _SLOWEST = 4.0  # radians over the rms of the position
 _PLACES, _FINEST = 4096, 8  # along the way; and places, or counts of the encoder, in a period
+_MOST_PERIODS = 100  # along the way: a motor's poles are not so many in the reach of a hand
+STEPS = 4  # rates for each that is independent of the others
 _AROUND = 51  # lines whose power together is the noise of the one in their middle
 _LOOKS = 3  # peaks of the periodogram that are looked at closely
 _FINER = 9  # steps between two of its places
@@ -57,10 +59,11 @@ class Wave:
         return force if self.of_the_gain else np.ones(len(force))
 
 
-WAVES = (
-    Wave("gain along the way", "gain_along_the_way", "a gain that ripples along the way", True),
-    Wave("force along the way", "cogging", "cogging: a force that ripples along the way", False),
+GAIN = Wave("gain along the way", "gain_along_the_way", "a gain that ripples along the way", True)
+COGGING = Wave(
+    "force along the way", "cogging", "cogging: a force that ripples along the way", False
 )
+WAVES = (GAIN, COGGING)
 
 
 @dataclass(frozen=True)
@@ -105,20 +108,30 @@ def ripple_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     recording = etfe.unbroken
     if recording is None:
         return ()
-    tests = []
-    for wave in WAVES:
-        found = find_ripple(wave, fit, etfe)
-        text, score = f"nothing like {wave.title} stands out", 0.0
-        if found is not None:
-            score = found.log_chance
+    return tuple(ripple_test(wave, find_ripple(wave, fit, etfe), recording) for wave in WAVES)
+
+
+def ripple_test(wave: Wave, found: Ripple | None, recording: Recording) -> Test:
+    """The test for a ripple, by the one that stands out most.
+
+    Parameters
+    ----------
+    wave : Wave
+    found : Ripple or None
+    recording : Recording
+    """
+    text, score = f"nothing like {wave.title} stands out", 0.0
+    if found is not None:
+        score = found.log_chance
+        size = percent(found.size)
+        if not wave.of_the_gain:
             size = quantity(found.size, recording.force_unit)
-            period = quantity(2 * np.pi / found.rate, recording.position_unit)
-            text = (
-                f"{wave.title} by {percent(found.size) if wave.of_the_gain else size}, once in "
-                f"{period} (the odds of noise like that: 1 in 10^{score:.0f})"
-            )
-        tests.append(Test(wave.test, "nonlinear", score, thresholds.LOG_CHANCE, None, text))
-    return tuple(tests)
+        period = quantity(2 * np.pi / found.rate, recording.position_unit)
+        text = (
+            f"{wave.title} by {size}, once in {period} (the odds of noise like that: 1 in "
+            f"10^{score:.0f})"
+        )
+    return Test(wave.test, "nonlinear", score, thresholds.LOG_CHANCE, None, text)
 
 
 def find_ripple(wave: Wave, fit: Fit, etfe: Etfe) -> Ripple | None:
@@ -138,11 +151,12 @@ def find_ripple(wave: Wave, fit: Fit, etfe: Etfe) -> Ripple | None:
         return None
     place = place_of_action(fit, recording)
     product = _product(wave, fit, etfe, recording)
-    rates, power = _periodogram(place, product, increment_unit(recording.position) or 0.0)
+    rates = rates_along(place, recording)
     if not len(rates):
         return None
+    power = _periodogram(place, product, rates)
     # Two degrees of freedom: the chance of a power is its exponential.
-    independent = (rates[-1] - rates[0]) * np.ptp(place) / (2 * np.pi)
+    independent = len(rates) / STEPS
     least = np.log(independent) + thresholds.LOG_CHANCE * np.log(10)
     looked = []
     for _ in range(_LOOKS):
@@ -190,20 +204,33 @@ def _product(wave: Wave, fit: Fit, etfe: Etfe, recording: Recording) -> Floats:
     return np.asarray(product - product.mean())
 
 
-def _periodogram(place: Floats, product: Floats, count: float) -> tuple[Floats, Floats]:
-    """Rates along the way, and power there over its mean in noise.
+def rates_along(place: Floats, recording: Recording) -> Floats:
+    """Rates to look at, from what is no spring any more to what the encoder shows, `STEPS` a line.
 
-    None of an encoder's counts, whose rounding has their period.
+    None of the encoder's counts, whose rounding has their period.
+
+    Parameters
+    ----------
+    place : ndarray, shape (N,)
+    recording : Recording
     """
+    span = float(np.ptp(place))
+    if span == 0:
+        return np.zeros(0)
+    count = increment_unit(recording.position) or 0.0
+    step = 2 * np.pi / (STEPS * span)
+    last = 2 * np.pi / (_FINEST * max(span / _PLACES, count)) / step
+    first = np.floor(_SLOWEST / place.std() / step) + 1
+    return np.asarray(step * np.arange(first, min(last, STEPS * _MOST_PERIODS)))
+
+
+def _periodogram(place: Floats, product: Floats, rates: Floats) -> Floats:
+    """Power at rates along the way, over its mean in noise."""
     span = float(np.ptp(place))
     bins = np.minimum((place - place.min()) / span * _PLACES, _PLACES - 1).astype(int)
     along = np.bincount(bins, weights=product, minlength=_PLACES)
-    finer = 4  # steps for each independent rate
-    power = np.abs(np.fft.rfft(along, finer * _PLACES)) ** 2 / np.sum(product**2)
-    rates = 2 * np.pi * np.arange(len(power)) / (finer * span)
-    fastest = 2 * np.pi / (_FINEST * max(span / _PLACES, count))
-    wanted = (rates * place.std() > _SLOWEST) & (rates < fastest)
-    return rates[wanted], power[wanted]
+    power = np.abs(np.fft.rfft(along, STEPS * _PLACES)) ** 2 / np.sum(product**2)
+    return np.asarray(power[np.rint(rates * STEPS * span / (2 * np.pi)).astype(int)])
 
 
 def _finer(place: Floats, product: Floats, rates: Floats, top: int) -> float:
