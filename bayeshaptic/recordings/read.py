@@ -176,7 +176,7 @@ def recording_from_arrays(
             f"No units were given: the force is taken to be in {unit_of_force}, the position in "
             f"{unit_of_position}. Say otherwise with --columns, as in position=q[mm]."
         )
-        notices += (Notice("note", "units", text),)
+        notices += (Notice("note", "units", text, ("force", "position")),)
     return Recording(
         force=force,
         position=position,
@@ -245,7 +245,7 @@ def recorded(
             f"in {recording.force_unit}: stiffness and masses are then wrong by the force of one "
             f"volt, C. Write {force}=NAME*C[{recording.force_unit}] in --columns."
         )
-        notices = (*recording.notices, Notice("warning", "units", text))
+        notices = (*recording.notices, Notice("warning", "units", text, ("force",)))
         recording = replace(recording, notices=notices)
     return recording
 
