@@ -654,6 +654,24 @@ def test_simulate_options(run: Run) -> None:
     assert excited.min() == 5 and excited.max() == 100
 
 
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (("--seconds", "1e9"), "1,000,000,000,000 samples"),
+        (("--seconds", "1e9", "--excitation", "relay"), "1,000,000,000,000 samples"),
+        (("--band", "600,900"), "ends above the Nyquist frequency, 500 Hz"),
+        (("--band", "600,900", "--excitation", "prbs"), "ends above the Nyquist"),
+        (("--delay-s", "200"), "delay of 200 s is over 100 sampling periods"),
+    ],
+)
+def test_what_the_bench_cannot_simulate_is_one_line(
+    run: Run, options: tuple[str, ...], part: str
+) -> None:
+    status, out, err = run("simulate", "lhifam", "-o", "a.csv", *options)
+    assert status == 2 and not out and not Path("a.csv").exists()
+    assert part in only_line(err) and "defect" not in err
+
+
 def test_simulate_from_a_posterior_and_from_its_priors(run: Run, tmp_path: Path) -> None:
     fake_analysis("grasped", device="lhifam").posterior.save(tmp_path / "p.nc")
     truths = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,24 @@ def test_a_name_that_would_do_nothing_is_refused(function, options, words) -> No
     """The misspelt prior of a model that was to be chosen was silently of no effect."""
     with pytest.raises(bh.InputError, match=words):
         function(RECORDING, **options)
+
+
+@pytest.mark.parametrize("function", [bh.analyse, bh.close_loop])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"delay_s": 200.0},
+        {"delay_s": 2.0, "modes": 1},
+        {"delay_s": 2e-4, "delay_sd_s": 200.0},
+        {"device": replace(bh.load_device("phantom"), delay_s=2.0)},
+    ],
+)
+def test_a_delay_of_milliseconds_in_seconds_is_refused(function, options) -> None:
+    """It filled the memory, or did not come to an end."""
+    with pytest.raises(bh.InputError, match="sampling periods of 0.001 s, and 100 are the most"):
+        function(RECORDING, **options)
+    with pytest.raises(bh.InputError, match="a loop delay of 2 s is 2,000 sampling periods"):
+        function(RECORDING, bh.free("phantom", delay_s=2.0))
 
 
 @pytest.mark.parametrize(
