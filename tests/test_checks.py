@@ -181,6 +181,19 @@ def test_a_device_file_betrays_units() -> None:
     assert topics(check_recording(degrees, load_device("phantom"))) == ["units"]
 
 
+def test_a_count_that_is_coarser_than_what_the_position_shows() -> None:
+    """A count of 1 m was believed, with a stiffness in green, and with it any friction hides."""
+    with pytest.raises(
+        InputError, match="count .* 1 m, and the whole motion is 0.0.*correct --enc"
+    ):
+        check_recording(changed(encoder_resolution=1.0))
+    with pytest.raises(InputError, match="whole motion"):
+        check_recording(changed(encoder_resolution=1.0), load_device("lhifam"))
+    (notice,) = check_recording(changed(encoder_resolution=2e-4))
+    assert "correct --encoder-resolution" in notice.text and in_doubt("position", (notice,))
+    assert check_recording(changed(encoder_resolution=3.14e-5)) == ()  # of a filtered position
+
+
 def test_a_motion_of_a_few_counts() -> None:
     count = np.ptp(held().position) / 15
     coarse = changed(position=np.round(held().position / count) * count)

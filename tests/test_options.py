@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import bayeshaptic as bh
+from bayeshaptic.commands.options import descriptions
 from bayeshaptic.diagnosis.base.asked import base_model, measurement_of
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.numerics.spending import BUDGET_S
 
+STATISTICS = Path(__file__).parents[1] / "docs" / "statistics.md"
 RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"
 
 
@@ -89,6 +93,14 @@ def test_priors_of_held_and_free_devices_go_with_either() -> None:
     }
     for held in (None, True, False):
         assert base_model("auto", Options(prior=hand, held=held)) == "auto"
+
+
+def test_the_budget_that_the_help_says_is_the_one_that_holds() -> None:
+    """Three commands said 60 where it was 40."""
+    said = descriptions(Options)["budget_s"]
+    assert said.endswith(f"by default {Options().budget_s:g}") and Options().budget_s == BUDGET_S
+    (told,) = re.findall(r"`--budget SECONDS` \(default (\d+)\)", STATISTICS.read_text("utf-8"))
+    assert float(told) == BUDGET_S
 
 
 def test_the_measurement_comes_first() -> None:

@@ -18,7 +18,9 @@ from bayeshaptic.recordings.columns import (
     REFERENCE,
     Column,
     as_numbers,
+    column_of,
     is_frequency_response,
+    listing,
     parse_columns,
     pick,
     played_by,
@@ -207,6 +209,7 @@ def recorded(
     units: dict[str, str | None] = {}
     written: dict[str, str | None] = {}
     force, position = played_by(FORCES, mapping, path), played_by(POSITIONS, mapping, path)
+    _refuse_shared(arrays, ("time", force, position), mapping, path)
     for role in (force, position, "time"):
         found = pick(arrays, role, mapping, path, required=role != "time" or period_s is None)
         if found is None:
@@ -248,6 +251,20 @@ def recorded(
         notices = (*recording.notices, Notice("warning", "units", text, ("force",)))
         recording = replace(recording, notices=notices)
     return recording
+
+
+def _refuse_shared(
+    arrays: Arrays, roles: tuple[str, ...], mapping: Mapping[str, Column], path: Path
+) -> None:
+    """Refuse one column that is to be two things: the position would answer to itself."""
+    played: dict[str, str] = {}
+    for role in roles:
+        key = column_of(arrays, role, mapping)
+        if key is not None and played.setdefault(key, role) != role:
+            raise InputError(
+                f"{path}: '{key}' is given as the {played[key]} and as the {role}; name another "
+                f"column for one of them (the file has {listing(arrays)})"
+            )
 
 
 def _in_volts(force: Column) -> bool:

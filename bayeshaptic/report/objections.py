@@ -139,11 +139,11 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             "or in the sensor of force or motion, which the loop does without, nobody can tell"
         )
     if _is_moved(analysis):
+        hand = "a hand (--held yes) or " if may_be_held(analysis) else ""
         found.append(
             "the device moves beside what its command does, at more than "
-            f"{percent(_BESIDES)} of that speed: something else moves it, a hand (--held yes) or "
-            "the floor, or a force that was not found, and dry friction beside such a motion looks "
-            "like damping"
+            f"{percent(_BESIDES)} of that speed: something else moves it, {hand}the floor, or a "
+            "force that was not found, and dry friction beside such a motion looks like damping"
         )
     return found
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.devices import STRUCTURES, Device
-from bayeshaptic.errors import Notice
+from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.sufficiency import LEAST_COHERENCE
 from bayeshaptic.recordings.checks.units_in_doubt import implausible_mass, other_units
 from bayeshaptic.recordings.recording import Recording
@@ -24,6 +24,9 @@ _SLIPS = {
     180 / np.pi: "is it in degrees? Write [deg]",
     np.pi / 180: "is it radians, scaled as degrees? Write [rad]",
 }
+# A position that was filtered has finer steps than counts, and files round it: by more only where
+# the unit of one of the two is wrong.
+_FINER = 30.0
 _MOST = 20.0  # times as much as the device file says, or as little: another such device may answer
 _SURELY = 30.0  # beyond it no stiffness follows: no two devices that share a file differ so
 
@@ -42,6 +45,8 @@ def compare_resolution(recording: Recording, device: Device | None) -> list[Noti
     known = recording.encoder_resolution
     if known is None and device is not None:
         known = device.encoder_resolution
+    if known is not None and step != known:
+        _refuse_coarse(recording, step or 0.0, known)
     if step is None or known is None or abs(step / known - 1) < 0.05:
         return notices
     slip = _slip(step / known, 1.05)
@@ -57,7 +62,26 @@ def compare_resolution(recording: Recording, device: Device | None) -> list[Noti
             f"to be {known:.3g} {unit}."
         )
         notices.append(Notice("note", "resolution", text))
+    elif step < known / _FINER:
+        text = (
+            f"The position moves in steps of {step:.3g} {unit}, and one count of the encoder is "
+            f"said to be {known:.3g} {unit}: correct --encoder-resolution, which is in {unit}, or "
+            "the device's file."
+        )
+        notices.append(Notice("warning", "units", text, ("position",)))
     return notices
+
+
+def _refuse_coarse(recording: Recording, step: float, known: float) -> None:
+    """Refuse a count that is larger than the motion, which has steps within it."""
+    moved = float(np.ptp(recording.position))
+    if moved < 2 * known and step < known / 2:
+        unit = recording.position_unit
+        raise InputError(
+            f"{recording.source or recording.name}: one count of the encoder is said to be "
+            f"{known:.3g} {unit}, and the whole motion is {moved:.3g} {unit}; correct "
+            f"--encoder-resolution, which is in {unit}, or the device's file"
+        )
 
 
 def _slip(ratio: float, tolerance: float) -> float | None:
