@@ -263,7 +263,8 @@ def _refuse_shared(
         if key is not None and played.setdefault(key, role) != role:
             raise InputError(
                 f"{path}: '{key}' is given as the {played[key]} and as the {role}; name another "
-                f"column for one of them (the file has {listing(arrays)})"
+                f"column for one of them (the file has {listing(arrays)})",
+                topic="columns",
             )
 
 

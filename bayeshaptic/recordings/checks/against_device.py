@@ -80,7 +80,8 @@ def _refuse_coarse(recording: Recording, step: float, known: float) -> None:
         raise InputError(
             f"{recording.source or recording.name}: one count of the encoder is said to be "
             f"{known:.3g} {unit}, and the whole motion is {moved:.3g} {unit}; correct "
-            f"--encoder-resolution, which is in {unit}, or the device's file"
+            f"--encoder-resolution, which is in {unit}, or the device's file",
+            topic="units",
         )
 
 

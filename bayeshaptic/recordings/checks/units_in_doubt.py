@@ -150,8 +150,11 @@ def other_units(factor: float, force_unit: str, position_unit: str) -> str:
     if factor > 1:
         asked = f" (are they in {named}?)" if named else ""
         written = f"position=NAME[{named}]" if named else f"position=NAME*{1 / factor:.3g}"
-        force = f"forces {times} times as large"
-        return f"positions {times} times as small{asked}, as in {written}, or {force},"
+        scaled = f" (force=NAME[{force_unit}], if they are in {force_unit} already)"
+        return (
+            f"positions {times} times as small{asked}, as in {written}, or forces {times} times as "
+            f"large{scaled if factor in (1e3, 1e6) else ''},"
+        )
     asked = f"are they in {position_unit}, and were scaled once too often?"
     milli = f" (are they in m{force_unit}? force=NAME[m{force_unit}])" if factor == 1e-3 else ""
     return (
