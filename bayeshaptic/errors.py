@@ -39,11 +39,16 @@ class Notice:
         One word or two: what it is about, for example ``"feedback"`` or ``"units"``.
     text : str
         The sentence, with numbers and units, and what to do.
+    about : tuple of str
+        What a decision needs to know of it, so that none hangs on the words of `text`: of units the
+        quantities ("force", "position", "time") that a warning doubts, or whose unit was assumed as
+        a note says; of feedback "undecided" where that is only a doubt.
     """
 
     level: str
     topic: str
     text: str
+    about: tuple[str, ...] = ()
 
 
 def printable(text: str) -> str:

@@ -73,6 +73,10 @@ def test_modes_name_the_base_model():
     for model, options in (("rigid", asked), ("free", replace(asked, held=True))):
         with pytest.raises(InputError, match="leave one of them out"):
             base_model(model, options)
+    for model, held in (("free", True), ("rigid", True), ("chain-2", True), ("grasped", False)):
+        with pytest.raises(InputError, match=f"model is '{model}'.*leave one of them out"):
+            base_model(model, Options(held=held))
+        assert base_model(model, Options(held=not held)) == model
     with pytest.raises(InputError, match="1 to 8"):
         base_model("grasped", replace(asked, modes=0))
     with pytest.raises(InputError, match="0 to 8"):

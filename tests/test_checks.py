@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,15 @@ import pytest
 from scipy.signal import lfilter
 from tiny_bench import PERIOD, SCALE, band_noise, record
 
-from bayeshaptic.devices import load_device
+from bayeshaptic.devices import Device, load_device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
+from bayeshaptic.recordings.checks import what_drives_what
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES
-from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt, steps_of_a_turn
+from bayeshaptic.recordings.checks.units_in_doubt import in_doubt, steps_of_a_turn
+from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.units import is_assumed
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -162,13 +166,32 @@ def test_a_device_file_betrays_units() -> None:
             recording = changed(**{part: factor * getattr(held(), part)})
             (notice,) = check_recording(recording, lhifam)
             assert notice.topic == "units"
-            slip = factor if part == "position" else 1 / factor
-            assert f"the position is {slip:.3g} times too large" in notice.text
+            too_large = (factor > 1) == (part == "position")
+            cure = (
+                "small (are they in mm?), as in position=NAME[mm]"
+                if too_large
+                else "position=NAME[m]"
+            )
+            assert cure in notice.text and ("position=NAME[mm]" in notice.text) == too_large
+            assert in_doubt("position", (notice,))
     # Where no force constant is known the device's masses say nothing.
     assert check_recording(changed(force_unit="A", force=1e3 * held().force), lhifam) == ()
     phantom = held("phantom")
     degrees = replace(phantom, position=phantom.position * 180 / np.pi)
     assert topics(check_recording(degrees, load_device("phantom"))) == ["units"]
+
+
+def test_a_count_that_is_coarser_than_what_the_position_shows() -> None:
+    """A count of 1 m was believed, with a stiffness in green, and with it any friction hides."""
+    with pytest.raises(
+        InputError, match="count .* 1 m, and the whole motion is 0.0.*correct --enc"
+    ):
+        check_recording(changed(encoder_resolution=1.0))
+    with pytest.raises(InputError, match="whole motion"):
+        check_recording(changed(encoder_resolution=1.0), load_device("lhifam"))
+    (notice,) = check_recording(changed(encoder_resolution=2e-4))
+    assert "correct --encoder-resolution" in notice.text and in_doubt("position", (notice,))
+    assert check_recording(changed(encoder_resolution=3.14e-5)) == ()  # of a filtered position
 
 
 def test_a_motion_of_a_few_counts() -> None:
@@ -206,6 +229,18 @@ def test_feedback_is_warned_of() -> None:
         check_recording(Recording(force[0], position[0], PERIOD, source=Path("held.csv")))
 
 
+def test_a_doubt_of_feedback_is_no_certainty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That it is only a doubt is data of the warning, whatever its words are."""
+    for has_feedback in (True, False):
+        found = SimpleNamespace(
+            has_feedback=has_feedback, doubtful=True, evidence="", relay=False, swapped=False,
+            opposite=False, early_position=False,
+        )  # fmt: skip
+        monkeypatch.setattr(what_drives_what, "causality", lambda _, found=found: found)
+        notices = check_recording(held())
+        assert topics(notices) == ["feedback"] and is_certain(notices) == has_feedback
+
+
 def test_the_measured_recordings() -> None:
     for name, columns, expected in (
         ("emps/DATA_EMPS.mat", "time=t,force=vir*35.15[N],position=qm[m]", ["feedback"]),
@@ -222,37 +257,93 @@ def test_the_measured_recordings() -> None:
         assert [notice.topic for notice in notices] == expected
 
 
-@pytest.mark.parametrize(("units", "doubted"), [(None, True), (("N", "m"), False)])
-def test_a_mass_of_170_kg_is_doubted_where_nobody_said_the_units(
-    units: tuple[str, str] | None, doubted: bool
-) -> None:
-    """A sixth of a kilogram whose positions are in a unit a thousand times too large."""
+def one_mass(mass: float, force_unit: str | None, position_unit: str | None) -> Recording:
     rng = np.random.default_rng(5)
-    force, mass, pole = rng.standard_normal(4000), 170.0, 0.99
+    force, pole = rng.standard_normal(4000), 0.99
     velocity = lfilter([0.0, PERIOD / mass], [1.0, -pole], force)
     position = lfilter([0.0, PERIOD], [1.0, -0.995], velocity)
-    said = {} if units is None else {"force_unit": units[0], "position_unit": units[1]}
-    recording = recording_from_arrays(force=force, position=position, period_s=PERIOD, **said)
-    texts = [notice.text for notice in check_recording(recording)]
-    assert any("slip of units" in text for text in texts) == doubted
+    return recording_from_arrays(
+        force, position, PERIOD, force_unit=force_unit, position_unit=position_unit
+    )
+
+
+@pytest.mark.parametrize(
+    ("mass", "said", "doubted"),
+    [
+        (
+            250.0,
+            False,
+            True,
+        ),  # a quarter of a kilogram in a unit that is a thousand times too large
+        (250.0, True, True),
+        (95.0, False, True),
+        (95.0, True, False),  # a servo axis of a machine tool
+        (1.7e-7, True, True),
+    ],
+)
+def test_a_mass_that_no_device_has_is_doubted(mass: float, said: bool, doubted: bool) -> None:
+    """A limit of 21 MN/m was recommended of positions in m that were read as mm."""
+    units = ("N", "m") if said else (None, None)
+    found = check_recording(one_mass(mass, *units))
+    assert in_doubt("position", found) == doubted
+    assert any("slip of units" in notice.text for notice in found) == doubted
+
+
+def test_a_device_file_that_says_the_mass_confirms_the_units() -> None:
+    heavy = one_mass(250.0, "N", "m")
+    device = Device("mine", "translational", parameters={"rigid": {"m": 250.0}})
+    assert not in_doubt("position", check_recording(heavy, device))
+    nothing = replace(device, parameters={})
+    assert in_doubt("position", check_recording(heavy, nothing))
+    light = replace(device, parameters={"rigid": {"m": 0.25}})
+    (notice,) = check_recording(heavy, light)
+    assert in_doubt("position", (notice,)) and "position=NAME[m]" in notice.text
+
+
+def test_a_scale_in_doubt_is_none_where_the_device_file_agrees() -> None:
+    """The steps say another unit, the masses that it is the encoder's resolution that is wrong."""
+    fine = changed(encoder_resolution=3.14e-3)
+    assert in_doubt("position", check_recording(fine))
+    found = check_recording(fine, load_device("lhifam"))
+    assert "units" in topics(found) and not in_doubt("position", found)
 
 
 @pytest.mark.parametrize(
     ("columns", "doubted"),
     [
         ("force=u,position=y", True),
-        ("force=u,position=y[m]", False),
+        ("force=u,position=y[m]", True),
+        ("force=u,position=y*3.14e-6[m]", False),
         ("force=u,position=x", False),
         ("force=u_V,position=x", False),
+        ("force=u,position=x[mm]", True),
     ],
 )
-def test_a_position_in_counts_is_in_doubt_unless_somebody_said_so(
-    tmp_path: Path, columns: str, doubted: bool
-) -> None:
+def test_a_position_in_counts_is_in_doubt(tmp_path: Path, columns: str, doubted: bool) -> None:
     """A limit in N/m of counts that were taken for metres was recommended."""
     recording = held()
     counts = np.round(recording.position / np.ptp(recording.position) * 30000)
     path = tmp_path / "a.npz"
     np.savez(path, u=recording.force, u_V=recording.force, y=counts, x=recording.position)
     found = check_recording(read_recording(path, columns, period_s=recording.period_s))
-    assert position_is_in_doubt(found) == doubted
+    assert in_doubt("position", found) == doubted
+
+
+@pytest.mark.parametrize(
+    ("columns", "assumed"),
+    [
+        ("force=u,position=x", True),
+        ("force=u,position=x[mm]", False),
+        ("time=t_s,force=u,position=x[mm]", False),
+    ],
+)
+def test_a_unit_that_was_said_is_not_called_unsaid(
+    tmp_path: Path, columns: str, assumed: bool
+) -> None:
+    """Notes about the force or the time were taken for notes about the position."""
+    path = tmp_path / "a.npz"
+    time = PERIOD * np.arange(held().samples)
+    np.savez(path, u=held().force, x=held().position, t_s=time)
+    recording = read_recording(path, columns, None if "t_s" in columns else PERIOD)
+    assert is_assumed("position", recording.notices) == assumed
+    assert is_assumed("force", recording.notices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import re
@@ -123,10 +124,11 @@ def test_help_of_a_command_says_what_defaults_and_examples(run: Run, command: An
 def test_every_option_has_help(command: Any) -> None:
     parser = cli._Parser()
     command.add_arguments(parser)
-    assert all(action.help for action in parser._actions)
-    help_text = parser.format_help()
-    if "--device" in help_text:
-        assert all(name in help_text for name in device_names())
+    assert all(action.help not in (None, "", argparse.SUPPRESS) for action in parser._actions)
+    told = [str(action.help) for action in parser._actions if action.dest == "device"]
+    takes_a_device = {"report", "batch", "population", "relay", "simulate"}
+    assert len(told) == (command.NAME in takes_a_device)
+    assert all(name in text for text in told for name in device_names())
 
 
 def test_without_a_command_the_help_is_shown(run: Run) -> None:
@@ -652,6 +654,24 @@ def test_simulate_options(run: Run) -> None:
     spectrum = np.abs(np.fft.rfft(recording.force))
     excited = np.flatnonzero(spectrum > 1e-6 * spectrum.max()) / 3.0
     assert excited.min() == 5 and excited.max() == 100
+
+
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (("--seconds", "1e9"), "1,000,000,000,000 samples"),
+        (("--seconds", "1e9", "--excitation", "relay"), "1,000,000,000,000 samples"),
+        (("--band", "600,900"), "ends above the Nyquist frequency, 500 Hz"),
+        (("--band", "600,900", "--excitation", "prbs"), "ends above the Nyquist"),
+        (("--delay-s", "200"), "delay of 200 s is over 100 sampling periods"),
+    ],
+)
+def test_what_the_bench_cannot_simulate_is_one_line(
+    run: Run, options: tuple[str, ...], part: str
+) -> None:
+    status, out, err = run("simulate", "lhifam", "-o", "a.csv", *options)
+    assert status == 2 and not out and not Path("a.csv").exists()
+    assert part in only_line(err) and "defect" not in err
 
 
 def test_simulate_from_a_posterior_and_from_its_priors(run: Run, tmp_path: Path) -> None:

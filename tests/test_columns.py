@@ -88,6 +88,23 @@ def test_units_and_what_they_are_taken_to_be(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "columns",
+    [
+        "time=t,force=x[N],position=x[m]",
+        "time=t,force=x*-3[N],position=x[mm]",
+        "time=t,force=f,position=t",
+        "force=position_m",
+    ],
+)
+def test_one_column_is_one_thing(tmp_path: Path, columns: str) -> None:
+    """The position that was its own force was said to be under feedback."""
+    path, time = tmp_path / "a.npz", np.arange(2000) * 1e-3
+    np.savez(path, t=time, time_s=1 * time, x=np.sin(time), f=np.cos(time), position_m=time**2)
+    with pytest.raises(InputError, match="is given as the .* and as the position; name another"):
+        read_recording(path, columns)
+
+
+@pytest.mark.parametrize(
     ("time", "force", "position", "factors", "units"),
     [
         ("t_ms", "cmd_mNm", "theta_deg", (1e-3, 1e-3, np.pi / 180), ("Nm", "rad")),

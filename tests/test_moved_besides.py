@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -48,6 +49,13 @@ def test_no_stiffness_follows_where_something_else_moves_the_device() -> None:
     analysis.etfe = replace(analysis.etfe, recording=replace(own, position=shaken))
     found = headline(analysis)
     assert found.stiffness is None and "looks like damping" in found.sentence
+    # Only where nobody said that nobody does is a hand hinted at.
+    candidates = {"grasped": SimpleNamespace(held=True), "free": SimpleNamespace(held=False)}
+    analysis.choice = SimpleNamespace(candidates=candidates)
+    assert "a hand (--held yes) or the floor" in headline(analysis).sentence
+    del candidates["grasped"]
+    said = headline(analysis).sentence
+    assert "moves it, the floor, or" in said and "hand" not in said
     held = fake_analysis("grasped", "lhifam")
     held.etfe = replace(held.etfe, recording=replace(held.recording, position=shaken))
     assert headline(held).stiffness is not None

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.base.asked import measurement_of
+from bayeshaptic.commands.options import descriptions
+from bayeshaptic.diagnosis.base.asked import base_model, measurement_of
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.numerics.spending import BUDGET_S
 
+STATISTICS = Path(__file__).parents[1] / "docs" / "statistics.md"
 RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"
 
 
@@ -28,6 +33,74 @@ def test_what_cannot_be_is_said_in_one_line(arguments, options, words) -> None:
         with pytest.raises(bh.InputError, match=words) as caught:
             function(*arguments, **options)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("function", [bh.analyse, bh.close_loop])
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"prior": {"kcc": bh.LogNormal(5e4, 1.0)}}, "no model has a parameter 'kcc'.*mean kc?"),
+        ({"prior": {"zzz": bh.LogNormal(5e4, 1.0)}}, "'zzz'; there are m, b, .*, delay_s"),
+        ({"effects": {"backlsh": 0.1}}, "no effect 'backlsh'; did you mean backlash?"),
+    ],
+)
+def test_a_name_that_would_do_nothing_is_refused(function, options, words) -> None:
+    """The misspelt prior of a model that was to be chosen was silently of no effect."""
+    with pytest.raises(bh.InputError, match=words):
+        function(RECORDING, **options)
+
+
+@pytest.mark.parametrize("function", [bh.analyse, bh.close_loop])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"delay_s": 200.0},
+        {"delay_s": 2.0, "modes": 1},
+        {"delay_s": 2e-4, "delay_sd_s": 200.0},
+        {"device": replace(bh.load_device("phantom"), delay_s=2.0)},
+    ],
+)
+def test_a_delay_of_milliseconds_in_seconds_is_refused(function, options) -> None:
+    """It filled the memory, or did not come to an end."""
+    with pytest.raises(bh.InputError, match="sampling periods of 0.001 s, and 100 are the most"):
+        function(RECORDING, **options)
+    with pytest.raises(bh.InputError, match="a loop delay of 2 s is 2,000 sampling periods"):
+        function(RECORDING, bh.free("phantom", delay_s=2.0))
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("[prior]\nkcc = {median = 5e4, log_sd = 1.0}\n", "'kcc'; did you mean kc?"),
+        ("[effects]\nbacklsh = 0.1\n", "'backlsh'; did you mean backlash?"),
+    ],
+)
+def test_a_study_is_refused_before_a_recording_is_read(tmp_path: Path, table, words) -> None:
+    study = tmp_path / "study.toml"
+    named = f"[[recording]]\nfile = '{tmp_path}/a.csv'\n"
+    study.write_text(f"[device]\nname = 'phantom'\n{table}{named}", "utf-8")
+    (tmp_path / "a.csv").touch()
+    with pytest.raises(bh.InputError, match=words):
+        bh.analyse_study(bh.read_study(study), close_loop=False)
+
+
+def test_priors_of_held_and_free_devices_go_with_either() -> None:
+    """A study of both has one table."""
+    hand = {
+        "mh": bh.LogNormal(1.0, 1.0),
+        "m3": bh.LogNormal(1.0, 1.0),
+        "delay_s": bh.HalfNormal(1e-3),
+    }
+    for held in (None, True, False):
+        assert base_model("auto", Options(prior=hand, held=held)) == "auto"
+
+
+def test_the_budget_that_the_help_says_is_the_one_that_holds() -> None:
+    """Three commands said 60 where it was 40."""
+    said = descriptions(Options)["budget_s"]
+    assert said.endswith(f"by default {Options().budget_s:g}") and Options().budget_s == BUDGET_S
+    (told,) = re.findall(r"`--budget SECONDS` \(default (\d+)\)", STATISTICS.read_text("utf-8"))
+    assert float(told) == BUDGET_S
 
 
 def test_the_measurement_comes_first() -> None:

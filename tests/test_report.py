@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import needs_browser, probe, run
-from fake_analysis import CASES, FEEDBACK, fake_analysis, fake_closed
+from fake_analysis import CASES, FEEDBACK, FakeAnalysis, fake_analysis, fake_closed
 
 import bayeshaptic
+from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.report import write, write_report
 from bayeshaptic.report.figures import PICTURES, draw_pictures
@@ -351,20 +352,36 @@ def test_the_next_command_reads_the_file_as_this_one_did() -> None:
 
 
 def test_units_that_nobody_said_are_on_the_first_screen() -> None:
-    note = Notice("note", "units", "The force's unit is not given: it is taken to be in N.")
+    note = Notice("note", "units", "The force's unit is not given.", ("force",))
     found = headline(fake_analysis("rigid", notices=(note,)))
     assert found.stiffness is not None
     assert any(
         "N stands for whatever the command was recorded in" in text for text in found.details
     )
     assert not any("stands for" in text for text in headline(fake_analysis("rigid")).details)
-    both = Notice("note", "units", "No units were given: the force is taken to be in N.")
-    counts = Notice("warning", "units", "The positions are whole numbers.")
-    doubted = fake_analysis("rigid", notices=(both, counts))
+    both = Notice("note", "units", "No units were given.", ("force", "position"))
+    counts = Notice("warning", "units", "The positions are whole numbers.", ("position",))
+    doubted = fake_analysis("rigid", None, notices=(both, counts))
     refused = headline(doubted)
     assert refused.status == "untrusted" and "nobody said the position's unit" in refused.sentence
-    (step,) = next_steps(refused, doubted)
-    assert "position=NAME*3.1e-6[m]" in step.command
+    units, mass = next_steps(refused, doubted)
+    assert "position=NAME*3.1e-6[m]" in units.command
+    assert "--device MINE.toml" in mass.command and "[rigid] m =" in mass.text
+    said = headline(fake_analysis("rigid", notices=(note, counts)))
+    assert said.stiffness is None and "nobody said" not in said.sentence
+
+
+def test_a_wall_that_no_device_renders_is_not_recommended() -> None:
+    """Masses in a unit a thousand times too large had 21 MN/m recommended, in green."""
+    usual = fake_analysis("rigid", None)
+    limit = replace(usual.limit, samples=usual.limit.samples * 1e4)
+    stiff = FakeAnalysis(**{**vars(usual), "limit": limit})
+    assert headline(usual).stiffness is not None and stiff.limit.quantile(0.5) > 1e6
+    refused = headline(stiff)
+    assert refused.status == "untrusted" and "position (m) or of the force (N)" in refused.sentence
+    assert any("--device" in step.command for step in next_steps(refused, stiff))
+    confirmed = FakeAnalysis(**{**vars(stiff), "device": load_device("lhifam")})
+    assert headline(confirmed).stiffness is not None
 
 
 @pytest.mark.parametrize("case", CASES)

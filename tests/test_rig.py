@@ -232,6 +232,14 @@ def test_what_cannot_be_is_refused_in_one_line(tmp_path: Path) -> None:
         "whole number": lambda: simulate(bench, Multisine(1.0, 1.0, 10.0, spacing_hz=0.3)),
         "Nyquist": lambda: simulate(bench, Multisine(1.0, 1.0, 500.0)),
         "no band": lambda: simulate(bench, WhiteNoise(1.0, 10.0, 20.0)),
+        "no lines in 30 s below the Nyquist": lambda: simulate(bench, WhiteNoise(1.0, 900, 600)),
+        "no lines in 2 s": lambda: simulate(bench, WhiteNoise(1.0, 0.2, 0.1, seconds=2.0)),
+        "100,000,000,000 samples, and 20,000,000 are the": lambda: simulate(
+            bench, WhiteNoise(1.0, 300.0, seconds=1e8)
+        ),
+        "1,000,000,000 samples": lambda: simulate(bench, Multisine(1.0, 1, 9, periods=1_000_000)),
+        "100,000,001,000 samples": lambda: run_relay(bench, 1.0, seconds=1e8 + 1),
+        "delay of 200 s is over 100 sampling": lambda: simulate(replace(bench, delay_s=200.0)),
         "finite": lambda: simulate(bench, [1.0, np.nan]),
         "amplitude above zero": lambda: run_relay(bench, -1.0),
     }
@@ -295,7 +303,7 @@ def test_the_limit_with_effects_is_where_walls_turn_unstable(
     assert rates[0] < 0 < rates[1]
 
 
-def test_damping_in_the_wall_and_limits_at_zero_infinity_and_nyquist() -> None:
+def test_damping_in_the_wall_and_limits_at_zero_and_nyquist() -> None:
     bench = Bench.from_device("phantom").quiet()
     limit = bench.true_critical_stiffness(damping=5e-3)
     assert limit > 1.2 * bench.true_critical_stiffness()
@@ -304,9 +312,15 @@ def test_damping_in_the_wall_and_limits_at_zero_infinity_and_nyquist() -> None:
         assert run.stable == (factor < 1)
     frictionless = Bench("rigid", {"m": 1.0, "b": 0.0}, delay_s=2e-4)
     assert frictionless.true_critical_stiffness() == 0.0
-    # A heavily damped mass is an integrator: u = -K y is unstable from K T/b = 2 on, at Nyquist.
-    syrup = critical_limit(Bench("rigid", {"m": 1e-3, "b": 1e3}))
-    assert syrup.stiffness == np.inf or syrup.frequency_hz == pytest.approx(500.0)
+    # A heavily damped mass is an integrator with a lag m/b: with exp(-T b/m) = 0 its response at
+    # Nyquist is -(T - 2 m/b)/(2 b).
+    for mass, damper in ((1e-3, 20.0), (1e-3, 1e3), (1e-6, 1e3)):
+        syrup = critical_limit(Bench("rigid", {"m": mass, "b": damper}))
+        assert syrup.frequency_hz == pytest.approx(500.0)
+        expected = 2 * damper / (PERIOD - 2 * mass / damper)
+        assert syrup.stiffness == pytest.approx(expected, rel=1e-6)
+    with pytest.raises(InputError, match="no edge of stability up to"):
+        critical_limit(Bench("rigid", {"m": 1e-9, "b": 1e9}))
     thick = critical_limit(Bench("rigid", {"m": 1.0, "b": 1e4}))
     assert thick.frequency_hz == pytest.approx(500.0)
     assert thick.stiffness == pytest.approx(2e7, rel=0.3)

@@ -160,6 +160,7 @@ def record(arguments: argparse.Namespace, bench: Bench) -> SimulatedRecording:
 
 def bench_from(arguments: argparse.Namespace) -> Bench:
     """The bench that the options describe."""
+    from bayeshaptic.recordings.response.band import refuse_band
     from bayeshaptic.rig.bench import Bench
 
     options = {
@@ -183,6 +184,7 @@ def bench_from(arguments: argparse.Namespace) -> Bench:
     for text in arguments.effect:
         name, fields = parse_effect(text)
         bench = bench.with_effect(name, **fields)
+    refuse_band(arguments.band, bench.period_s)
     return bench
 
 

@@ -11,6 +11,7 @@ from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, begin
 from bayeshaptic.diagnosis.base.opened import Clock
 from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
@@ -65,6 +66,7 @@ def analyse(
         Where the measurement cannot be used, or the model does not fit it in kind.
     """
     chosen = options_from(options, changes)
+    HiddenPrior.from_table(chosen.effects)  # refuses names of no effect, as the loop does
     begun = begin(measurement_of(measurement, model, chosen), model, chosen)
     if is_certain(begun.notices):
         return without_sampling(begun, chosen)

@@ -61,7 +61,7 @@ class Options:
         Of the sampler: the same seed gives the same report; by default 0.
     budget_s : float
         What looking for what the model lacks may cost, in nominal seconds: evaluations are counted,
-        so that the verdict is the same on every machine; by default 60.
+        so that the verdict is the same on every machine; by default 40.
     checkpoints : path or None
         Folder in which samplers that run for longer than some ten seconds keep their state, to go
         on after an interruption; by default none, and the report's own in commands.

@@ -19,6 +19,7 @@ from bayeshaptic.inference.fit import MISFIT, Fit, search_box, weighted_residual
 from bayeshaptic.inference.least_squares import SETS, least_squares
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.hand import from_a_hand
+from bayeshaptic.models.prior_table import refuse_unknown
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -36,6 +37,7 @@ _WORDS = {
     "chain-2": "three masses in a row, held by nobody",
     "grasped": "a device held by a user",
 }
+CANDIDATES = tuple(_WORDS)
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def choose_model(
     delay_s, delay_sd_s : float, optional
         The loop delay and its standard deviation, where they are known.
     prior : mapping, optional
-        The user's own priors; those that a candidate has no parameter for are left aside.
+        The user's own priors; each candidate takes those that it has a parameter for.
     held : bool, optional
         Whether somebody held the device, where the study says so: then it is not a question.
     seed : int
@@ -148,7 +150,13 @@ def choose_model(
     Returns
     -------
     Choice
+
+    Raises
+    ------
+    InputError
+        For a prior of what no candidate has for a parameter.
     """
+    refuse_unknown(prior or {}, CANDIDATES)
 
     def fitted(name: str, shorter: Fit | None = None, most_sets: int = SETS) -> Fit:
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)

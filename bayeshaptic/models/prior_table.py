@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Iterable, Mapping
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.prior import (
@@ -14,6 +15,7 @@ from bayeshaptic.models.prior import (
     Uniform,
 )
 from bayeshaptic.models.prior_of_zero import MaybeZero, NearZero
+from bayeshaptic.models.structures import structure_named
 
 _FORMS: dict[frozenset[str], type] = {
     frozenset({"median", "log_sd"}): LogNormal,
@@ -54,3 +56,20 @@ def prior_from_table(name: str, table: Mapping[str, object]) -> Prior:
         return LogUniform(**numbers) if log and form is Uniform else form(**numbers)
     except (TypeError, ValueError) as problem:
         raise InputError(f"prior of {name}: {problem}") from None
+
+
+def refuse_unknown(prior: Iterable[str], models: Iterable[str]) -> None:
+    """Refuse priors by names that are parameters of none of the models: they would do nothing.
+
+    Raises
+    ------
+    InputError
+        With the nearest name.
+    """
+    structures = [structure_named(model) for model in models]
+    known = [*dict.fromkeys(name for one in structures for name in one.names), "delay_s"]
+    for name in prior:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
+            raise InputError(f"prior: no model has a parameter {name!r}; {hint}")

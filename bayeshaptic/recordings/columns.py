@@ -257,6 +257,12 @@ def pick(
     )
 
 
+def column_of(arrays: Arrays, role: str, mapping: Mapping[str, Column]) -> str | None:
+    """The name of the array that plays a role; None where none does."""
+    names = mapping[role].names if role in mapping else tuple(_defaults(arrays, role))
+    return next((key for name in names if (key := _find(arrays, name)) is not None), None)
+
+
 def listing(arrays: Arrays, most: int = 20) -> str:
     """The names of a file's arrays and their lengths, the longest first, single numbers not."""
     names: dict[int, list[str]] = {}

@@ -11,7 +11,7 @@ from bayeshaptic.devices.table import Table
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.types import Floats
 
-UNDECIDED = "cannot be decided"  # in the warning where feedback is only a doubt
+UNDECIDED = "undecided"  # what a warning is about where feedback is only a doubt
 _KEYS = ("law", "proportional", "derivative", "integral", "filter_hz")
 
 
@@ -60,7 +60,7 @@ def has_feedback(notices: Iterable[Notice]) -> bool:
 def is_certain(notices: Iterable[Notice]) -> bool:
     """Whether there is feedback, and not only a doubt that cannot be decided."""
     found = [n for n in notices if n.topic == "feedback" and n.level == "warning"]
-    return bool(found) and not any(UNDECIDED in n.text for n in found)
+    return bool(found) and not any(UNDECIDED in n.about for n in found)
 
 
 def told(feedback: Feedback | None, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:

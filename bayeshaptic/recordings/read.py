@@ -18,7 +18,9 @@ from bayeshaptic.recordings.columns import (
     REFERENCE,
     Column,
     as_numbers,
+    column_of,
     is_frequency_response,
+    listing,
     parse_columns,
     pick,
     played_by,
@@ -176,7 +178,7 @@ def recording_from_arrays(
             f"No units were given: the force is taken to be in {unit_of_force}, the position in "
             f"{unit_of_position}. Say otherwise with --columns, as in position=q[mm]."
         )
-        notices += (Notice("note", "units", text),)
+        notices += (Notice("note", "units", text, ("force", "position")),)
     return Recording(
         force=force,
         position=position,
@@ -207,6 +209,7 @@ def recorded(
     units: dict[str, str | None] = {}
     written: dict[str, str | None] = {}
     force, position = played_by(FORCES, mapping, path), played_by(POSITIONS, mapping, path)
+    _refuse_shared(arrays, ("time", force, position), mapping, path)
     for role in (force, position, "time"):
         found = pick(arrays, role, mapping, path, required=role != "time" or period_s is None)
         if found is None:
@@ -245,9 +248,24 @@ def recorded(
             f"in {recording.force_unit}: stiffness and masses are then wrong by the force of one "
             f"volt, C. Write {force}=NAME*C[{recording.force_unit}] in --columns."
         )
-        notices = (*recording.notices, Notice("warning", "units", text))
+        notices = (*recording.notices, Notice("warning", "units", text, ("force",)))
         recording = replace(recording, notices=notices)
     return recording
+
+
+def _refuse_shared(
+    arrays: Arrays, roles: tuple[str, ...], mapping: Mapping[str, Column], path: Path
+) -> None:
+    """Refuse one column that is to be two things: the position would answer to itself."""
+    played: dict[str, str] = {}
+    for role in roles:
+        key = column_of(arrays, role, mapping)
+        if key is not None and played.setdefault(key, role) != role:
+            raise InputError(
+                f"{path}: '{key}' is given as the {played[key]} and as the {role}; name another "
+                f"column for one of them (the file has {listing(arrays)})",
+                topic="columns",
+            )
 
 
 def _in_volts(force: Column) -> bool:

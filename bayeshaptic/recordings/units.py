@@ -179,18 +179,13 @@ def said_by_names(
     else:
         return ()
     example = said[0] if said else "force"
-    return (
-        Notice(
-            "note", "units", f"{text} Say otherwise with --columns, as in {example}=NAME[UNIT]."
-        ),
-    )
+    text += f" Say otherwise with --columns, as in {example}=NAME[UNIT]."
+    return (Notice("note", "units", text, ("force",) if nobody else ()),)
 
 
-def force_is_assumed(notices: Iterable[Notice]) -> bool:
-    """Whether a note says that nobody said the force's unit, and which one was taken."""
-    return any(
-        (n.level, n.topic) == ("note", "units") and "taken to be in" in n.text for n in notices
-    )
+def is_assumed(quantity: str, notices: Iterable[Notice]) -> bool:
+    """Whether a note says that nobody said this quantity's unit, and which one was taken."""
+    return any((n.level, n.topic) == ("note", "units") and quantity in n.about for n in notices)
 
 
 def kind_by_names(force: str, position: str) -> str | None:

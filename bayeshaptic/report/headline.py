@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import estimate, percent, pretty_unit, pure, quantity, rounded_down
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.recordings.units import force_is_assumed
+from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
 from bayeshaptic.report.numbers.misfit import (
@@ -160,7 +160,7 @@ def _of_the_limit(analysis: Analysis, stated: float, ends: tuple[float, float]) 
             f"At the tip, {quantity(lever, 'm')} from the axis, that is {there.with_level}."
         )
     details.append(_what_binds(analysis))
-    if force_is_assumed(analysis.notices):
+    if is_assumed("force", analysis.notices):
         unit = pretty_unit(analysis.model.force_unit)
         details.append(
             f"Nobody said the unit of the force: {unit} stands for whatever the command was "

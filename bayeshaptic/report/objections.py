@@ -14,9 +14,10 @@ from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
-from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt
+from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
+from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
     misfit_factor,
@@ -24,6 +25,7 @@ from bayeshaptic.report.numbers.misfit import (
     residual_is_noticed,
 )
 from bayeshaptic.report.numbers.result import may_be_held
+from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
@@ -109,11 +111,7 @@ def _of_the_misfit(analysis: Analysis, verdict: str | None) -> list[str]:
 
 def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -> list[str]:
     found = []
-    if position_is_in_doubt(analysis.notices):
-        unit = analysis.model.position_unit
-        found.append(
-            f"nobody said the position's unit, and what was recorded does not look like {unit}"
-        )
+    found += _of_the_units(analysis)
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
     if has_feedback(analysis.notices) and analysis.in_loop is None:
@@ -147,12 +145,25 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             "or in the sensor of force or motion, which the loop does without, nobody can tell"
         )
     if _is_moved(analysis):
+        hand = "a hand (--held yes) or " if may_be_held(analysis) else ""
         found.append(
             "the device moves beside what its command does, at more than "
-            f"{percent(_BESIDES)} of that speed: something else moves it, a hand (--held yes) or "
-            "the floor, or a force that was not found, and dry friction beside such a motion looks "
-            "like damping"
+            f"{percent(_BESIDES)} of that speed: something else moves it, {hand}the floor, or a "
+            "force that was not found, and dry friction beside such a motion looks like damping"
         )
+    return found
+
+
+def _of_the_units(analysis: Analysis) -> list[str]:
+    found = []
+    if in_doubt("position", analysis.notices):
+        assumed = is_assumed("position", analysis.notices)
+        who = "nobody said the position's unit, and" if assumed else "a unit is in doubt:"
+        found.append(f"{who} what was recorded does not look like {analysis.model.position_unit}")
+    if in_doubt("time", analysis.notices):
+        found.append("no haptic loop has this sampling period: the unit of the time is in doubt")
+    if not found and analysis.sampled and (stiff := too_stiff(analysis)) is not None:
+        found.append(stiff)
     return found
 
 

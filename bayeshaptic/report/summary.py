@@ -102,7 +102,15 @@ def plain(value: Any) -> Any:
 
 def _notices(notices: tuple[Notice, ...]) -> list[dict[str, str]]:
     """Warnings first, each with the word of its entry in `bayeshaptic explain`."""
-    return [{**vars(notice), "explain": entry(notice.topic).word} for notice in unique(notices)]
+    return [
+        {
+            "level": notice.level,
+            "topic": notice.topic,
+            "text": notice.text,
+            "explain": entry(notice.topic).word,
+        }
+        for notice in unique(notices)
+    ]
 
 
 def _error(given: Mapping[str, Any]) -> dict[str, Any]:

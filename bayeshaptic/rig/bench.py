@@ -38,6 +38,8 @@ DEFAULTS = {
     "rotational": Defaults("Nm", 0.1, 5e-3, 8e-3, 2 * np.pi / 16000),
 }
 
+MOST_PERIODS = 100  # of the loop's delay, each of which is a state more
+
 
 @dataclass(frozen=True)
 class Bench:
@@ -197,7 +199,13 @@ class Bench:
         structure = chain(self.mechanism, values, self.delay_s)
         for effect in self.effects:
             effect.build(structure)
-        return assemble(structure)
+        plant = assemble(structure)
+        if plant.delay_s > MOST_PERIODS * self.period_s:
+            raise InputError(
+                f"a loop delay of {plant.delay_s:g} s is over {MOST_PERIODS} sampling periods of "
+                f"{self.period_s:g} s; it is in seconds: 0.2 ms are 2e-4"
+            )
+        return plant
 
     def scales(self) -> MotionScales:
         """How far and how fast the bench moves under its usual excitation, without effects."""

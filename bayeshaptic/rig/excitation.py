@@ -11,6 +11,8 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.noise import shaped_noise
 
+MOST_SAMPLES = 20_000_000  # five and a half hours at 1 kHz, some gigabytes on the way
+
 
 @runtime_checkable
 class Excitation(Protocol):
@@ -42,7 +44,7 @@ class WhiteNoise:
     seconds: float = 30.0
 
     def samples(self, period_s: float) -> int:
-        return _sample_count(self.seconds, period_s)
+        return sample_count(self.seconds, period_s)
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         if not 0 <= self.lower_hz < self.upper_hz:
@@ -51,6 +53,13 @@ class WhiteNoise:
                 "give 0 <= lower_hz < upper_hz"
             )
         total = lead + self.samples(period_s)
+        highest = min(self.upper_hz, 0.5 / period_s)
+        if not highest - self.lower_hz > 2 / (total * period_s):
+            raise InputError(
+                f"noise from {self.lower_hz:g} to {self.upper_hz:g} Hz has no lines in "
+                f"{total * period_s:g} s below the Nyquist frequency of {0.5 / period_s:g} Hz; "
+                "choose another band"
+            )
 
         def density(frequency: Array) -> Array:
             return ((frequency >= self.lower_hz) & (frequency <= self.upper_hz)).astype(float)
@@ -104,7 +113,7 @@ class Multisine:
         return np.arange(first, last + 1) * self.spacing_hz
 
     def samples(self, period_s: float) -> int:
-        return self.periods * self.period_samples(period_s)
+        return sample_count(self.periods * self.period_samples(period_s) * period_s, period_s)
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         lines = self.lines_hz(period_s)
@@ -140,7 +149,7 @@ class Chirp:
     seconds: float = 30.0
 
     def samples(self, period_s: float) -> int:
-        return _sample_count(self.seconds, period_s)
+        return sample_count(self.seconds, period_s)
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         low = max(self.low_hz, 1.0 / self.seconds)
@@ -172,7 +181,7 @@ class BinaryNoise:
     seconds: float = 30.0
 
     def samples(self, period_s: float) -> int:
-        return _sample_count(self.seconds, period_s)
+        return sample_count(self.seconds, period_s)
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         from scipy.signal import max_len_seq
@@ -203,7 +212,7 @@ class Steps:
     seconds: float = 30.0
 
     def samples(self, period_s: float) -> int:
-        return _sample_count(self.seconds, period_s)
+        return sample_count(self.seconds, period_s)
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         step = np.floor(np.arange(self.samples(period_s)) * period_s / self.hold_s + 1e-9)
@@ -223,10 +232,16 @@ class Prescribed:
         return np.concatenate([np.zeros(lead), np.asarray(self.command, dtype=float)])
 
 
-def _sample_count(seconds: float, period_s: float) -> int:
+def sample_count(seconds: float, period_s: float) -> int:
+    """How many samples are so many seconds, where that is a recording."""
     samples = round(seconds / period_s)
     if samples < 2:
         raise InputError(
             f"{seconds:g} s at {period_s:g} s a sample are no recording; give more seconds"
+        )
+    if samples > MOST_SAMPLES:
+        raise InputError(
+            f"{seconds:g} s at {period_s:g} s a sample are {samples:,} samples, and "
+            f"{MOST_SAMPLES:,} are the most that the bench simulates; give fewer seconds"
         )
     return samples

@@ -13,6 +13,7 @@ from bayeshaptic.rig.dynamics.plant import Array
 from bayeshaptic.rig.dynamics.propagate import split_delay
 from bayeshaptic.rig.dynamics.stepper import SUBSTEPS, Stepper
 from bayeshaptic.rig.effects import Effect
+from bayeshaptic.rig.excitation import sample_count
 from bayeshaptic.rig.motion import Start, epochs, initial_state
 from bayeshaptic.rig.recording import SimulatedRecording
 from bayeshaptic.rig.sensing import Encoder, Streams, actuate, hand_force, write_down
@@ -51,9 +52,7 @@ def run_loop(
     -------
     SimulatedRecording
     """
-    count = round(seconds / bench.period_s)
-    if count < 2:
-        raise InputError(f"{seconds:g} s are no recording; give more seconds")
+    count = sample_count(seconds, bench.period_s)
     run = _Run(bench, controller, count, seed, start, substeps)
     run.go(give_up)
     done = slice(0, run.done)

@@ -175,9 +175,15 @@ def critical_limit(bench: Setup, damping: float = 0.0) -> TrueLimit:
     Returns
     -------
     TrueLimit
-        The stiffness is 0 where the loop is unstable from the first scanned stiffness on, and
-        infinite (the frequency nan) where it is stable up to the last; the scan covers
-        `SCAN_DECADES` below 40 m1/T^2, `SCAN_POINTS` of them, and the edge is then bisected.
+        The stiffness is 0 where the loop is unstable from the first scanned stiffness on; the scan
+        covers `SCAN_DECADES` below 40 m1/T^2 and as many above, `SCAN_POINTS` each, and the edge is
+        then bisected.
+
+    Raises
+    ------
+    InputError
+        Where no edge is found. There is one: no position answers within its own sample, so that a
+        stiffness that is large enough makes any loop unstable.
     """
     moments = np.linspace(0, 1, MOMENTS) if bench.varies else [0.0]
     limits = [_limit(bench, bench.plant(float(at)), damping) for at in moments]
@@ -195,10 +201,15 @@ def _limit(bench: Setup, plant: Plant, damping: float) -> TrueLimit:
         coarse = sampled_loop(plant, bench.period_s, COARSE)
     values = bench.values
     top = 40 * values["m" if "m" in values else "m1"] / bench.period_s**2
-    stiffness = top * np.logspace(-SCAN_DECADES, 0, SCAN_POINTS)
+    # Above, too: a mass of milligrams in syrup is an integrator, with a limit of some 2 b/T.
+    decades = np.linspace(-SCAN_DECADES, SCAN_DECADES, 2 * SCAN_POINTS - 1)
+    stiffness = top * 10.0**decades
     first = _first_unstable(coarse, stiffness, damping)
     if first is None:
-        return TrueLimit(np.inf, np.nan)
+        raise InputError(
+            f"no edge of stability up to {stiffness[-1]:g}: the bench's masses are too light for "
+            "its dampers; give others"
+        )
     if first == 0:
         return TrueLimit(0.0, 0.0)
     # A step to either side, because the coarse chain may be off by a little.

@@ -10,14 +10,17 @@ from typing import Any
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.analyse import analyse
-from bayeshaptic.diagnosis.base.asked import device_of
+from bayeshaptic.diagnosis.base.asked import device_of, has_a_hand
 from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.several import Together
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import Notice, describe
+from bayeshaptic.inference.choose import CANDIDATES
 from bayeshaptic.inference.population.population import Population
 from bayeshaptic.models import prior_from_table
+from bayeshaptic.models.prior_table import refuse_unknown
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks.sufficiency import refuse_where_told
 from bayeshaptic.recordings.read import recording_name
@@ -177,12 +180,15 @@ def analyse_study(
     Raises
     ------
     InputError
-        Where a prior of the study cannot be understood.
+        Where a prior of the study cannot be understood, or is of no parameter, or no effect.
     """
     prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
     chosen = options_from(options, changes)
     device = device_of(chosen, model) or study.device
     effects = {**study.effects, **chosen.effects}
+    HiddenPrior.from_table(effects)
+    if model == "auto" and chosen.modes is None:
+        refuse_unknown(prior, CANDIDATES)
     chosen = replace(chosen, device=device, prior=prior | dict(chosen.prior), effects=effects)
     tasks = [
         Task(number, study, entry, model, close_loop, replace(chosen, progress=None))
@@ -213,8 +219,10 @@ def analyse_study(
 
 def analyse_entry(task: Task, progress: Progress | None = None) -> Result:
     """Read and analyse one recording of a study."""
-    held = task.entry.user is not None
+    held: bool | None = task.entry.user is not None
     modes = None if held else task.options.modes  # of the device by itself
+    if modes is None and task.model != "auto" and held != has_a_hand(task.model):
+        held = None  # who asks for one model of all means it
     options = replace(task.options, held=held, modes=modes, progress=progress)
     run = close_loop if task.close_loop else analyse
     result = run(task.study.read(task.entry), task.model, options)

@@ -9,8 +9,10 @@ from bayeshaptic.arguments import instance, shown
 from bayeshaptic.devices import Device, load_device
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.choose import CANDIDATES
 from bayeshaptic.models import Model
-from bayeshaptic.models.structures import chain
+from bayeshaptic.models.prior_table import refuse_unknown
+from bayeshaptic.models.structures import chain, structure_named
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -33,9 +35,17 @@ def base_model(model: str | Model, options: Options) -> str | Model:
     Raises
     ------
     InputError
-        Where they contradict each other.
+        Where they contradict each other, or a prior is of what none of the models has.
     """
     if options.modes is None:
+        if model == "auto":
+            refuse_unknown(options.prior, CANDIDATES)
+        elif options.held is not None and options.held != has_a_hand(model):
+            said, who = ("yes", "nobody") if options.held else ("no", "somebody")
+            raise InputError(
+                f"held is {said}, and the model is {shown(model)}, of a device that {who} holds; "
+                "leave one of them out"
+            )
         return model
     held = model == "grasped" if options.held is None else options.held
     if model not in ("auto", "grasped" if held else "free"):
@@ -45,6 +55,11 @@ def base_model(model: str | Model, options: Options) -> str | Model:
             f"{shown(model)}; leave one of them out"
         )
     return chain(options.modes, held).name
+
+
+def has_a_hand(model: str | Model) -> bool:
+    """Whether somebody holds the device of a base model."""
+    return model.held if isinstance(model, Model) else structure_named(model).held
 
 
 def measurement_of(measurement: Any, model: Any, options: Options) -> Recording | Etfe:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,6 +27,7 @@ from bayeshaptic.recordings.through_reference import through_reference, too_weak
 from bayeshaptic.threads import single_threaded
 
 _WIDEST = 0.4  # of the sampling rate: a band's upper end
+MOST_PERIODS = 100  # of a loop's delay: haptic loops have one or two, across a network some tens
 
 
 @dataclass
@@ -69,6 +71,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     one_mass = name == "rigid"
     clock = Clock()
     device = device_of(options, asked)
+    _refuse_delay(measurement.period_s, device, asked, options)
     if isinstance(measurement, Recording):
         measurement = with_differences(measurement)
     measurement, notices = with_delay_of_the_loop(measurement, device, options)
@@ -97,6 +100,26 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     if lever_m is None and device is not None:
         lever_m = device.lever_m
     return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m, name)
+
+
+def _refuse_delay(
+    period_s: float, device: Device | None, model: str | Model, options: Options
+) -> None:
+    """Refuse a delay of the loop that none has: every period of it costs states and time."""
+    delay_s, sd_s = options.delay_s, options.delay_sd_s
+    if delay_s is None and isinstance(model, Model):
+        delay_s = model.fixed.get("delay_s")
+    if device is not None:
+        delay_s = device.delay_s if delay_s is None else delay_s
+        sd_s = device.delay_sd_s if sd_s is None else sd_s
+    named = (("loop delay", delay_s), ("standard deviation of the loop delay", sd_s))
+    for what, value in named:
+        if value is not None and MOST_PERIODS * period_s < value < math.inf:
+            raise InputError(
+                f"a {what} of {value:g} s is {value / period_s:,.0f} sampling periods of "
+                f"{period_s:g} s, and {MOST_PERIODS} are the most: it is in seconds, so "
+                f"{value:g} ms are {1e-3 * value:g} and {value:g} us {1e-6 * value:g}"
+            )
 
 
 def with_delay_of_the_loop(

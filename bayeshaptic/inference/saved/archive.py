@@ -60,9 +60,15 @@ def model_from_dict(data: dict[str, Any]) -> Model:
         data["reference"],
         data["force_unit"],
         data["position_unit"],
-        device=Device(**device) if device else None,
+        device=_device_from_dict(device) if device else None,
         effects=tuple(effect_from_dict(entry) for entry in data["effects"]),
     )
+
+
+def _device_from_dict(data: dict[str, Any]) -> Device:
+    """The device; JSON knows no tuples, and one with lists is not equal to what was saved."""
+    tuples = {key: tuple(value) for key, value in data.items() if isinstance(value, list)}
+    return Device(**{**data, **tuples})
 
 
 def effect_to_dict(effect: Any) -> dict[str, Any]:

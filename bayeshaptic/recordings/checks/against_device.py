@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.devices import STRUCTURES, Device
-from bayeshaptic.errors import Notice
+from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.sufficiency import LEAST_COHERENCE
-from bayeshaptic.recordings.checks.units_in_doubt import implausible_mass
+from bayeshaptic.recordings.checks.units_in_doubt import implausible_mass, other_units
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
@@ -18,12 +18,17 @@ from bayeshaptic.recordings.signals.rough_response import RoughResponse
 # Slips of units: thousands, and degrees for radians; with the cure for each.
 _SLIPS = {
     1e3: "is it in thousandths of the unit, such as mm? Write [mm] or *1e-3",
-    1e-3: "is it scaled by 1e-3 twice, or in another unit?",
+    1e-3: "is it scaled by 1e-3 twice, or in another unit? Say it",
     1e6: "is it in millionths of the unit, such as um? Write [um] or *1e-6",
-    1e-6: "is it scaled by 1e-6 twice, or in another unit?",
+    1e-6: "is it scaled by 1e-6 twice, or in another unit? Say it",
     180 / np.pi: "is it in degrees? Write [deg]",
-    np.pi / 180: "is it radians, scaled as degrees?",
+    np.pi / 180: "is it radians, scaled as degrees? Write [rad]",
 }
+# A position that was filtered has finer steps than counts, and files round it: by more only where
+# the unit of one of the two is wrong.
+_FINER = 30.0
+_MOST = 20.0  # times as much as the device file says, or as little: another such device may answer
+_SURELY = 30.0  # beyond it no stiffness follows: no two devices that share a file differ so
 
 
 def compare_resolution(recording: Recording, device: Device | None) -> list[Notice]:
@@ -40,6 +45,8 @@ def compare_resolution(recording: Recording, device: Device | None) -> list[Noti
     known = recording.encoder_resolution
     if known is None and device is not None:
         known = device.encoder_resolution
+    if known is not None and step != known:
+        _refuse_coarse(recording, step or 0.0, known)
     if step is None or known is None or abs(step / known - 1) < 0.05:
         return notices
     slip = _slip(step / known, 1.05)
@@ -48,20 +55,65 @@ def compare_resolution(recording: Recording, device: Device | None) -> list[Noti
             f"The position moves in steps of {step:.3g} {unit}, {slip:.3g} times the encoder's "
             f"resolution of {known:.3g} {unit}: {_SLIPS[slip]} in --columns."
         )
-        notices.append(Notice("warning", "units", text))
+        notices.append(Notice("warning", "units", text, ("position",)))
     elif step > known:
         text = (
             f"The position moves in steps of {step:.3g} {unit}, the encoder's resolution is said "
             f"to be {known:.3g} {unit}."
         )
         notices.append(Notice("note", "resolution", text))
+    elif step < known / _FINER:
+        text = (
+            f"The position moves in steps of {step:.3g} {unit}, and one count of the encoder is "
+            f"said to be {known:.3g} {unit}: correct --encoder-resolution, which is in {unit}, or "
+            "the device's file."
+        )
+        notices.append(Notice("warning", "units", text, ("position",)))
     return notices
+
+
+def _refuse_coarse(recording: Recording, step: float, known: float) -> None:
+    """Refuse a count that is larger than the motion, which has steps within it."""
+    moved = float(np.ptp(recording.position))
+    if moved < 2 * known and step < known / 2:
+        unit = recording.position_unit
+        raise InputError(
+            f"{recording.source or recording.name}: one count of the encoder is said to be "
+            f"{known:.3g} {unit}, and the whole motion is {moved:.3g} {unit}; correct "
+            f"--encoder-resolution, which is in {unit}, or the device's file",
+            topic="units",
+        )
 
 
 def _slip(ratio: float, tolerance: float) -> float | None:
     """The slip of units that a ratio shows, within a factor; None where it shows none."""
     nearest = min(_SLIPS, key=lambda slip: abs(np.log(ratio / slip)))
     return nearest if 1 / tolerance < ratio / nearest < tolerance else None
+
+
+def response_ratio(
+    recording: Recording, device: Device | None, rough: RoughResponse
+) -> float | None:
+    """How many times as much the position answers as that of the device file's nearest model.
+
+    None where nothing can be compared: no force constant, no mass in the file, no clear answer.
+    """
+    clear = rough.clear()
+    if recording.force_unit == "A" or len(clear.response) < 5 or not says_the_mass(device):
+        return None
+    assert device is not None
+    s = 2j * np.pi * clear.frequency_hz
+    ratios = np.array([np.abs(clear.response / each) for each in _compliances(device, s)])
+    if set(_in_full(device)) == {"rigid"}:  # true below the first vibration mode alone
+        lowest = np.argsort(clear.frequency_hz)[: max(5, len(s) // 20)]
+        ratios = ratios[:, lowest]
+    # Nobody knows here whether the device was held: the nearest of its models counts.
+    return float(min(np.median(ratios, axis=1), key=lambda ratio: abs(np.log(ratio))))
+
+
+def confirms(ratio: float | None) -> bool:
+    """Whether a device answers about as much as its file says: no unit is in doubt then."""
+    return ratio is not None and 1 / _MOST < ratio < _MOST
 
 
 def compare_response(
@@ -77,25 +129,34 @@ def compare_response(
     clear = rough.clear()
     if recording.force_unit == "A" or len(clear.response) < 5:
         return []
-    if device is None:
+    ratio = response_ratio(recording, device, rough)
+    if ratio is None or device is None:
         return [] if slipped else implausible_mass(recording, clear)
-    s = 2j * np.pi * clear.frequency_hz
-    ratios = [
-        float(np.median(np.abs(clear.response / compliance)))
-        for compliance in _compliances(device, s)
-    ]
-    # Nobody knows here whether the device was held: the nearest of its models counts.
-    ratio = min(ratios, key=lambda ratio: abs(np.log(ratio)), default=1.0)
-    if 0.05 < ratio < 20:
+    if confirms(ratio):
         return []
-    slip = _slip(ratio, 4)
+    slip = _slip(ratio, 4) or ratio
+    cure = other_units(slip, recording.force_unit, device.position_unit)
     text = (
         f"The position answers {ratio:.2g} times as much to the force as that of {device.name} "
-        f"should: a slip of units? Perhaps the position is {slip or ratio:.3g} times too large, or "
-        f"the force {1 / (slip or ratio):.3g} times. Give the units with --columns, as in "
-        "position=NAME[mm]."
+        f"should: a slip of units? With {cure} it would be "
+        "as the device's file says; correct the units in --columns, or the file."
     )
-    return [Notice("warning", "units", text)]
+    far = not 1 / _SURELY < ratio < _SURELY
+    return [Notice("warning", "units", text, ("position",) if far else ())]
+
+
+def says_the_mass(device: Device | None) -> bool:
+    """Whether a device file says enough to compare a response with: a mass, or all of a model."""
+    return device is not None and bool(_in_full(device))
+
+
+def _in_full(device: Device) -> dict[str, dict[str, float]]:
+    """The models that a device file gives in full; one mass may be without its damper."""
+    return {
+        structure: {"b": 0.0, **parameters} if structure == "rigid" else dict(parameters)
+        for structure, parameters in device.parameters.items()
+        if set(STRUCTURES[structure]) - {"b"} <= set(parameters)
+    }
 
 
 def _compliances(device: Device, s: NDArray[Any]) -> list[NDArray[Any]]:
@@ -103,11 +164,7 @@ def _compliances(device: Device, s: NDArray[Any]) -> list[NDArray[Any]]:
 
     The rigid one counts only where it is alone: it is far off above the first mode.
     """
-    full = {
-        structure: device.parameters[structure]
-        for structure, names in STRUCTURES.items()
-        if set(names) <= set(device.parameters.get(structure, {}))
-    }
+    full = _in_full(device)
     if set(full) == {"rigid"}:
         return [1 / (full["rigid"]["m"] * s**2 + full["rigid"]["b"] * s)]
     found = []

@@ -6,9 +6,19 @@ import numpy as np
 
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.recordings.checks.against_device import compare_resolution, compare_response
+from bayeshaptic.recordings.checks.against_device import (
+    compare_resolution,
+    compare_response,
+    confirms,
+    response_ratio,
+)
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
-from bayeshaptic.recordings.checks.units_in_doubt import degrees, mixed_units, whole_numbers
+from bayeshaptic.recordings.checks.units_in_doubt import (
+    degrees,
+    mixed_units,
+    not_of_the_position,
+    whole_numbers,
+)
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.rough_response import rough_response
@@ -48,7 +58,7 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
             f"--columns, as in position=NAME[{device.position_unit}]",
             topic="columns",
         )
-    scales = (
+    scales: tuple[Notice, ...] = (
         *_period(recording, device),
         *mixed_units(recording),
         *whole_numbers(recording),
@@ -56,6 +66,8 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *compare_resolution(recording, device),
     )
     rough = rough_response(recording)
+    if confirms(response_ratio(recording, device, rough)):
+        scales = not_of_the_position(scales)
     # A slip of units need not be found twice.
     slipped = any((n.level, n.topic) == ("warning", "units") for n in scales)
     return (
@@ -109,7 +121,7 @@ def _period(recording: Recording, device: Device | None) -> list[Notice]:
             f"The sampling period is {period:g} s, which no haptic loop has: is the time in ms "
             "or us? Write time=NAME[ms] or time=NAME[us] in --columns."
         )
-        notices.append(Notice("warning", "units", text))
+        notices.append(Notice("warning", "units", text, ("time",)))
     if recording.time_jitter is not None and recording.time_jitter > NOTABLE_JITTER:
         text = (
             f"The time steps vary by {100 * recording.time_jitter:.2g} % of the period (standard "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,26 +11,32 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
+from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.types import Floats
 
-_FORCE = "The force"  # how warnings begin that speak of it alone
 # Mass of a device as its motor feels it: the lightest, a usual and the heaviest one; and from where
 # on it is doubted if nobody said the units, since what is a thousand times too heavy gets a limit
-# that is a thousand times too high.
+# that is a thousand times too high.  A push of a hand, 50 N, moves 140 kg by a third of a m/s^2
+# only, and a servo axis of a machine tool, 95 kg, is still below it; an outstretched leg is 2.5
+# kg m^2 about the hip.  Motors of 0.15 kg, or of 3e-3 kg m^2, are beyond it in mm or mrad.
 _MASSES = {
-    ("N", "m"): (3e-3, 0.5, 500.0, 50.0, "kg"),
-    ("Nm", "rad"): (1e-7, 1e-3, 10.0, 0.3, "kg m^2"),
+    ("N", "m"): (3e-3, 0.5, 140.0, 50.0, "kg"),
+    ("Nm", "rad"): (1e-7, 1e-3, 3.0, 0.3, "kg m^2"),
 }
 
 
-def position_is_in_doubt(notices: Iterable[Notice]) -> bool:
-    """Whether nobody said the units, and a warning speaks against the position's.
+def in_doubt(quantity: str, notices: Iterable[Notice]) -> bool:
+    """Whether a warning doubts the unit of a quantity, "position" or "time".
 
     The limit is wrong by what a position is wrong by, in whichever direction; a force that is wrong
     by a factor cancels, since the limit is in units of the command.
     """
-    others = [n for n in notices if n.topic == "units" and not n.text.startswith(_FORCE)]
-    return {"note", "warning"} <= {notice.level for notice in others}
+    return any((n.level, n.topic) == ("warning", "units") and quantity in n.about for n in notices)
+
+
+def not_of_the_position(notices: Iterable[Notice]) -> tuple[Notice, ...]:
+    """The same, without doubt of the position's unit: the device's file confirms it."""
+    return tuple(replace(n, about=tuple(a for a in n.about if a != "position")) for n in notices)
 
 
 def mixed_units(recording: Recording) -> list[Notice]:
@@ -37,11 +44,11 @@ def mixed_units(recording: Recording) -> list[Notice]:
     if (recording.force_unit, recording.position_unit) not in (("N", "rad"), ("Nm", "m")):
         return []
     text = (
-        f"{_FORCE} is in {recording.force_unit} and the position in {recording.position_unit}: "
+        f"The force is in {recording.force_unit} and the position in {recording.position_unit}: "
         f"stiffness is then in {recording.stiffness_unit}, and masses are not in kg or kg m^2. "
         "Give the units with --columns, as in force=NAME[Nm]."
     )
-    return [Notice("warning", "units", text)]
+    return [Notice("warning", "units", text, ("force",))]
 
 
 def whole_numbers(recording: Recording) -> list[Notice]:
@@ -53,11 +60,11 @@ def whole_numbers(recording: Recording) -> list[Notice]:
     levels = 20  # of a force, which may be whole newtons
     if is_whole(recording.force) and len(np.unique(recording.force)) > levels:
         text = (
-            f"{_FORCE}s are whole numbers, from {recording.force.min():g} to "
+            f"The forces are whole numbers, from {recording.force.min():g} to "
             f"{recording.force.max():g} {recording.force_unit}: are they counts of a converter? "
             f"Write force=NAME*C[{recording.force_unit}] with the force C of one count."
         )
-        notices.append(Notice("warning", "units", text))
+        notices.append(Notice("warning", "units", text, ("force",)))
     if not is_whole(recording.position):
         return notices
     unit = recording.position_unit
@@ -66,7 +73,7 @@ def whole_numbers(recording: Recording) -> list[Notice]:
         f"{recording.position.max():g} {unit}: are they counts of the encoder? Write "
         f"position=NAME*C with one count C in {unit}, or name their unit, as in position=NAME[mm]."
     )
-    return [*notices, Notice("warning", "units", text)]
+    return [*notices, Notice("warning", "units", text, ("position",))]
 
 
 def is_whole(signal: Floats) -> bool:
@@ -83,7 +90,9 @@ def degrees(recording: Recording) -> list[Notice]:
         f"The angles are multiples of {360 / turn:.6g}, and {turn:,} of that are 360: are they in "
         "degrees? Write position=NAME[deg] in --columns."
     )
-    return [Notice("warning", "units", text)]
+    # One step in fifty of an encoder in radians is so by chance: where rad is said it may be true.
+    assumed = is_assumed("position", recording.notices)
+    return [Notice("warning", "units", text, ("position",) if assumed else ())]
 
 
 def steps_of_a_turn(step: float | None) -> int | None:
@@ -110,24 +119,45 @@ def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]
     if kind not in _MASSES:
         return []
     lightest, usual, heaviest, doubted, unit = _MASSES[kind]
-    said_nothing = any(n.topic == "units" for n in recording.notices)
+    said_nothing = is_assumed("position", recording.notices)
     s = 2j * np.pi * clear.frequency_hz
     mass = float(np.median(np.abs(1 / (s**2 * clear.response))))
     if lightest < mass < (doubted if said_nothing else heaviest):
         return []
     factor = min((1e-6, 1e-3, 1e3, 1e6), key=lambda f: abs(np.log(mass * f / usual)))
-    smaller, larger = ("small", "large") if factor > 1 else ("large", "small")
-    named = {1e3: "mm", 1e6: "um"}.get(factor) if recording.position_unit == "m" else None
-    asked = f" (are they in {named}?)" if named else ""
-    term = f"[{named}]" if named else f"*{1 / factor:g}[{recording.position_unit}]"
     turns = ""
     low, _, high, _, _ = _MASSES["Nm", "rad"]
     if said_nothing and kind == ("N", "m") and low < mass < high:
         turns = " If it turns: force=NAME[Nm],position=NAME[rad]."
-    times = max(factor, 1 / factor)
     text = (
-        f"The device answers as {mass:.2g} {unit} would: a slip of units? With positions {times:g} "
-        f"times as {smaller}{asked}, or forces {times:g} times as {larger}, it would be "
-        f"{mass * factor:.2g} {unit}. Give the units with --columns, as in position=NAME{term}."
+        f"The device answers as {mass:.2g} {unit} would: a slip of units? With "
+        f"{other_units(factor, *kind)} it would be {mass * factor:.2g} {unit}.{turns} If the units "
+        "are right, confirm them with a device file that says the mass (--device)."
     )
-    return [Notice("warning", "units", text + turns)]
+    return [Notice("warning", "units", text, ("position",))]
+
+
+def other_units(factor: float, force_unit: str, position_unit: str) -> str:
+    """What makes positions `factor` times as small, or forces as large, and how to write it."""
+    times = f"{max(factor, 1 / factor):.4g}"
+    named = {
+        ("m", 1e3): "mm",
+        ("m", 1e6): "um",
+        ("rad", 1e3): "mrad",
+        ("rad", 1e6): "urad",
+        ("rad", 180 / np.pi): "deg",
+    }.get((position_unit, factor))
+    if factor > 1:
+        asked = f" (are they in {named}?)" if named else ""
+        written = f"position=NAME[{named}]" if named else f"position=NAME*{1 / factor:.3g}"
+        scaled = f" (force=NAME[{force_unit}], if they are in {force_unit} already)"
+        return (
+            f"positions {times} times as small{asked}, as in {written}, or forces {times} times as "
+            f"large{scaled if factor in (1e3, 1e6) else ''},"
+        )
+    asked = f"are they in {position_unit}, and were scaled once too often?"
+    milli = f" (are they in m{force_unit}? force=NAME[m{force_unit}])" if factor == 1e-3 else ""
+    return (
+        f"positions {times} times as large ({asked} position=NAME[{position_unit}]), or forces "
+        f"{times} times as small{milli},"
+    )

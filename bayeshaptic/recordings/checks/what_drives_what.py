@@ -101,11 +101,11 @@ def _feedback(evidence: str, against: bool) -> Notice:
 def _doubt(evidence: str) -> Notice:
     """That it may have been."""
     text = (
-        f"It {UNDECIDED} whether the force was computed from the motion ({evidence}, more than "
-        "chance but little). If the recording was made in closed loop, the ETFE, the fit and K_CR "
-        "are biased: record again with a force that does not depend on the motion, and longer."
+        f"It cannot be decided whether the force was computed from the motion ({evidence}, more "
+        "than chance but little). If the recording was made in closed loop, the ETFE, the fit and "
+        "K_CR are biased: record again with a force that does not depend on the motion, and longer."
     )
-    return Notice("warning", "feedback", text)
+    return Notice("warning", "feedback", text, (UNDECIDED,))
 
 
 def _early() -> Notice:

@@ -111,7 +111,7 @@ def frf_from_arrays(
     notices: tuple[Notice, ...] = ()
     if force_unit is None and position_unit is None:
         text = f"No units were given: the gain is taken to be in {units[1]}/{units[0]}."
-        notices = (Notice("note", "units", text),)
+        notices = (Notice("note", "units", text, ("force", "position")),)
     phase = np.exp(1j * np.radians(columns["phase_deg"]))
     value: Complexes = np.asarray(10 ** (columns[of] / 20) * phase)
     variance, averages = _variance(path, columns, value)

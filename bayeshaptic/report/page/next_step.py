@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.trials.drift import PARTS
 from bayeshaptic.quantities import pure
+from bayeshaptic.recordings.checks.against_device import says_the_mass
 from bayeshaptic.recordings.checks.sufficiency import SHORTEST_S, told_too_little
-from bayeshaptic.recordings.checks.units_in_doubt import position_is_in_doubt
+from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
+from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.objections import changes, is_open
 
 if TYPE_CHECKING:
@@ -61,15 +63,9 @@ def next_steps(
     if has_feedback(analysis.notices):
         through = f"bayeshaptic report {_source(result)}{_device(result)}"
         return _after_feedback(result, command, new, through + _said(options, _KEPT[1:]))
-    if position_is_in_doubt(analysis.notices):
-        bare = f"bayeshaptic report {_source(result)}{_device(result)}{_said(options, _KEPT[1:])}"
-        return (
-            Step(
-                "Say in which units they are, with the size of a count where they are counts. This "
-                "recording will do:",
-                f'{bare} --columns "time=NAME[s],force=NAME*0.01[N],position=NAME*3.1e-6[m]"',
-            ),
-        )
+    doubted = any(in_doubt(what, analysis.notices) for what in ("position", "time"))
+    if doubted or (analysis.sampled and too_stiff(analysis) is not None):
+        return _after_doubtful_units(result, options)
     if (too_little := told_too_little(analysis.notices)) is not None:
         cure = too_little.cure[0].upper() + too_little.cure[1:]
         return (Step(f"{cure}. Then:", new),)
@@ -78,6 +74,32 @@ def next_steps(
     if analysis.etfe.direct and analysis.posterior.converged:
         return (_in_open_loop(new),)
     return (_after_fit(result, command, new),)
+
+
+def _after_doubtful_units(result: Result, options: Mapping[str, Any]) -> tuple[Step, ...]:
+    """Where a number is one that no device has: another unit, or a device that says so."""
+    model = result.analysis.model
+    force, position = model.force_unit, model.position_unit
+    source, kept = f"bayeshaptic report {_source(result)}", _said(options, _KEPT[1:])
+    columns = f"time=NAME[s],force=NAME*0.01[{force}],position=NAME*3.1e-6[{position}]"
+    if result.measured.recording is None:
+        columns = f"gain_db=NAME[{position}/{force}]"
+    units = Step(
+        "Say in which units they are, with the size of a count where they are counts. This "
+        "recording will do:",
+        f'{source}{_device(result)}{kept} --columns "{columns}"',
+    )
+    notices = result.analysis.notices
+    of_the_time = in_doubt("time", notices) and not in_doubt("position", notices)
+    if of_the_time or says_the_mass(result.measured.device):
+        return (units,)
+    unit, kind = ("kg m^2", "rotational") if position == "rad" else ("kg", "translational")
+    table = f'name = "mine", kind = "{kind}" and [rigid] m = its mass in {unit}'
+    return units, Step(
+        "Or, if the units are right, confirm them by the mass, in a device file (MINE.toml: "
+        f"{table}, a line each):",
+        f"{source} --device MINE.toml{_said(options, _KEPT)}",
+    )
 
 
 def _after_fit(result: Result, command: str, new: str) -> Step:
