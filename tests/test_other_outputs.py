@@ -12,6 +12,7 @@ import bayeshaptic as bh
 from bayeshaptic.diagnosis.base.begun import begin
 from bayeshaptic.diagnosis.base.opened import with_delay_of_the_loop
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.samples.mend import measurement_tests
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.response.between_samples import with_images
 from bayeshaptic.recordings.response.differences import with_differences
@@ -211,6 +212,28 @@ def test_a_velocity_beside_a_command_needs_no_richer_model(noise, pushed, tmp_pa
     assert begun.fit.model.name == "rigid" and begun.fit.reduced_chi_square < 1.3
     assert np.all(np.abs(begun.fit.theta - theta) < 4 * begun.fit.sd)
     assert begun.etfe.band_hz[1] <= 0.3 / PERIOD_S
+
+
+def test_no_rows_are_missing_where_friction_turns_a_velocity(tmp_path):
+    """Where it does, the integral bends by more than the sensor's noise, and none was lost."""
+    mass, friction, steps, late = 0.3, 0.16, 10, 3
+    rng = np.random.default_rng(9)
+    force = 1.6 * rng.standard_normal(8000)
+    kept, speed, speeds = 1 - 2.0 / mass * PERIOD_S / steps, 0.0, np.zeros(8000)
+    for row, before in enumerate([0.0, *force[:-1]]):
+        speeds[row] = speed
+        for step in range(steps):
+            push = before if step < late else force[row]
+            free = speed * kept + push / mass * PERIOD_S / steps
+            most = friction / mass * PERIOD_S / steps
+            speed = free - min(max(free, -most), most)
+    noise = 7e-4 * np.std(speeds) * rng.standard_normal(8000)
+    path = tmp_path / "tacho.npz"
+    np.savez(path, t=np.arange(8000) * PERIOD_S, u=force, v=speeds + noise)
+    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    begun = begin(recording, "rigid", Options(delay_s=late / steps * PERIOD_S))
+    tests = {test.name: test for test in measurement_tests(begun.fit, begun.etfe)}
+    assert not tests["dropped_samples"].flagged
 
 
 def test_the_limit_from_a_tachometer_beside_a_command(tmp_path):
