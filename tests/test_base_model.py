@@ -14,10 +14,10 @@ from bayeshaptic.diagnosis.base import best_base, loops_in_turn
 from bayeshaptic.diagnosis.base.best_base import traced_from_best_base
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
-from bayeshaptic.inference import choose
+from bayeshaptic.inference import choose, criterion
 from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
 from bayeshaptic.models.hand import from_a_hand
-from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.numerics.spending import RATE, Meter, spend
 
 SIZES = {"rigid": 2, "free": 6, "chain-2": 10, "grasped": 11}
 
@@ -110,7 +110,7 @@ def rounds_of(
             self.rounds += 1
 
     monkeypatch.setattr(loops_in_turn, "Loop", Loop)
-    monkeypatch.setattr(choose, "deviance", deviance)
+    monkeypatch.setattr(criterion, "deviance", deviance)
     monkeypatch.setattr(best_base, "replace", lambda old, **new: _changed(old, new))
     fits = {name: fit(name, value) for name, value in misfits.items()}
     score = dict.fromkeys(fits, 0.0) | (scores or {})
@@ -339,3 +339,24 @@ def test_a_third_mass_is_no_hand(tmp_path) -> None:
     grasped = choice.candidates["grasped"]
     assert grasped.fit.reduced_chi_square < 1.2
     assert grasped.score > choice.candidates["chain-2"].score + UNDECIDED
+
+
+@pytest.mark.parametrize(("spent", "loops"), [(0.3, 3), (0.6, 2), (1.1, 1)])
+def test_loops_that_are_closed_again_share_one_budget(monkeypatch, spent, loops) -> None:
+    """What lies between the samples may change with every loop, and none is without an end."""
+    budgets: list[float] = []
+
+    def traced_from_best_base(begun: Any, options: Options) -> Any:
+        budgets.append(options.budget_s)
+        spend(spent * Options().budget_s * RATE)
+        model = SimpleNamespace(effects=())
+        return begun, SimpleNamespace(state=SimpleNamespace(model=model, fit=None))
+
+    monkeypatch.setattr(best_base, "traced_from_best_base", traced_from_best_base)
+    monkeypatch.setattr(best_base, "as_of_the_loop", lambda measured, fit: None)
+    monkeypatch.setattr(best_base, "hardly_differ", lambda etfe, other: False)
+    monkeypatch.setattr(best_base, "refitted", lambda begun, *rest: begun)
+    begun: Any = SimpleNamespace(measured=None, etfe=None)
+    best_base.traced_as_of_the_loop(begun, "auto", Options())
+    left = [1 - number * spent for number in range(loops)]
+    assert budgets == pytest.approx([Options().budget_s * share for share in left])

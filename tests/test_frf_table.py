@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bayeshaptic.diagnosis.base.begun import begin
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
-from bayeshaptic.models import rigid
+from bayeshaptic.models import free, rigid
 from bayeshaptic.recordings import read_frf, read_measurement
 from bayeshaptic.recordings.response.etfe import Etfe
 
@@ -18,9 +20,8 @@ GAIN_DB, PHASE_DEG = 20 * np.log10(np.abs(RESPONSE)), np.degrees(np.angle(RESPON
 
 
 def write(path: Path, **columns: np.ndarray | float) -> Path:
-    table = np.column_stack(
-        [np.broadcast_to(values, len(FREQUENCY)) for values in columns.values()]
-    )
+    rows = np.shape(columns.get("frequency_hz", FREQUENCY))
+    table = np.column_stack([np.broadcast_to(values, rows) for values in columns.values()])
     np.savetxt(path, table, header=",".join(columns), comments="", delimiter=",")
     return path
 
@@ -175,6 +176,33 @@ def test_the_response_of_a_structure_gets_the_hold(
     np.testing.assert_allclose(etfe.value[low], exact[low], rtol=1e-4)
     np.testing.assert_allclose(np.sqrt(etfe.variance[low]), 1e-3 * abs(exact[low]), rtol=1e-3)
     assert any("structure" in note.text for note in etfe.notices)
+
+
+def test_a_fitted_model_says_what_a_structure_has_above_half_the_sampling_rate(
+    tmp_path: Path,
+) -> None:
+    """Two masses, up to 0.4 of the sampling rate: nothing else is needed to explain them."""
+    model = free(delay_s=4e-4, period_s=1e-3)
+    values = {"m1": 0.25, "b1": 0.5, "kc": 3e4, "bc": 3.0, "m2": 1.5, "b2": 4.0}
+    theta = np.array([values[name] for name in model.names])
+    frequency = np.arange(1.0, 400.0)
+    mobility = model.system(theta).continuous_response(2j * np.pi * frequency)[0]
+    mobility = mobility * 2j * np.pi * frequency
+    rng = np.random.default_rng(5)
+    noise = rng.standard_normal(399) + 1j * rng.standard_normal(399)
+    seen = mobility * (1 + 0.01 / np.sqrt(2) * noise)
+    columns = {"frequency_hz": frequency, "mobility_db": 20 * np.log10(np.abs(seen))}
+    columns |= {"phase_deg": np.degrees(np.angle(seen)), "sd": 0.01 * np.abs(mobility)}
+    table = read_frf(write(tmp_path / "a.csv", **columns), 1e-3, kind="translational")
+    begun = begin(table, "auto", Options(delay_s=4e-4))
+    assert begun.fit.model.name == "free" and begun.fit.reduced_chi_square < 1.2
+    off = (begun.fit.theta - theta) / begun.fit.sd
+    assert np.nanmax(np.abs(off)) < 4
+    # What was measured is as exact as the table says, and what was added is right.
+    exact = model.response(theta, frequency)
+    held = begun.etfe.value - exact
+    assert np.mean(np.abs(held) ** 2 / begun.etfe.variance) == pytest.approx(1, abs=0.2)
+    assert begun.etfe.relative_sd[-1] < 0.02 < begun.measured.relative_sd[-1]
 
 
 def test_a_response_is_of_one_kind(tmp_path: Path) -> None:

@@ -9,8 +9,10 @@ import pytest
 from scipy.signal import butter, lfilter
 
 import bayeshaptic as bh
+from bayeshaptic.diagnosis.base.begun import begin
 from bayeshaptic.diagnosis.base.opened import with_delay_of_the_loop
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.samples.mend import measurement_tests
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.response.between_samples import with_images
 from bayeshaptic.recordings.response.differences import with_differences
@@ -183,6 +185,55 @@ def test_differences_of_an_encoder_are_told_from_a_tachometer(output, tmp_path):
     assert (told.sensed is None) == (output == "differences")
     if output == "differences":
         assert np.allclose(told.position, count * np.round(position / count))
+
+
+def tacho_of_one_mass(path, noise, pushed=0.0):
+    """A rigid device under noise; beside the command something pushes it at low frequencies."""
+    mass, damping, delay_s = 0.3, 2.0, 3e-4
+    rng = np.random.default_rng(7)
+    force = rng.standard_normal(12000)
+    keep = np.exp(-damping / mass * PERIOD_S)
+    late = np.exp(-damping / mass * (PERIOD_S - delay_s))
+    gains = np.array([0.0, 1 - late, late - keep]) / damping
+    besides = lfilter(*butter(2, 2 * 20 * PERIOD_S), pushed * rng.standard_normal(12000))
+    speed = lfilter(gains, [1.0, -keep], force)
+    speed += lfilter([0.0, (1 - keep) / damping], [1.0, -keep], besides)
+    speed += noise * np.std(speed) * rng.standard_normal(12000)
+    np.savez(path, t=np.arange(12000) * PERIOD_S, u=force, v=speed)
+    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    return recording, np.array([mass, damping]), delay_s
+
+
+@pytest.mark.parametrize(("noise", "pushed"), [(1e-3, 0.0), (1e-5, 0.3)])
+def test_a_velocity_beside_a_command_needs_no_richer_model(noise, pushed, tmp_path):
+    """Each model is fitted to what it makes of the samples itself, and where these tell of it."""
+    recording, theta, delay_s = tacho_of_one_mass(tmp_path / "tacho.npz", noise, pushed)
+    begun = begin(recording, "auto", Options(delay_s=delay_s))
+    assert begun.fit.model.name == "rigid" and begun.fit.reduced_chi_square < 1.3
+    assert np.all(np.abs(begun.fit.theta - theta) < 4 * begun.fit.sd)
+    assert begun.etfe.band_hz[1] <= 0.3 / PERIOD_S
+
+
+def test_no_rows_are_missing_where_friction_turns_a_velocity(tmp_path):
+    """Where it does, the integral bends by more than the sensor's noise, and none was lost."""
+    mass, friction, steps, late = 0.3, 0.16, 10, 3
+    rng = np.random.default_rng(9)
+    force = 1.6 * rng.standard_normal(8000)
+    kept, speed, speeds = 1 - 2.0 / mass * PERIOD_S / steps, 0.0, np.zeros(8000)
+    for row, before in enumerate([0.0, *force[:-1]]):
+        speeds[row] = speed
+        for step in range(steps):
+            push = before if step < late else force[row]
+            free = speed * kept + push / mass * PERIOD_S / steps
+            most = friction / mass * PERIOD_S / steps
+            speed = free - min(max(free, -most), most)
+    noise = 7e-4 * np.std(speeds) * rng.standard_normal(8000)
+    path = tmp_path / "tacho.npz"
+    np.savez(path, t=np.arange(8000) * PERIOD_S, u=force, v=speeds + noise)
+    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    begun = begin(recording, "rigid", Options(delay_s=late / steps * PERIOD_S))
+    tests = {test.name: test for test in measurement_tests(begun.fit, begun.etfe)}
+    assert not tests["dropped_samples"].flagged
 
 
 def test_the_limit_from_a_tachometer_beside_a_command(tmp_path):

@@ -12,10 +12,12 @@ from typing import Any
 
 import pytest
 from browser import needs_browser, probe
+from fake_analysis import fake_analysis, fake_closed
 from fake_study import NAMES, SIX_DB, fake_study
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
+from bayeshaptic.report.headline import headline
 from bayeshaptic.report.study import write as study_report
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.population_json import population_summary
@@ -193,6 +195,51 @@ def test_warnings_stand_at_the_top() -> None:
     warned = replace(study("nobody"), notices=(Notice("warning", "population", "Beware of it"),))
     head = study_headline(warned)
     assert head.status == "caution" and "Beware: Beware of it." in head.details
+
+
+def changed(which: Any, *results: Any) -> Any:
+    """A study with other results of its recordings, in their order."""
+    both = zip(which.recordings, results, strict=True)
+    return replace(which, recordings=tuple(replace(one, result=found) for one, found in both))
+
+
+def test_a_study_is_no_better_than_its_recordings(tmp_path: Path) -> None:
+    one = study("nobody")
+    assert study_headline(one).status == "safe"
+    closed = fake_closed("unexplained", "linear", device="phantom")
+    assert headline(closed).status == "caution"
+    head = study_headline(changed(one, closed))
+    assert head.status == "caution" and "unexplained" in head.doubts
+    assert "Part of its recording remains unexplained" in head.sentence
+    write_study_report(changed(one, closed), tmp_path)
+    assert json.loads((tmp_path / "limits.json").read_text())["status"] == "caution"
+    said = json.loads((tmp_path / "population.json").read_text())["recommendation"]
+    assert said["status"] == "caution" and "unexplained" in said["sentence"]
+
+
+def test_what_recordings_warn_of_stands_at_the_top_of_their_study() -> None:
+    text = "Dry friction is not taken off, and makes the limit too high"
+    warned = partial(fake_analysis, "free", "phantom", spread=0.01)
+    doubtful, clean = warned(notices=(Notice("warning", "pieces", text),)), warned()
+    head = study_headline(changed(study("nobody"), doubtful))
+    assert head.status == "caution" and f"Beware: {text}." in head.details
+    two = fake_study(people=0, free=2)
+    assert study_headline(two).status == "safe"
+    head = study_headline(changed(two, clean, doubtful))
+    assert head.status == "caution" and f"Beware: {text}." in head.details
+    head = study_headline(changed(two, doubtful, doubtful))
+    assert "free-0 (pieces) and free-1 (pieces)" in " ".join(head.details)
+
+
+def test_a_measurement_that_puts_the_limit_lower_lowers_that_of_the_study() -> None:
+    analysis = fake_analysis("free", "phantom", spread=0.01)
+    low = 0.8 * analysis.limit.quantile(0.5)
+    own = {"q05": 0.98 * low, "q50": low, "q95": 1.02 * low}
+    analysis.etfe_limit = replace(analysis.etfe_limit, **own)
+    head = study_headline(changed(study("nobody"), analysis))
+    assert head.status == "caution" and head.risk is None
+    assert head.stiffness == headline(analysis).stiffness
+    assert "the measured response of free-0 itself" in head.sentence
 
 
 def test_an_older_report_leaves_nothing_that_contradicts(whole: Path, tmp_path: Path) -> None:

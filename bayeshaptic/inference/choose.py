@@ -8,19 +8,19 @@ counts by how far it is from any, as five more residuals.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
-from bayeshaptic.inference.fit import MISFIT, Fit, search_box, weighted_residuals
+from bayeshaptic.inference.criterion import deviance, information_criterion
+from bayeshaptic.inference.fit import MISFIT, Fit
 from bayeshaptic.inference.least_squares import SETS, least_squares
+from bayeshaptic.inference.loop_response import fitted_to_the_loop
 from bayeshaptic.models import Prior, build_model
-from bayeshaptic.models.hand import from_a_hand
 from bayeshaptic.models.prior_table import refuse_unknown
-from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown, data_frame
@@ -54,11 +54,14 @@ class ScoredFit:
         Squared distance of its hand from what hands are like, in standard deviations, where both
         this and the misfit are least: a chi-square of five numbers, and in the score; zero where
         there is no hand.
+    etfe : Etfe or None
+        What it was fitted to: of some measurements each model makes its own.
     """
 
     fit: Fit
     score: float
     from_a_hand: float = 0.0
+    etfe: Etfe | None = field(default=None, repr=False)
 
     @property
     def held(self) -> bool:
@@ -130,6 +133,7 @@ def choose_model(
     prior: Mapping[str, Prior] | None = None,
     held: bool | None = None,
     seed: int = 0,
+    measured: bool = True,
 ) -> Choice:
     """Fit the rigid, the free and the grasped model; choose by an information criterion.
 
@@ -146,6 +150,9 @@ def choose_model(
     held : bool, optional
         Whether somebody held the device, where the study says so: then it is not a question.
     seed : int
+    measured : bool
+        Whether `etfe` is as it was measured: where something else than a command and a position was
+        sensed each candidate is fitted to what it makes of that.
 
     Returns
     -------
@@ -157,26 +164,37 @@ def choose_model(
         For a prior of what no candidate has for a parameter.
     """
     refuse_unknown(prior or {}, CANDIDATES)
+    fits: dict[str, Fit] = {}
+    etfes: dict[str, Etfe] = {}
 
-    def fitted(name: str, shorter: Fit | None = None, most_sets: int = SETS) -> Fit:
+    def fit_to(name: str, shorter: Fit | None = None, most_sets: int = SETS) -> None:
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
         own = {key: value for key, value in (prior or {}).items() if key in model.names}
-        return least_squares(model.with_prior(own), etfe, seed, None, shorter, most_sets)
+
+        def fitting(response: Etfe, start: Floats | None = None) -> Fit:
+            return least_squares(model.with_prior(own), response, seed, start, shorter, most_sets)
+
+        # What the best so far makes of the measurement is near what this one will.
+        best = min(fits, key=lambda other: fits[other].reduced_chi_square, default=None)
+        first = etfes[best] if best else etfe
+        found = fitted_to_the_loop(fitting, etfe, first) if measured else (fitting(etfe), etfe)
+        fits[name], etfes[name] = found
 
     names = {None: ("rigid", "free", "grasped"), True: ("grasped",), False: ("rigid", "free")}
-    fits: dict[str, Fit] = {}
     for name in names[held]:
         # Where a simpler one leaves noise, no deeper valley of a richer one would be chosen.
         noise_reached = any(fit.reduced_chi_square < _NOISE for fit in fits.values())
-        fits[name] = fitted(name, most_sets=1 if noise_reached else SETS)
+        fit_to(name, most_sets=1 if noise_reached else SETS)
     best, candidates, noise = _compared(fits)
     # Where two masses that nobody holds explain it, a third has nothing to explain.
     if held is None and (fits[best].misfits or candidates[best].held):
-        fits[_CHAIN] = fitted(_CHAIN, shorter=fits["free"])
+        fit_to(_CHAIN, shorter=fits["free"])
         if fits[_CHAIN].misfits:
-            fits[_CHAIN] = _from_the_hand(fits[_CHAIN], fits["grasped"], etfe)
+            fits[_CHAIN] = _from_the_hand(fits[_CHAIN], fits["grasped"], etfes[_CHAIN])
         best, candidates, noise = _compared(fits)
-    return Choice(fits[best], _reason(best, candidates, noise, held), candidates)
+    reason = _reason(best, candidates, noise, held)
+    tried = {name: replace(one, etfe=etfes[name]) for name, one in candidates.items()}
+    return Choice(fits[best], reason, tried)
 
 
 def _compared(fits: Mapping[str, Fit]) -> tuple[str, dict[str, ScoredFit], float]:
@@ -213,62 +231,6 @@ def _best(candidates: Mapping[str, ScoredFit], noise: float) -> str:
         if better and (noise < MISFIT or gain > material):
             best = name
     return best
-
-
-def information_criterion(fit: Fit, noise: float, further: int = 0) -> float:
-    """Bayesian information criterion of a fit; smaller is better.
-
-    Parameters
-    ----------
-    fit : Fit
-    noise : float
-        Factor on the noise variance (a quasi-likelihood where no model reaches the noise).
-    further : int
-        Parameters beside those of the fit's model.
-    """
-    numbers = 2 * len(fit.residual)
-    return deviance(fit, noise)[0] + (fit.model.size + further) * float(np.log(numbers))
-
-
-def deviance(fit: Fit, noise: float) -> tuple[float, float]:
-    """Squared residual of a fit, and how far its hand is from what hands are like.
-
-    A hand counts as five more residuals, and both are those of the least sum.
-
-    Parameters
-    ----------
-    fit : Fit
-    noise : float
-        Factor on the noise variance.
-
-    Returns
-    -------
-    whole : float
-        Twice the fall of the log likelihood; of what is known of hands, too.
-    from_a_hand : float
-        The hand's part of it, a chi-square of five numbers; zero where nobody holds the device.
-    """
-    at_fit = 2 * float(np.sum(np.abs(fit.residual) ** 2)) / noise
-    # Where the noise is what the fit leaves the likelihood tells one fit from another.
-    known = fit.windows.noise is None
-    own = at_fit if known else -2 * fit.log_likelihood
-    if not fit.model.held:
-        return own, 0.0
-    here, low, high = search_box(fit.model)
-    misfit = weighted_residuals(fit.likelihood, here)
-    mass = float(fit.model.prior("mh").quantile(0.5))
-
-    def hand(phi: Floats) -> Floats:
-        values = dict(zip(fit.model.names, here.natural(phi).T, strict=True))
-        return from_a_hand(values, mass)
-
-    def both(phi: Floats) -> Floats:
-        return np.concatenate([misfit(phi) / np.sqrt(noise), hand(phi)], axis=1)
-
-    start = here.coordinate(fit.theta[None])
-    steps, settled = 40, 1e-3  # of the least sum of misfit and distance from a hand
-    phi, half = minimise(both, start, low, high, steps, settled)
-    return own + 2 * float(half[0]) - at_fit, float(np.sum(hand(phi) ** 2))
 
 
 def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: bool | None) -> str:

@@ -49,37 +49,36 @@ def row_of(name: str, folder: Path, status: str | None, error: str | None) -> di
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return row | _of_study(folder, status)
+        return row | _of_study(folder)
     limit, recording = summary["critical_stiffness"], summary["recording"]
     return row | {
         "device": recording["device"],
         "user": recording["user"],
         "configuration": recording["configuration"],
-        "safe": _safe(summary),
+        "safe": _safe(summary["recommendation"], limit["safe"]),
         **{name: limit[name] for name in ("q05", "q50", "q95", "unit")},
         "frequency_hz": limit["frequency_hz"]["q50"],
         "verdict": (summary["diagnosis"] or {}).get("verdict"),
     }
 
 
-def _safe(summary: Mapping[str, Any]) -> float | None:
+def _safe(said: Mapping[str, Any], safe: Mapping[str, Any]) -> float | None:
     """The stiffness at 1 % risk; what the measurement asks for where that is lower, or nothing."""
-    said = summary["recommendation"]
     if said["status"] == "untrusted":
         return None
     if said["stiffness"] is not None and said["risk"] is None:
         return float(said["stiffness"])
-    stiffness: float | None = summary["critical_stiffness"]["safe"].get("0.01")
+    stiffness: float | None = safe.get("0.01")
     return stiffness
 
 
-def _of_study(folder: Path, status: str | None) -> dict[str, Any]:
+def _of_study(folder: Path) -> dict[str, Any]:
     try:
         population = json.loads((folder / "population.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     limit = population.get("device_limit") or {}
-    safe = None if status == "untrusted" else (limit.get("safe") or {}).get("0.01")
+    safe = _safe(population["recommendation"], limit.get("safe") or {})
     known = {key: limit.get(key) for key in ("q05", "q50", "q95", "unit")}
     return {"device": population.get("device"), "safe": safe, **known}
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.quantities import estimate, percent, pretty_unit, pure, quantity, rounded_down
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.estimates import decibel, own_limit
-from bayeshaptic.report.numbers.misfit import (
-    misfit_is_faint,
-)
-from bayeshaptic.report.numbers.result import tip_limit
+from bayeshaptic.report.numbers.misfit import misfit_is_faint
+from bayeshaptic.report.numbers.result import is_unexplained, tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.objections import HEADLINE_RISKS, why_none
+from bayeshaptic.report.status import CAUTION, UNTRUSTED, status_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # Below this the two ways to read the limit agree well enough for any use.
 _AGREEMENT_DB = 0.3
 _WORTH_NAMING = 0.001  # probability from which a crossing that binds is named
+_FAINT = "slightly above noise"
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Headline:
     risk : float or None
         The risk that the loop is unstable there; None where the measurement, not the model, sets
         the stiffness.
+    doubts : tuple of str
+        Why it is "caution", in a word or two each.
     """
 
     status: str
@@ -52,6 +55,7 @@ class Headline:
     details: tuple[str, ...]
     stiffness: float | None = None
     risk: float | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def headline(result: Result) -> Headline:
@@ -71,9 +75,8 @@ def headline(result: Result) -> Headline:
     if limit.safe(risk) == math.inf:
         sure = percent(1 - risk)
         unlimited = f"Nothing limits the stiffness: any is stable with a probability of {sure}."
-        return Headline("caution", unlimited, ())
-    diagnosis = result.closed.diagnosis if result.closed else {}
-    return _recommended(analysis, risk, diagnosis, result.closed)
+        return Headline(CAUTION, unlimited, (), doubts=("nothing limits it",))
+    return _recommended(result, risk)
 
 
 def _untrusted(
@@ -105,12 +108,11 @@ def _untrusted(
         )
     if closed is not None and closed.force is not None:
         details.append(in_short(closed))
-    return Headline("untrusted", sentence, tuple(details))
+    return Headline(UNTRUSTED, sentence, tuple(details))
 
 
-def _recommended(
-    analysis: Analysis, risk: float, diagnosis: Any, closed: Closed | None
-) -> Headline:
+def _recommended(result: Result, risk: float) -> Headline:
+    analysis, closed = result.analysis, result.closed
     limit = analysis.limit
     safe = limit.safe(risk)
     assert safe is not None
@@ -130,23 +132,38 @@ def _recommended(
         )
     details = [] if closed is None else [text for text in (in_short(closed),) if text]
     details += _of_the_limit(analysis, stated.value, ends)
-    warnings = [n.text for n in analysis.notices if n.level == "warning"]
-    unexplained = diagnosis.get("verdict") == "unexplained"
-    faint = not diagnosis and misfit_is_faint(analysis)
-    doubts = (warnings, unexplained, faint, cap is not None)
-    if faint:
+    doubts = _doubts(result, cap)
+    if _FAINT in doubts:
         details.append(
             "The residual is slightly above the noise (reduced chi-square "
             f"{pure(analysis.fit.reduced_chi_square)}): something small may be missing from the "
             "model."
         )
-    if unexplained:
+    if is_unexplained(result):
         sentence += " Part of this recording remains unexplained; the interval is widened for it."
+    warnings = warned_of(analysis)
     if warnings:
-        details.append("Beware: " + " ".join(_sentence(text) for text in warnings))
-    status = "caution" if any(doubts) else "safe"
+        details.append("Beware: " + " ".join(sentence_of(text) for text in warnings))
     known = risk if cap is None else None
-    return Headline(status, sentence, tuple(details), stated.value, known)
+    return Headline(status_of(doubts), sentence, tuple(details), stated.value, known, doubts)
+
+
+def _doubts(result: Result, cap: float | None) -> tuple[str, ...]:
+    """What makes a recommendation one to use with caution, each in a word or two."""
+    analysis = result.analysis
+    found = [n.topic for n in analysis.notices if n.level == "warning"]
+    if is_unexplained(result):
+        found.append(UNEXPLAINED)
+    if result.closed is None and misfit_is_faint(analysis):
+        found.append(_FAINT)
+    if cap is not None:
+        found.append("the measured response by itself is lower")
+    return tuple(dict.fromkeys(found))
+
+
+def warned_of(analysis: Analysis) -> tuple[str, ...]:
+    """What an analysis warns of, in sentences."""
+    return tuple(n.text for n in analysis.notices if n.level == "warning")
 
 
 def _of_the_limit(analysis: Analysis, stated: float, ends: tuple[float, float]) -> list[str]:
@@ -200,6 +217,7 @@ def _joined(reasons: tuple[str, ...]) -> str:
     return reasons[0] if len(reasons) == 1 else "; and ".join(reasons)
 
 
-def _sentence(text: str) -> str:
+def sentence_of(text: str) -> str:
+    """`text` with a full stop."""
     text = text.strip()
     return text if text.endswith((".", "!", "?")) else text + "."

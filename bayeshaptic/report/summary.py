@@ -13,7 +13,7 @@ from bayeshaptic.errors import Notice, unique
 from bayeshaptic.faq import entry
 from bayeshaptic.provenance import provenance
 from bayeshaptic.recordings.feedback import has_feedback
-from bayeshaptic.report.headline import headline
+from bayeshaptic.report.headline import Headline, headline
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, finite
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.trust import doubtful_parameters
@@ -68,7 +68,7 @@ def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str
             "least_squares": _least_squares(analysis),
             "posterior": _posterior(result),
             "critical_stiffness": _critical_stiffness(analysis),
-            "recommendation": _recommendation(result),
+            "recommendation": recommendation(headline(result)),
             "hidden": _hidden(analysis),
             "diagnosis": diagnosis,
             "error": {name: _error(given or {}) for name, given in error.items()},
@@ -250,9 +250,8 @@ def _hidden(analysis: Analysis) -> list[dict[str, Any]] | None:
     ]
 
 
-def _recommendation(result: Result) -> dict[str, Any]:
-    """What the sentence at the top of the page says, as numbers."""
-    head = headline(result)
+def recommendation(head: Headline) -> dict[str, Any]:
+    """What the sentence at the top of a page says, as numbers."""
     return {
         "status": head.status,
         "stiffness": head.stiffness,

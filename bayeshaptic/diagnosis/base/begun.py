@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.base.alignment import realigned
 from bayeshaptic.diagnosis.base.asked import base_model
-from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.choose import Choice, choose_model
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.inference.loop_response import fitted_to_the_loop
 from bayeshaptic.models import Model, build_model
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks.sufficiency import refuse_where_told
@@ -20,8 +20,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded
-
-_MOST_ROUNDS = 8  # fits to what the last one makes of the samples
+from bayeshaptic.types import Floats
 
 
 @dataclass(frozen=True)
@@ -48,25 +47,25 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
     clock = Clock(dict(found.seconds))
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
-        fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
+        etfe, fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
         again = realigned(found, fit, model, options, _simpler(choice))
         if again is not None:
             return fitted(again, model, options)
-        seconds = {**found.seconds, **clock.seconds}
-        begun = Begun(
-            **{**vars(found), "seconds": seconds}, measured=found.etfe, fit=fit, choice=choice
-        )
-        for _ in range(_MOST_ROUNDS):
-            etfe = as_of_the_loop(begun.measured, begun.fit)
-            if hardly_differ(etfe, begun.etfe):
-                break
-            begun = refitted(begun, etfe, model, options)
-    return begun
+    parts = {**vars(found), "etfe": etfe, "seconds": clock.seconds}
+    return Begun(**parts, measured=found.etfe, fit=fit, choice=choice)
+
+
+def base_of(begun: Begun, name: str) -> tuple[Etfe, Fit]:
+    """The fit of a base model that was tried, and the response that it makes of the measurement."""
+    if begun.choice is None or name == begun.fit.model.name:
+        return begun.etfe, begun.fit
+    tried = begun.choice.candidates[name]
+    return tried.etfe or begun.etfe, tried.fit
 
 
 def refitted(begun: Begun, etfe: Etfe, model: str | Model, options: Options) -> Begun:
     """With the base model fitted to another estimate of the response."""
-    fit, choice = _fit(etfe, base_model(model, options), begun.device, options)
+    etfe, fit, choice = _fit(etfe, base_model(model, options), begun.device, options, False)
     return replace(begun, etfe=etfe, fit=fit, choice=choice)
 
 
@@ -75,19 +74,29 @@ def _fit(
     model: str | Model,
     device: Device | None,
     options: Options,
-) -> tuple[Fit, Choice | None]:
-    """The fit of the model that was asked for, or of the chosen one."""
+    measured: bool = True,
+) -> tuple[Etfe, Fit, Choice | None]:
+    """The fit of the model that was asked for, or of the chosen one, and what it was fitted to.
+
+    `measured` says whether `etfe` is as it was measured, or what a model made of that.
+    """
     prior, seed = dict(options.prior), options.seed
-    if isinstance(model, Model):
-        return least_squares(model.with_prior(prior), etfe, seed=seed), None
     delay = options.delay_s, options.delay_sd_s
     if model == "auto":
         choice = _lower_where_undecided(
-            choose_model(etfe, device, *delay, prior, options.held, seed)
+            choose_model(etfe, device, *delay, prior, options.held, seed, measured)
         )
-        return choice.fit, choice
-    built = build_model(model, device, *delay, etfe.period_s, prior)
-    return least_squares(built, etfe, seed=seed), None
+        return choice.candidates[choice.fit.model.name].etfe or etfe, choice.fit, choice
+    if isinstance(model, Model):
+        built = model.with_prior(prior)
+    else:
+        built = build_model(model, device, *delay, etfe.period_s, prior)
+
+    def fitting(response: Etfe, start: Floats | None = None) -> Fit:
+        return least_squares(built, response, seed, start)
+
+    fit, etfe = fitted_to_the_loop(fitting, etfe, etfe) if measured else (fitting(etfe), etfe)
+    return etfe, fit, None
 
 
 def _simpler(choice: Choice | None) -> tuple[Fit, ...]:

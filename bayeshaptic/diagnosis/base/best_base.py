@@ -14,14 +14,16 @@ from dataclasses import replace
 import numpy as np
 
 from bayeshaptic.diagnosis.base.alignment import realigned
-from bayeshaptic.diagnosis.base.begun import Begun, fitted, refitted
-from bayeshaptic.diagnosis.base.loop_response import as_of_the_loop, hardly_differ
+from bayeshaptic.diagnosis.base.begun import Begun, base_of, fitted, refitted
 from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
-from bayeshaptic.inference.choose import Choice, ScoredFit, information_criterion
+from bayeshaptic.inference.choose import Choice, ScoredFit
+from bayeshaptic.inference.criterion import information_criterion
 from bayeshaptic.inference.fit import MISFIT, Fit
+from bayeshaptic.inference.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.models import Model
+from bayeshaptic.numerics.spending import RATE, counting, metered
 
 # Differences of BIC: evidence "not worth more than a bare mention", and "very strong" evidence
 # (R. E. Kass and A. E. Raftery, JASA 90, 1995).
@@ -46,17 +48,20 @@ def traced_as_of_the_loop(
         As asked for.
     options : Options
     """
-    begun, traced = traced_from_best_base(begun, options)
+    with metered(options.budget_s * RATE) as meter:
+        begun, traced = traced_from_best_base(begun, options)
     for fit in _on_the_way(traced):
         again = realigned(begun, fit, model, options)
         if again is not None:
             return traced_as_of_the_loop(fitted(again, model, options), model, options)
     for _ in range(_MOST_AGAIN):
         etfe = as_of_the_loop(begun.measured, traced.state.fit)
-        if hardly_differ(etfe, begun.etfe):
+        left_s = options.budget_s - meter.spent / RATE
+        if hardly_differ(etfe, begun.etfe) or left_s <= 0:
             break
-        again = refitted(begun, etfe, model, options)
-        begun, traced = traced_from_best_base(again, options)
+        with counting(meter):
+            again = refitted(begun, etfe, model, options)
+            begun, traced = traced_from_best_base(again, replace(options, budget_s=left_s))
     return begun, traced
 
 
@@ -103,10 +108,10 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
     noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
     best = _best(found, noise, loops.given_up)
     assert begun.choice is not None
-    fit = begun.choice.candidates[best].fit if best in rivals else begun.fit
+    etfe, fit = base_of(begun, best)
     said = _said(best, found, noise, loops.given_up)
     choice = replace(begun.choice, fit=fit, reason=begun.choice.reason + said)
-    return replace(begun, fit=fit, choice=choice), found[best]
+    return replace(begun, etfe=etfe, fit=fit, choice=choice), found[best]
 
 
 def _rivals(begun: Begun) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayeshaptic.diagnosis.base.begun import Begun
+from bayeshaptic.diagnosis.base.begun import Begun, base_of
 from bayeshaptic.diagnosis.loop import Loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.state import State
@@ -37,12 +37,9 @@ class LoopsInTurn:
 
     def begin(self, name: str, budget_s: float) -> Loop:
         """The loop on a base model, which has not gone anywhere yet."""
-        begun = self._begun
-        fit = begun.fit
-        if name != fit.model.name:
-            fit = begun.choice.candidates[name].fit  # type: ignore[union-attr]
+        etfe, fit = base_of(self._begun, name)
         own = next(iter(self.running.values()), None)
-        self.running[name] = Loop(begun.etfe, fit, budget_s, self._options.report, like=own)
+        self.running[name] = Loop(etfe, fit, budget_s, self._options.report, like=own)
         return self.running[name]
 
     @property

@@ -82,6 +82,9 @@ def faults(samples: Samples) -> Faults:
         return Faults(0, samples, np.zeros(samples.recording.samples, dtype=bool), 0.0)
     look = _look(samples, predictor)
     passes = 3  # what lies close behind a gap is seen when the gap is mended
+    sensed = samples.recording.sensed
+    if sensed is not None and sensed.derivatives:
+        passes = 0  # an integral lacks the motion in rows that were lost, and does not jump there
     for _ in range(passes):
         if len(look.gaps) <= look.unexplained:
             break

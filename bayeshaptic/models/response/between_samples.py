@@ -5,7 +5,8 @@ A sampled position holds the images of what moves between the samples, :math:`P(
 and a force that was measured where it acts none of them. Both differ from the loop's response by a
 smooth function of the frequency, a few thousandths at a tenth of the sampling rate and a fifth at a
 third of it, which a fitted model knows far better than that; what it makes of the command is added
-to the position.
+to the position. A table of a continuous structure, put under a hold, lacks them as a measured force
+does.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.frf_kinds import of_a_hold
 from bayeshaptic.types import Complexes, Floats
 
 _POINTS = 400  # of the smooth function
@@ -55,7 +57,7 @@ def images(recording: Recording, system: LinearSystem, theta: Floats) -> Complex
     s: Complexes = np.multiply(1j, theta / period_s)
     if sensed.measured_force:
         own_delay = system.delay_s[0] - sensed.later * period_s
-        seen = system.continuous_response(s)[0] * np.exp(-s * own_delay)
+        seen = _between(system, s, own_delay)
         seen = seen * s**sensed.derivatives / sensed.command(theta)
     else:
         power = np.zeros((sensed.derivatives + 1, 1))
@@ -63,3 +65,23 @@ def images(recording: Recording, system: LinearSystem, theta: Floats) -> Complex
         seen = system.with_filter(power, np.ones((1, 1))).sampled_response(frequency_hz, period_s)
         seen = seen[0]
     return np.asarray(loop - seen * integral)
+
+
+def hidden_by_structure(system: LinearSystem, frequency_hz: Floats, period_s: float) -> Complexes:
+    """The loop's response less that of its continuous structure under a hold; shape (L,).
+
+    Parameters
+    ----------
+    system : LinearSystem
+        A batch of one.
+    frequency_hz : ndarray, shape (L,)
+    period_s : float
+    """
+    s: Complexes = np.multiply(2j * np.pi, frequency_hz)
+    held = _between(system, s, system.delay_s[0]) * of_a_hold(frequency_hz, period_s)
+    return np.asarray(system.sampled_response(frequency_hz, period_s)[0] - held)
+
+
+def _between(system: LinearSystem, s: Complexes, delay_s: float) -> Complexes:
+    """The motion at every instant over a force that changes at any, with a delay; shape (L,)."""
+    return np.asarray(system.continuous_response(s)[0] * np.exp(-s * delay_s))

@@ -9,6 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.spectra import RandomSpectra
 
 # A force that fell by more within an octave was cut off there: 13 dB is more than what a
@@ -16,6 +17,9 @@ from bayeshaptic.recordings.response.spectra import RandomSpectra
 CUT_OFF = 20.0
 # Power, relative to the strongest or the mean, below which there is nothing but rounding.
 NO_POWER = 1e-10
+# Of the sampling rate: there what lies between the samples of a velocity is a quarter of the loop's
+# response, and at 0.44 most of it. Fits to what a model makes of that are fits to itself.
+_OF_A_VELOCITY = 0.3
 
 
 def choose_band(spectra: RandomSpectra, name: str) -> tuple[float, float]:
@@ -110,6 +114,13 @@ def responds_until(excess: NDArray[Any], reach: int = 4) -> int | None:
     count = np.convolve(np.ones_like(excess), kernel, mode="same")
     found = np.flatnonzero(total / np.sqrt(count) > 4)
     return int(found[-1]) if len(found) else None
+
+
+def tells_until(recording: Recording) -> float:
+    """The frequency up to which a recording, more than a model, tells the loop's response, Hz."""
+    sensed = recording.sensed
+    of_a_velocity = sensed is not None and sensed.derivatives and not sensed.measured_force
+    return (_OF_A_VELOCITY if of_a_velocity else 0.5) / recording.period_s
 
 
 def refuse_band(band_hz: tuple[float, float] | None, period_s: float) -> None:

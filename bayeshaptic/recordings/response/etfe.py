@@ -90,6 +90,11 @@ class Etfe(Shown):
         return self.recording is not None and self.recording.reference is not None
 
     @property
+    def of_a_structure(self) -> bool:
+        """Whether it is a table of a continuous structure, which no loop sampled."""
+        return isinstance(self.spectra, TableSpectra) and self.spectra.own_variance is not None
+
+    @property
     def direct(self) -> bool:
         """Whether it may be biased by feedback, and is fitted so that this does not matter."""
         return isinstance(self.spectra, DirectSpectra)
@@ -124,6 +129,14 @@ class Etfe(Shown):
         assert isinstance(self.spectra, TableSpectra)
         value = self.value * np.exp(-2j * np.pi * self.frequency_hz * delay_s)
         return replace(self, value=value, spectra=replace(self.spectra, value=value))
+
+    def beside_images(self, images: NDArray[Any]) -> Etfe:
+        """A structure's table with the images that a model knows, shape (L,)."""
+        spectra = self.spectra
+        assert isinstance(spectra, TableSpectra) and spectra.own_variance is not None
+        value, variance = self.value + images, spectra.own_variance
+        known = replace(spectra, value=value, variance=variance)
+        return replace(self, value=value, variance=variance, spectra=known)
 
     @property
     def gain_db(self) -> NDArray[Any]:

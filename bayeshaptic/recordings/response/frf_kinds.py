@@ -19,15 +19,19 @@ STRUCTURAL = {"receptance_db": 0, "mobility_db": 1, "accelerance_db": 2}
 PER_TIME = {0: ("",), 1: ("/s",), 2: ("/s^2", "/s2", "/s/s")}
 
 
-def as_sampled(
+def of_a_hold(frequency_hz: Floats, period_s: float) -> Complexes:
+    r"""What holding a command for a period does to it: :math:`(1 - e^{-sT}) / (sT)`, shape (L,)."""
+    s = 2j * np.pi * frequency_hz * period_s
+    return np.asarray(-np.expm1(-s) / s)
+
+
+def as_held(
     value: Complexes, variance: Floats, frequency_hz: Floats, period_s: float, derivatives: int
 ) -> tuple[Complexes, Floats]:
-    r"""The response of a loop that holds its command for a period, from that of a structure.
+    """The receptance under a command that is held for a period, from a structure's response.
 
-    .. math:: G(j\omega) \frac{1 - e^{-j \omega T}}{j \omega T}
-
-    without the aliases, which a table does not say.  Of a response that falls as :math:`1/\omega^2`
-    the nearest is :math:`(f / (f_s - f))^3` of it: that much is added to the standard deviation.
+    Without the images of what lies above half the sampling rate, which a table does not show: a
+    model that is fitted to it knows them (`bayeshaptic.models.response.between_samples`).
 
     Parameters
     ----------
@@ -42,18 +46,27 @@ def as_sampled(
     -------
     value, variance
     """
-    s = 2j * np.pi * frequency_hz
-    turn = -np.expm1(-s * period_s) / (s * period_s) / s**derivatives
+    turn = of_a_hold(frequency_hz, period_s) / (2j * np.pi * frequency_hz) ** derivatives
+    return value * turn, variance * np.abs(turn) ** 2
+
+
+def with_images_allowed_for(
+    value: Complexes, variance: Floats, frequency_hz: Floats, period_s: float
+) -> Floats:
+    r"""The variance where no model says what the images are.
+
+    Of a response that falls as :math:`1/\omega^2` the nearest is :math:`(f / (f_s - f))^3` of it:
+    that much is added to the standard deviation.
+    """
     part = frequency_hz * period_s
-    aliases = (part / (1 - part)) ** 3
-    held = value * turn
-    return held, variance * np.abs(turn) ** 2 + np.abs(held * aliases) ** 2
+    return np.asarray(variance + np.abs(value * (part / (1 - part)) ** 3) ** 2)
 
 
 def told(kind: str) -> Notice:
     """What was done to a structure's response."""
     text = (
         f"The table is the {kind.removesuffix('_db')} of a continuous structure: it was turned "
-        "into the response of a loop that holds its command for a period."
+        "into the response of a loop that holds its command for a period, with what a fitted model "
+        "says of the frequencies above half the sampling rate."
     )
     return Notice("note", NO_LOOP, text)

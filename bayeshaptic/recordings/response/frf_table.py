@@ -15,7 +15,13 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import FRF_KINDS, FRF_ROLES, Column, parse_columns, pick
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.frf_kinds import PER_TIME, STRUCTURAL, as_sampled, told
+from bayeshaptic.recordings.response.frf_kinds import (
+    PER_TIME,
+    STRUCTURAL,
+    as_held,
+    told,
+    with_images_allowed_for,
+)
 from bayeshaptic.recordings.response.spectra import TableSpectra
 from bayeshaptic.recordings.units import base_unit, choose_units
 from bayeshaptic.types import Complexes
@@ -115,10 +121,12 @@ def frf_from_arrays(
     phase = np.exp(1j * np.radians(columns["phase_deg"]))
     value: Complexes = np.asarray(10 ** (columns[of] / 20) * phase)
     variance, averages = _variance(path, columns, value)
+    own = None
     if of in STRUCTURAL:
-        value, variance = as_sampled(value, variance, frequency, period_s, derivatives)
-        notices = (*notices, told(of))
-    spectra = TableSpectra(frequency, value * factor, variance * factor**2, averages)
+        value, own = as_held(value, variance, frequency, period_s, derivatives)
+        variance = with_images_allowed_for(value, own, frequency, period_s)
+        own, notices = own * factor**2, (*notices, told(of))
+    spectra = TableSpectra(frequency, value * factor, variance * factor**2, averages, own)
     return Etfe(
         frequency_hz=frequency,
         value=spectra.value,

@@ -277,12 +277,16 @@ class TableSpectra:
         E|value - truth|^2.
     averages : ndarray, shape (L,)
         Number of averages behind the variance; infinite where it is known exactly.
+    own_variance : ndarray, shape (L,), or None
+        Where the table is of a structure without a loop, and shows nothing of what lies between the
+        samples: the variance that it has beside a model that knows of that.
     """
 
     frequency_hz: NDArray[Any] = field(repr=False)
     value: NDArray[Any] = field(repr=False)
     variance: NDArray[Any] = field(repr=False)
     averages: NDArray[Any] = field(repr=False)
+    own_variance: NDArray[Any] | None = field(default=None, repr=False)
 
     @property
     def lines(self) -> int:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 from bayeshaptic.quantities import percent, quantity, rounded_down
-from bayeshaptic.report.headline import Headline, headline
+from bayeshaptic.report.headline import Headline, headline, sentence_of, warned_of
 from bayeshaptic.report.numbers.cases import is_free
-from bayeshaptic.report.study.words import missing
+from bayeshaptic.report.numbers.result import is_unexplained
+from bayeshaptic.report.status import CAUTION, UNTRUSTED, status_of
+from bayeshaptic.report.study.words import listed, missing
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Binding
     from bayeshaptic.study.analysed import Analysed
     from bayeshaptic.study.analysis import StudyAnalysis
+
+_Parts: TypeAlias = "Sequence[tuple[Analysed, Headline]]"  # recordings, and what their pages say
 
 RISKS = (0.01, 0.05)
 HOLDERS = {
@@ -30,61 +34,107 @@ def study_headline(study: StudyAnalysis) -> Headline:
     """The stiffness to render whoever holds the device, or why there is none."""
     limit = study.limit
     if limit is None:
-        return Headline("untrusted", "There is no limit: no recording could be used.", ())
-    doubtful = untrusted(study.recordings)
+        return Headline(UNTRUSTED, "There is no limit: no recording could be used.", ())
+    parts = [(one, headline(one.result)) for one in study.recordings if one.result is not None]
+    doubtful = [one.name for one, head in parts if head.status == UNTRUSTED]
     if doubtful:
-        names = ", ".join(one.name for one in doubtful)
         sentence = (
             f"Do not ship a stiffness from this study: {len(doubtful)} of its "
             f"{len(study.recordings)} recordings "
-            f"{'supports' if len(doubtful) == 1 else 'support'} no recommendation ({names})."
+            f"{'supports' if len(doubtful) == 1 else 'support'} no recommendation "
+            f"({', '.join(doubtful)})."
         )
         why = "Their own pages say why. What follows is for comparison only."
-        return Headline("untrusted", sentence, (why,))
+        return Headline(UNTRUSTED, sentence, (why,))
     risk = next((r for r in RISKS if limit.safe(r) is not None), None)
     if risk is None:
         few = "the draws are too few to state a risk of 5 %"
-        return Headline("untrusted", f"Do not ship a stiffness from this study: {few}.", ())
+        return Headline(UNTRUSTED, f"Do not ship a stiffness from this study: {few}.", ())
     safe = limit.safe(risk)
     assert safe is not None
     if not math.isfinite(safe) or safe <= 0:
         extreme = "nothing limits the stiffness" if safe > 0 else "no stiffness is stable"
-        return Headline("caution", f"Over all cases {extreme}.", ())
-    return _recommended(study, risk, safe)
+        return Headline(CAUTION, f"Over all cases {extreme}.", (), doubts=(extreme,))
+    return _recommended(study, parts, risk, safe)
 
 
-def _recommended(study: StudyAnalysis, risk: float, safe: float) -> Headline:
+def _recommended(study: StudyAnalysis, parts: _Parts, risk: float, safe: float) -> Headline:
     assert study.limit is not None
+    unit = study.limit.unit
     low, high = (float(end) for end in study.limit.quantile([0.05, 0.95]))
-    stated = rounded_down(safe, study.limit.unit, low, high)
-    sentence = (
-        f"Render walls of at most {stated.with_level}: the risk that the loop is unstable there is "
-        f"{percent(risk)}, {_scope(study)}."
-    )
+    lower = _lower_witness(parts, safe)
+    stated = rounded_down(safe if lower is None else lower[1], unit, low, high)
+    if lower is None:
+        sentence = (
+            f"Render walls of at most {stated.with_level}: the risk that the loop is unstable "
+            f"there is {percent(risk)}, {_scope(study)}."
+        )
+    else:
+        sentence = (
+            f"Stay below {stated.with_level}: the measured response of {lower[0]} itself puts the "
+            f"limit lower than the models do ({quantity(safe, unit)} at {percent(risk)} risk), and "
+            "the two must agree before the models' figure is used."
+        )
+    sentence += _unexplained(parts)
     details = [what_binds(study)]
     lever = study.device.lever_m
-    if lever and study.limit.unit == "N m/rad":
+    if lever and unit == "N m/rad":
         tip = rounded_down(stated.value, "N/m", low, high, lever)
         details.append(
             f"At the tip, {quantity(lever, 'm')} from the axis, that is {tip.with_level}."
         )
     lacking = missing(study)
-    warned = [n.text for n in study.notices if n.level == "warning"]
-    if warned:
-        details.append("Beware: " + " ".join(sentence_of(text) for text in warned))
+    warned = [n for n in study.notices if n.level == "warning"]
+    beware = [n.text for n in warned] + _cautions(parts)
+    if beware:
+        details.append("Beware: " + " ".join(sentence_of(text) for text in beware))
     if lacking:
         details.append("What this study does not say: " + " ".join(lacking))
-    status = "caution" if warned or study.failed else "safe"
-    return Headline(status, sentence, tuple(details), stated.value, risk)
+    doubts = [n.topic for n in warned] + ["recordings"] * bool(study.failed)
+    doubts += [doubt for _, head in parts for doubt in head.doubts]
+    status = status_of(doubts, (head.status for _, head in parts))
+    known = risk if lower is None else None
+    told = tuple(dict.fromkeys(doubts))
+    return Headline(status, sentence, tuple(details), stated.value, known, told)
 
 
-def untrusted(recordings: Iterable[Analysed]) -> tuple[Analysed, ...]:
-    """The recordings whose own reports recommend no stiffness."""
-    return tuple(
-        one
-        for one in recordings
-        if one.result is not None and headline(one.result).status == "untrusted"
+def _lower_witness(parts: _Parts, safe: float) -> tuple[str, float] | None:
+    """The recording whose measured response puts the limit lowest, below what the models say."""
+    found = [
+        (one.name, head.stiffness)
+        for one, head in parts
+        if head.stiffness is not None and head.risk is None and head.stiffness < safe
+    ]
+    return min(found, key=lambda pair: pair[1], default=None)
+
+
+def _unexplained(parts: _Parts) -> str:
+    """What the large sentence says of recordings that are explained in part."""
+    names = [one.name for one, _ in parts if one.result and is_unexplained(one.result)]
+    if not names:
+        return ""
+    if len(parts) == 1:
+        return " Part of its recording remains unexplained; the interval is widened for it."
+    return (
+        f" Of {len(names)} of its {len(parts)} recordings ({listed(names)}) a part remains "
+        "unexplained; their intervals are widened for it."
     )
+
+
+def _cautions(parts: _Parts) -> list[str]:
+    """What the recordings' own pages warn of: in full of one, in a word or two each of several."""
+    cautious = [(one, head) for one, head in parts if head.status == CAUTION]
+    if not cautious:
+        return []
+    if len(cautious) == 1:
+        only, head = cautious[0]
+        assert only.analysis is not None
+        texts = warned_of(only.analysis)
+        return list(texts or (f"its page says caution ({', '.join(head.doubts)})",))
+    named = listed([f"{one.name} ({', '.join(head.doubts)})" for one, head in cautious])
+    return [
+        f"{len(cautious)} recordings are to be used with caution, as their own pages say: {named}"
+    ]
 
 
 def _scope(study: StudyAnalysis) -> str:
@@ -126,8 +176,3 @@ def _holder(found: Binding) -> str:
     """Who holds the device in a case, in words."""
     group = FREE if is_free(found.case, found.group) else found.group
     return HOLDERS.get(group, group)
-
-
-def sentence_of(text: str) -> str:
-    text = text.strip()
-    return text if text.endswith((".", "!", "?")) else text + "."

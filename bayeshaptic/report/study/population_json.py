@@ -10,7 +10,8 @@ import numpy as np
 
 from bayeshaptic.inference.population.reweighting import ALONE
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS
-from bayeshaptic.report.summary import plain
+from bayeshaptic.report.study.headline import study_headline
+from bayeshaptic.report.summary import plain, recommendation
 from bayeshaptic.study.recorded_cases import place_of
 from bayeshaptic.types import Floats
 
@@ -42,6 +43,7 @@ def population_summary(study: StudyAnalysis) -> dict[str, Any]:
         {
             "device": study.device.name,
             "recordings": sum(one.error is None for one in study.recordings),
+            "recommendation": recommendation(study_headline(study)),
             "users": _users(study),
             "population": None if population is None else _population(population),
             "correlation": None if population is None else population.correlation.mean(axis=0),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.band import responds_until
+from bayeshaptic.recordings.response.band import responds_until, tells_until
 from bayeshaptic.recordings.response.local_polynomial import (
     LEAKAGE_TERMS,
     default_minimum_lines,
@@ -242,6 +242,9 @@ def _responding(spectra: PeriodicSpectra, recording: Recording) -> PeriodicSpect
     until = moves_until(recording)
     if last is not None and until is not None:
         last = min(last, int(np.searchsorted(spectra.frequency_hz, until)))
+    if last is not None:
+        inside = spectra.frequency_hz <= tells_until(recording) * (1 + 1e-9)
+        last = min(last, int(np.count_nonzero(inside)) - 1)
     if last is None or last + 1 < FEWEST_LINES:
         raise InputError(
             f"{recording.name}: the position does not follow the periodic force; check which "

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.band import NO_POWER, choose_band
+from bayeshaptic.recordings.response.band import NO_POWER, choose_band, tells_until
 from bayeshaptic.recordings.response.estimators.direct import DirectSpectra
 from bayeshaptic.recordings.response.estimators.instrument import STRONG, InstrumentSpectra
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
@@ -136,6 +136,10 @@ def _in_chosen_band(recording: Recording, minimum: int) -> tuple[RandomSpectra, 
         high = until
         why = f"the sweep moves the device by {FEWEST_COUNTS} counts of its encoder or more"
         drives = f"the force moves the device by {FEWEST_COUNTS} counts of its encoder from"
+    until = tells_until(seen)
+    if low < until < high:
+        high = until
+        why += ", and what is between the samples of a velocity does not hide the loop"
     text = f"Band {low:.3g} to {high:.4g} Hz, chosen where {why}."
     return _spectra(recording, (low, high), minimum, drives), Notice("note", "band", text)
 

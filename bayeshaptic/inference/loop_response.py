@@ -1,0 +1,98 @@
+"""The response of the loop, where something else than a command and a position was sensed.
+
+What lies between the samples depends on the model, and so each model is fitted to what it makes of
+the measurement itself: until then the right one misfits, and a richer one stands in for what is
+missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.models.response.between_samples import hidden_by_structure, with_images
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.types import Floats
+
+_SAME = 0.1  # the chi-square that is no difference
+_MOST_ROUNDS = 8  # fits to what the last one makes of the samples
+_AS_DEEP = 1.01  # of the reduced chi-square: valleys no deeper than that are one
+
+
+class Fitting(Protocol):
+    """How a model is fitted: from many starts, or from the one given."""
+
+    def __call__(self, etfe: Etfe, start: Floats | None = None, /) -> Fit: ...
+
+
+def depends_on_fit(etfe: Etfe) -> bool:
+    """Whether the response of the loop is known beside a model only."""
+    recording = etfe.recording
+    return etfe.of_a_structure if recording is None else recording.sensed is not None
+
+
+def as_of_the_loop(etfe: Etfe, fit: Fit) -> Etfe:
+    """The response as of a position sampled in the loop, whatever was sensed in its place.
+
+    Parameters
+    ----------
+    etfe : Etfe
+        As it was measured; back as it is where it is that of a position beside a command.
+    fit : Fit
+        Of it, or of what an earlier fit made of it.
+    """
+    if not depends_on_fit(etfe):
+        return etfe
+    system = fit.model.system(fit.theta)
+    if etfe.recording is None:
+        return etfe.beside_images(hidden_by_structure(system, etfe.frequency_hz, etfe.period_s))
+    recording = with_images(etfe.recording, system)
+    return replace(estimate_etfe(recording, etfe.band_hz), notices=etfe.notices)
+
+
+def hardly_differ(etfe: Etfe, other: Etfe) -> bool:
+    """Whether two estimates from one measurement are the same, beside their errors."""
+    apart = np.abs(etfe.value - other.value) ** 2 / etfe.variance
+    return bool(np.sum(apart) < _SAME)
+
+
+def fitted_to_the_loop(fitting: Fitting, measured: Etfe, first: Etfe) -> tuple[Fit, Etfe]:
+    """A model fitted to the response that it makes of the measurement.
+
+    Parameters
+    ----------
+    fitting : callable
+        Fits the model to a response.
+    measured : Etfe
+    first : Etfe
+        What to begin with: `measured`, or what another model made of that.
+
+    Returns
+    -------
+    fit : Fit
+    etfe : Etfe
+        What it was fitted to; `measured` itself where that depends on no model.
+    """
+    fit, etfe = fitting(first), first
+    if not depends_on_fit(measured):
+        return fit, etfe
+    fit, etfe = _settled(fitting, measured, fit, etfe)
+    if fit.misfits:  # what was missing may have bent the first fit into another valley
+        other = fitting(etfe)
+        if other.reduced_chi_square < fit.reduced_chi_square * _AS_DEEP:
+            fit, etfe = _settled(fitting, measured, other, etfe)
+    return fit, etfe
+
+
+def _settled(fitting: Fitting, measured: Etfe, fit: Fit, etfe: Etfe) -> tuple[Fit, Etfe]:
+    """Fits from where the last one ended, until what they make of the measurement stays."""
+    for _ in range(_MOST_ROUNDS):
+        again = as_of_the_loop(measured, fit)
+        if hardly_differ(again, etfe):
+            break
+        fit, etfe = fitting(again, fit.theta), again
+    return fit, etfe
