@@ -31,8 +31,8 @@ from bayeshaptic.types import Floats
 
 PLACES = (0.0, 0.2, 0.5, 0.7, 1.0)
 KEYS = (
-    "device", "recordings", "users", "population", "correlation", "new_person", "configurations",
-    "device_limit", "sampling", "hidden_effects",
+    "device", "recordings", "recommendation", "users", "population", "correlation", "new_person",
+    "configurations", "device_limit", "sampling", "hidden_effects",
 )  # fmt: skip
 
 

@@ -41,7 +41,7 @@ SINGLE: dict[str, tuple[str, set[str]]] = {
     "drag": ("nonlinear", {"drag"}),
     "actuator_saturation": ("nonlinear", {"actuator_saturation"}),
     "gain_drift": ("time-varying", {"gain_drift"}),
-    "force_ripple": ("nonlinear", {UNKNOWN}),
+    "force_ripple": ("nonlinear", {"cogging"}),
     "position_clipping": ("measurement", {"position_clipping"}),
     # Outside the bench's own effects as well: see foreign.py. UNKNOWN: there is no law for it.
     "tanh_saturation": ("nonlinear", {"soft_saturation"}),

@@ -31,6 +31,7 @@ from bayeshaptic.types import Floats, Tick
 
 _SIZE = 3  # parameters: the period, and both parts of the ripple
 _MOST = 0.9  # of the mean gain, or of the limit, that a ripple may be
+_LAW_SD = 0.03  # relative, of a ripple's size: no motor's is one sine
 
 
 def ripple_trials(
@@ -84,7 +85,7 @@ def _try(state: State, recording: Recording, wave: Wave, ripple: Ripple) -> Tria
                 2 * np.pi / ripple.rate, float("nan"), recording.position_unit
             ),
         },
-        limit_log_sd=ripple.sd / (1 + ripple.size) if wave.of_the_gain else 0.0,
+        limit_log_sd=_log_sd(ripple) if wave.of_the_gain else 0.0,
         limit_log_fall=lowered,
     )
     changed = State(etfe, fit, (*state.accepted, accepted))
@@ -101,6 +102,11 @@ def _given(state: State, recording: Recording, wave: Wave, ripple: Ripple) -> Fl
     if wave.of_the_gain:
         return np.asarray(recording.force * (1 + at) / (1 + ripple.size))
     return np.asarray(recording.force + at)
+
+
+def _log_sd(ripple: Ripple) -> float:
+    """Of log K_CR, as the largest gain is known."""
+    return float(np.hypot(ripple.sd, _LAW_SD * ripple.size)) / (1 + ripple.size)
 
 
 def _lowered(state: State, wave: Wave, ripple: Ripple) -> float | None:
