@@ -342,6 +342,14 @@ def test_a_limit_that_only_the_prior_ends_below_is_no_recommendation(
     assert any("dampers" in step.text for step in next_steps(found, analysis)) == refused
 
 
+def test_one_mass_that_does_not_explain_a_loop_is_taken_back() -> None:
+    """It said to record again, of a loop that is read without that."""
+    notice = Notice("warning", "feedback", "The force was computed from the motion (it was).")
+    analysis = fake_analysis(notices=(notice,))
+    _, other = next_steps(headline(analysis), analysis, {"options": {"model": "rigid"}})
+    assert "one mass" in other.text and "--model" not in other.command
+
+
 def test_the_next_command_reads_the_file_as_this_one_did() -> None:
     """It said no columns and no period, and was refused."""
     analysis = fake_analysis(converged=False)

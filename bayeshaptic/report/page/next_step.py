@@ -40,6 +40,10 @@ class Step:
 
 # What is said of how the file is read, and of the device: the next report needs it, too.
 _KEPT = ("columns", "period_s", "delay_s", "encoder_resolution", "held")
+_NOT_ONE_MASS = (
+    "Or ask whether it is another device: one mass, as was declared, does not explain this motion. "
+    "Without --model rigid those of two masses, free and held, are tried. This recording will do:"
+)
 
 
 def next_steps(
@@ -61,6 +65,8 @@ def next_steps(
     analysis, command = result.analysis, f"bayeshaptic report {_source(result)}{device}"
     new = f"bayeshaptic report NEW.csv{device}"
     if has_feedback(analysis.notices):
+        if options.get("model") == "rigid":
+            return _in_open_loop(new), Step(_NOT_ONE_MASS, command)
         through = f"bayeshaptic report {_source(result)}{_device(result)}"
         return _after_feedback(result, command, new, through + _said(options, _KEPT[1:]))
     doubted = any(in_doubt(what, analysis.notices) for what in ("position", "time"))
