@@ -43,4 +43,4 @@ def _declared(axes: Axes, hidden: Hidden) -> None:
 
 
 def _label(effect: HiddenEffect) -> str:
-    return f"{percent(effect.probability)}, {size(effect)}"
+    return f"{percent(effect.probability)} likely, {size(effect)}"

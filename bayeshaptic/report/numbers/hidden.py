@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bayeshaptic.quantities import estimate, quantity
+from bayeshaptic.quantities import estimate, percent, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -27,7 +27,10 @@ def in_short(analysis: Analysis) -> str:
         text = f"allowed for; if the model were exact, the limit would be {declared}"
     if first is None or reach(first) < FEW:
         return text
-    return f"{text}. What counts most: {first.title}, {size(first)} ({moves(first)})"
+    return (
+        f"{text}. What counts most: {first.title}, {percent(first.probability)} likely "
+        f"({first.what} {size(first)}: {moves(first)})"
+    )
 
 
 def interval_of(limit: CriticalStiffness) -> str:
