@@ -22,7 +22,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
-from bayeshaptic.recordings.signals.rounding import hidden_rounding, repeated_rounding
+from bayeshaptic.recordings.signals.rounding import hidden_rounding
 
 MEASURED = Path(
     os.environ.get(
@@ -319,18 +319,6 @@ def test_transient_periods_are_dropped_and_said():
 def test_two_periods_carry_a_warning():
     etfe = estimate_etfe(periodic_recording(Device(LHIFAM_FREE), 1.0, 5e-7, 17, 2))
     assert "warning" in {notice.level for notice in etfe.notices}
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.05, 0.15, 0.3, 0.6])
-def test_repeated_rounding(noise):
-    """Against rounding simulated: the mean over periods keeps what repeats."""
-    rng = np.random.default_rng(18)
-    place, periods = rng.uniform(0, 50, 4000), 200
-    rounded = np.round(place + noise * rng.standard_normal((periods, 4000)))
-    scatter = np.mean(np.var(rounded, axis=0, ddof=1))
-    left = np.mean((rounded.mean(axis=0) - place) ** 2) - scatter / periods
-    # Standard error of the mean of 4000 squares near 1/12.
-    assert repeated_rounding(float(scatter)) == pytest.approx(left, abs=4 * 0.0745 / np.sqrt(4000))
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.15])

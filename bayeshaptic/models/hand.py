@@ -18,7 +18,6 @@ KILOGRAMS = 0.3  # middle of what a hand, or a finger, brings along
 _MASS_SD = 2.0  # of logarithms, as all that follow
 _ARM, _ARM_SD, _ARM_RATIO, _ARM_RATIO_SD = 2 * np.pi * 3.0, 0.8, 0.7, 1.1
 _GRIP, _GRIP_SD, _GRIP_RATIO, _GRIP_RATIO_SD = 2 * np.pi * 25.0, 0.9, 0.1, 1.5
-SIZE = 5  # numbers that make a hand
 
 
 def hand_priors(mass: float) -> dict[str, Prior]:

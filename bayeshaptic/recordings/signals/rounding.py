@@ -62,34 +62,17 @@ def _covariance(apart: Floats, noise: float) -> Floats:
     return np.asarray(np.sum(np.exp(-squared * (apart + 2 * noise**2)) / squared, axis=0))
 
 
-def repeated_rounding(scatter: float) -> float:
-    r"""Variance of the part of the rounding to whole counts that is the same in each period.
+def _repeated() -> tuple[Floats, Floats]:
+    r"""Noise before rounding, and the variance of the part of the error that repeats, in counts.
 
-    Noise of standard deviation :math:`\sigma` before rounding smooths the sawtooth of the rounding
-    error, whose mean at a given position keeps the variance
+    Noise of standard deviation :math:`\sigma` smooths the sawtooth of the rounding error, whose mean
+    at a given position keeps the variance
 
     .. math:: r(\sigma) = \sum_k e^{-(2 \pi k \sigma)^2} / (2 \pi^2 k^2)
 
-    and repeats; the scatter between periods is :math:`\sigma^2 + 1/12 - r`. Without noise all of it
-    repeats, 1/12; with half a count of noise nearly nothing (non-subtractive dither, B. Widrow and
-    I. Kollar, "Quantization Noise", Cambridge, 2008).
-
-    Parameters
-    ----------
-    scatter : float
-        Variance between periods, square counts.
-
-    Returns
-    -------
-    float
-        r, square counts.
+    and repeats.  Without noise all of it does, 1/12; with half a count of noise nearly nothing
+    (non-subtractive dither; Widrow and Kollar).
     """
-    sigma, repeated = _repeated()
-    return float(np.interp(scatter, _scatter(), repeated))
-
-
-def _repeated() -> tuple[Floats, Floats]:
-    """Noise before rounding, and r of it."""
     sigma = np.linspace(0, 1, 201)
     repeated = _covariance(2 * sigma**2, 0.0)
     repeated[0] = 1 / 12
@@ -97,6 +80,6 @@ def _repeated() -> tuple[Floats, Floats]:
 
 
 def _scatter() -> Floats:
-    """Between periods, of the same noise."""
+    """Variance between periods of the same noise: sigma^2 + 1/12 - r."""
     sigma, repeated = _repeated()
     return np.asarray(sigma**2 + 1 / 12 - repeated)
