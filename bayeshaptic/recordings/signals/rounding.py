@@ -65,8 +65,8 @@ def _covariance(apart: Floats, noise: float) -> Floats:
 def _repeated() -> tuple[Floats, Floats]:
     r"""Noise before rounding, and the variance of the part of the error that repeats, in counts.
 
-    Noise of standard deviation :math:`\sigma` smooths the sawtooth of the rounding error, whose mean
-    at a given position keeps the variance
+    Noise of standard deviation :math:`\sigma` smooths the sawtooth of the rounding error, whose
+    mean at a given position keeps the variance
 
     .. math:: r(\sigma) = \sum_k e^{-(2 \pi k \sigma)^2} / (2 \pi^2 k^2)
 
