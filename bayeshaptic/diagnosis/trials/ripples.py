@@ -21,6 +21,7 @@ from bayeshaptic.diagnosis.state import (
     describe_gain,
     log_likelihoods,
 )
+from bayeshaptic.effects.linear.centring_stiffness import CentringStiffness
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.recording import Recording
@@ -30,7 +31,8 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Tick
 
 _SIZE = 3  # parameters: the period, and both parts of the ripple
-_MOST = 0.9  # of the mean gain, or of the limit, that a ripple may be
+_MOST = 0.9  # of the mean gain that a ripple may be
+_FARTHEST = 2.3  # log stiffness: a factor of ten
 _LAW_SD = 0.03  # relative, of a ripple's size: no motor's is one sine
 
 
@@ -62,8 +64,7 @@ def ripple_trials(
 
 
 def _try(state: State, recording: Recording, wave: Wave, ripple: Ripple) -> Trial | None:
-    lowered = _lowered(state, wave, ripple)
-    if lowered is None:
+    if wave.of_the_gain and ripple.size > _MOST:
         return None
     given = _given(state, recording, wave, ripple)
     etfe = estimate_etfe(replace(recording, force=given), state.etfe.band_hz)
@@ -86,7 +87,7 @@ def _try(state: State, recording: Recording, wave: Wave, ripple: Ripple) -> Tria
             ),
         },
         limit_log_sd=_log_sd(ripple) if wave.of_the_gain else 0.0,
-        limit_log_fall=lowered,
+        limit_log_fall=0.0 if wave.of_the_gain else _lowered(State(etfe, fit), ripple),
     )
     changed = State(etfe, fit, (*state.accepted, accepted))
     return Trial(accepted, changed, float(gains[0]), float(gains[1]), _SIZE)
@@ -109,10 +110,14 @@ def _log_sd(ripple: Ripple) -> float:
     return float(np.hypot(ripple.sd, _LAW_SD * ripple.size)) / (1 + ripple.size)
 
 
-def _lowered(state: State, wave: Wave, ripple: Ripple) -> float | None:
-    """How much log K_CR is lower where cogging is stiffest; None of what is no ripple any more."""
-    if wave.of_the_gain:
-        return 0.0 if ripple.size < _MOST else None
-    limit = float(critical_stiffness(state.model, state.fit.theta).value)
-    stiffness = ripple.size * ripple.rate
-    return -float(np.log1p(-stiffness / limit)) if stiffness < _MOST * limit else None
+def _lowered(state: State, ripple: Ripple) -> float:
+    """How much log K_CR is lower where cogging is stiffest: a spring to the frame."""
+    model, values = state.model, dict(zip(state.model.names, state.fit.theta, strict=True))
+    (spring,) = CentringStiffness.candidates(model, state.etfe)
+    (parameter,) = spring.parameters
+    stiffer = model.with_effect(spring)
+    values[parameter.name] = ripple.size * ripple.rate
+    theta = np.array([values[name] for name in stiffer.names])
+    limits = (critical_stiffness(model, state.fit.theta), critical_stiffness(stiffer, theta))
+    here, there = (max(float(limit.value), 1e-300) for limit in limits)
+    return float(np.clip(np.log(here / there), 0.0, _FARTHEST))
