@@ -62,12 +62,14 @@ def share_by_a_law(recording: Recording) -> float:
     recording : Recording
     """
     piece = max(recording.pieces, key=lambda one: one.samples)
-    found, by_itself = _left_over(piece), _left_over(piece, own=True)
-    if found is None or by_itself is None:
+    found = _left_over(piece)
+    if found is None or np.count_nonzero(_changes(found)) < _FEWEST_CHANGES:
         return 0.0
-    left, own = (float(np.mean(np.abs(part) > _EXACT)) for part in (found, by_itself))
-    changes = int(np.count_nonzero(_changes(found)))
-    if left > 1 - _MOST or left > _HALF * own or changes < _FEWEST_CHANGES:
+    left = float(np.mean(np.abs(found) > _EXACT))
+    if left > 1 - _MOST:
+        return 0.0
+    by_itself = _left_over(piece, own=True)
+    if by_itself is None or left > _HALF * float(np.mean(np.abs(by_itself) > _EXACT)):
         return 0.0
     return 1 - left
 
