@@ -71,5 +71,5 @@ def test_a_hand_that_moves_the_device_feigns_none() -> None:
         etfe = estimate_etfe(recording)
         tests = ripple_tests(least_squares(model, etfe, start=model.values), etfe)
         assert len(tests) == 2
-        # Of 16 the largest lies above 2.2 once in ten; 10^-4 of it is the chance beyond 3.2 + 1.
+        # Each of 16 is as large as that once in 10^4 by chance.
         assert all(test.statistic < thresholds.LOG_CHANCE - 1 for test in tests)

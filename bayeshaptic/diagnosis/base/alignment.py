@@ -30,7 +30,8 @@ _FALLS = 0.9
 _WHOLE = 0.05  # of a period: so near to whole ones is one delay in ten
 _LATER = "extra_delay_s"
 # Delays to begin at, and starting points beside: with one and none four of 60 fits to positions
-# that are early stay where they were, with four and none three do, with four and sixteen none.
+# that are early stay where they were, with four and none three do, with four and sixteen none: on
+# these they were chosen. What is moved though it is in time was counted before (docs/door.md).
 _WAYS, _OWN = 4, 16
 
 
