@@ -105,3 +105,15 @@ def test_the_limit_stays_and_the_page_names_the_noise(make) -> None:  # type: ig
     assert head.status == "safe" and 0.8 * truth < head.stiffness < truth
     (notice,) = [one for one in result.analysis.notices if one.topic == "noise of the force"]
     assert notice.level == "note" and "white" in notice.text
+
+
+def test_a_hand_is_no_louder_than_slower_windows_leave_it() -> None:
+    """Where a motor hardly moves the position any motion is a large force: told of no hand."""
+    hertz = np.geomspace(10, 200, 60)
+    falls = 1e-3 * (45 / hertz) ** 4
+    stands_still = (hertz > 38) & (hertz < 42)
+    hand = excess._of_the_hand(hertz, np.where(stands_still, 1e3 * falls, falls))
+    fast = hertz > 45
+    # Of three windows together those of a steep fall have 5 % more than the middle one.
+    np.testing.assert_allclose(hand[fast], falls[fast], rtol=0.1)
+    assert np.all(hand[hertz < 30] == 0)

@@ -13,7 +13,7 @@ from along_the_way import DELAY_S, guided
 from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
-from bayeshaptic.diagnosis.state import State, Trial
+from bayeshaptic.diagnosis.state import FIT, State, Trial, log_likelihoods, share, weights
 from bayeshaptic.diagnosis.trials import beside, force_search, force_slopes
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.beside import beside_tests
@@ -31,10 +31,12 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.effects.effect import Effect as BenchEffect
 from bayeshaptic.rig.effects.friction import StribeckFriction
@@ -218,6 +220,68 @@ def test_the_law_on_the_way_from_the_simple_one() -> None:
     assert law.departing(0.25).shape == {"static_excess": 0.2, "stribeck_velocity": 0.02}
     assert law.departing(1.0) == law and law.contains(CoulombFriction(MOTOR))
     assert not law.contains(law) and not CoulombFriction(MOTOR).contains(CoulombFriction(MOTOR))
+
+
+def test_what_a_step_along_a_ridge_leaves_is_foreseen() -> None:
+    """Drag up by half, and the damper that it makes up for down as far: the product counts."""
+    state, _ = rubbed(0.0)
+    assert state.etfe.unbroken is not None
+    bench, damper = ForceBench(state, state.etfe.unbroken), state.model.names.index("b1")
+    kind = next(kind for kind in effects("nonlinear") if kind.name == "drag")
+    velocity = bench.motions(state.fit.theta, (MOTOR,))[MOTOR].velocity
+    looks_like = np.mean(np.abs(velocity) ** 3) / np.mean(velocity**2)
+    whole = float(state.fit.theta[damper] / looks_like)
+
+    def at(drag: float) -> Point:
+        theta = np.array(state.fit.theta)
+        theta[damper] *= 1 - drag
+        for _ in range(3):  # the slow motion is read off beside the motion before
+            found = bench.as_it_is((Acting(kind(MOTOR), drag * whole),), theta)
+        return found
+
+    there, here = at(0.75), at(0.5)
+    chosen = share(here.windows, FIT)
+    weight, _ = weights(state.model, here.windows, here.theta)
+
+    def left(point: Point) -> Floats:
+        of_windows = Likelihood(state.model, point.windows.part(chosen))
+        return of_windows.deviations(point.theta[None])[0] * np.sqrt(2 * weight[chosen])[:, None]
+
+    form, logs = Form.of(here), np.log([here.strength])
+    near, nudges = np.full(1, 0.01), nudges_of(bench)
+    residuals, start, _ = linearised(bench, form, logs, here.theta, 0 * logs, nudges, near, FIT)
+    moved = np.append(search_box(state.model)[0].coordinate(there.theta[None])[0], np.log(1.5))
+    foreseen = residuals(moved[None])[0].reshape(2, chosen.sum(), -1)[..., : left(here).shape[1]]
+    error = np.linalg.norm(foreseen[0] + 1j * foreseen[1] - left(there))
+    assert error < 0.1 * np.linalg.norm(left(there) - left(here))  # 2.0 to first order
+
+
+def test_what_a_deviation_counts_touches_the_likelihood_from_below() -> None:
+    """One mass for two: what is left is far beyond the noise, which its size is then read from."""
+    etfe = state_of(LHIFAM).etfe
+    fit = least_squares(build_model("rigid", "lhifam"), etfe)
+    windows = compress(etfe, fit.response)
+    fitted = share(windows, FIT)
+    weight, scattered = weights(fit.model, windows, fit.theta)
+    assert np.median(scattered / weight) > 100
+
+    def squares(theta: Floats, scatter: float) -> float:
+        left = np.abs(Likelihood(fit.model, windows).deviations(theta[None])[0]) ** 2
+        each = weight * left.sum(axis=1) + scattered * scatter * windows.scatter
+        return float(each[fitted].sum())
+
+    def likelihood(theta: Floats, scatter: float) -> float:
+        scaled = replace(windows, scatter=scatter * windows.scatter)
+        return float(log_likelihoods(fit.model, scaled, theta)[0])
+
+    less = squares(fit.theta, 1.0), likelihood(fit.theta, 1.0)
+    for factor in (0.5, 0.999, 1.001, 1.5):
+        for scatter in (0.8, 1.0, 1.2):
+            theta = factor * fit.theta
+            rise, fall = likelihood(theta, scatter) - less[1], less[0] - squares(theta, scatter)
+            assert rise > fall - 1e-9 * abs(less[0])
+            if factor in (0.999, 1.001) and scatter == 1.0:
+                assert rise == pytest.approx(fall, abs=0.02 * abs(fall) + 1e-3)
 
 
 def test_slopes_over_the_linear_parameters_are_taken_again_only_where_something_has_moved(

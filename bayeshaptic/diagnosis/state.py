@@ -218,16 +218,35 @@ def log_likelihoods(model: Model, windows: Windows, theta: Floats) -> Floats:
     in the terms of `Likelihood`, k the nodes of a window; at c = 1 that is `Likelihood` itself.
     Where feedback hides the noise, on all windows, and a quarter of that.
     """
-    likelihood = Likelihood(model, windows)
     if windows.noise is not None:
-        return np.array([1.0, _HELD_OUT]) * likelihood(theta[None])[0]
-    left = likelihood.deviations(theta[None])[0]
-    power = np.sum(np.abs(left) ** 2, axis=1)
-    nodes = left.shape[1]
-    fitted, freedom = share(windows, FIT), windows.lines - 1
-    c = _noise_factor(power[fitted], windows.scatter[fitted], freedom[fitted], nodes)
+        likelihood = Likelihood(model, windows)(theta[None])[0]
+        return np.array([1.0, _HELD_OUT]) * likelihood
+    power, freedom, c = _noise_with(model, windows, theta)
+    nodes = windows.target.shape[1]
     pointwise = -freedom * np.log(windows.scatter + power / c) - nodes * np.log(c)
     return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
+
+
+def weights(model: Model, windows: Windows, theta: Floats) -> tuple[Floats, Floats]:
+    """What a squared deviation and what scatter count in `log_likelihoods` near a vector, (W,).
+
+    Their sum with these weights touches that likelihood from below: who makes it less raises that
+    (K. Lange, D. Hunter and I. Yang, Journal of Computational and Graphical Statistics 9, 2000).
+    """
+    if windows.noise is not None:
+        return np.asarray(1 / windows.noise), np.asarray(1 / windows.noise)
+    power, freedom, c = _noise_with(model, windows, theta)
+    weight = np.asarray(freedom / (c * windows.scatter + power))
+    return weight, c * weight
+
+
+def _noise_with(model: Model, windows: Windows, theta: Floats) -> tuple[Floats, Floats, float]:
+    """|z - R g|^2 and degrees of freedom of each window, and the factor on its noise variance."""
+    left = Likelihood(model, windows).deviations(theta[None])[0]
+    power = np.sum(np.abs(left) ** 2, axis=1)
+    fitted, freedom = share(windows, FIT), windows.lines - 1
+    c = _noise_factor(power[fitted], windows.scatter[fitted], freedom[fitted], left.shape[1])
+    return power, freedom, c
 
 
 def _noise_factor(power: Floats, scatter: Floats, freedom: Floats, nodes: int) -> float:

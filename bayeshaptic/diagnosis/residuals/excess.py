@@ -149,13 +149,18 @@ def _noise_of(fit: Fit, etfe: Etfe) -> _Noise | None:
 
 
 def _of_the_hand(centre_hz: Floats, force: Floats) -> Floats:
-    """Power of a line of the hand's force, as far as the windows just below tell that of it.
+    """Power of a line of the hand's force, as far as slower windows tell that of it.
 
     A muscle follows as a mass on a spring and a damper does, so that its force falls with the
-    fourth power at least.
+    fourth power at least: no window has more of it than any slower one leaves to it.  One alone
+    would not tell: where a hand holds on behind a spring the motor moves the position little at
+    the hand's own resonance, and as a force of the motor the same motion is many times larger.
     """
-    slow = (centre_hz > _HAND_HZ / np.sqrt(2)) & (centre_hz <= _HAND_HZ)
-    return np.asarray(np.max(force[slow], initial=0.0) * (_HAND_HZ / centre_hz) ** 4)
+    beside = np.pad(force, _TOGETHER // 2, "edge")
+    force = np.convolve(beside, np.full(_TOGETHER, 1 / _TOGETHER), "valid")
+    told = centre_hz > _HAND_HZ / np.sqrt(2)
+    left = np.minimum.accumulate(np.where(told, force * centre_hz**4, np.inf)) / centre_hz**4
+    return np.where(told, left, 0.0)
 
 
 def _floor_inside(centre_hz: Floats, noise: Floats) -> float:

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.state import Change, share
+from bayeshaptic.diagnosis.state import Change, share, weights
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
-from bayeshaptic.effects.nonlinear.protocol import Acting
+from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
@@ -140,15 +140,19 @@ class Along:
 
     Attributes
     ----------
-    slopes : list of ndarray
-        Empty where the motion hardly depends on the parameters.
+    slopes : ndarray, shape (P, I, N)
+        Of the motion of each force that moves a mass; P = 0 where it hardly depends on the
+        parameters.
+    strengths : ndarray of int, shape (I,)
+        Which of the logarithms is that of its strength.
     at : ndarray
         Coordinates of the parameters, and logarithms of the strengths.
     near : float
         Share of the usual distances that they were taken over.
     """
 
-    slopes: list[Floats]
+    slopes: Floats
+    strengths: NDArray[np.intp]
     at: Floats
     near: float
 
@@ -169,7 +173,10 @@ def linearised(
     motions: list[Floats] | None = None,
     along: Along | None = None,
 ) -> tuple[Callable[[Floats], Floats], Floats, Along]:
-    """Residuals around forces, linear in everything but the linear parameters, and their start.
+    """Residuals around forces, linear in their motion, and their start.
+
+    A motion is that of a unit of the force times its strength, and is so here: along a ridge where
+    force and damper make up for each other the product of both steps is worth more than the noise.
 
     Parameters
     ----------
@@ -223,13 +230,15 @@ def linearised(
         # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
         linear = forces and not (bench.held and all(o.effect.place == MOTOR for o in forces))
         around = here.natural(phi + np.diag(nearest * nudges)) if linear else ()
+        moving = np.flatnonzero([not isinstance(o.effect, CommandEffect) for o in forces])
         moves = [
-            (bench.added_motions(forces, vector).sum(axis=0) - inner) / (nearest * nudge)
+            (bench.added_motions(forces, vector) - added)[moving] / (nearest * nudge)
             for vector, nudge in zip(around, nudges, strict=False)
         ]
-        along = Along(moves, at, nearest)
+        each = np.array(moves).reshape(len(moves), len(moving), added.shape[1])
+        along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
     bench.remember(inner)  # not before: what is compared has the slow motion in common
-    slopes += along.slopes
+    slopes += list(along.slopes.reshape(-1, added.shape[1]))
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
     slopes += further
     windows, weight = _weighed_windows(bench, bench.changes(forces, added), theta, slopes, parts)
@@ -248,9 +257,12 @@ def _weighed_windows(
     etfe = bench.without(changes)
     windows = bench.windows(etfe, theta, slopes)
     # The many slopes leave too little of a window to read its noise from.
-    noise = Likelihood(bench.model, bench.windows(etfe, theta)).noise_variance
+    left, scattered = weights(bench.model, bench.windows(etfe, theta), theta)
+    nodes, rows = windows.frequency_hz.shape[1], windows.target.shape[1]
+    # Rows beyond the nodes' are what of the scatter the slopes can take.
+    each = np.where(np.arange(rows) < nodes, left[:, None], scattered[:, None])
     chosen = share(windows, parts)
-    return windows.part(chosen), np.sqrt(2 / noise[chosen])[:, None]
+    return windows.part(chosen), np.sqrt(2 * each[chosen])
 
 
 def _residuals(
@@ -275,11 +287,13 @@ def _residuals(
     def residuals(phi: Floats) -> Floats:
         steps, sizes = np.split(phi[:, size:], [len(moved)], axis=1)
         far = (moved + steps)[:, shape] / shape_sd
-        if along.slopes:
-            steps = np.concatenate([steps, phi[:, :size] - start[:, :size]], axis=1)
-        steps = np.concatenate([steps, sizes], axis=1)
+        grown = np.where(shape, steps, np.expm1(steps))
+        # A slope is that of a motion, and as many times larger as its force is.
+        beside = (phi[:, :size] - start[:, :size])[:, : len(along.slopes), None]
+        beside = beside * np.exp(steps[:, None, along.strengths])
+        sized = np.concatenate([grown, beside.reshape(len(phi), -1), sizes], axis=1)
         left = own.deviations(here.natural(phi[:, :size]))
-        left = (left - np.einsum("wrj,bj->bwr", columns, steps)) * weight
+        left = (left - np.einsum("wrj,bj->bwr", columns, sized)) * weight
         flat = left.reshape(len(phi), -1)
         return np.concatenate([flat.real, flat.imag, far], axis=1)
 
