@@ -63,3 +63,13 @@ print(stats.__file__, stats.norm.cdf(0.3))
 def test_a_version_without_these_names_is_left_as_it_is(gone: str) -> None:
     hidden = f"import sys\nsys.modules[{gone!r}] = None\n"
     assert printed(hidden + LEAVE + f"del sys.modules[{gone!r}]\n" + COMPUTE) == printed(COMPUTE)
+
+
+def test_nothing_is_collected_at_the_end() -> None:
+    ended = printed(
+        "import atexit, gc\n"
+        "atexit.register(lambda: print(gc.get_freeze_count() > 0))\n"
+        "from bayeshaptic.own_process import collect_garbage_rarely\n"
+        "collect_garbage_rarely()\n"
+    )
+    assert ended.split() == ["True"]
