@@ -15,7 +15,14 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-_LATER = ("scipy.stats", "scipy.interpolate", "scipy.spatial", "scipy.optimize")
+_LATER = (
+    "scipy.stats",
+    "scipy.interpolate",
+    "scipy.spatial",
+    "numpy.f2py",
+    "numpy.testing",
+    "tqdm",
+)
 
 
 def collect_garbage_rarely() -> None:
@@ -33,10 +40,11 @@ def collect_garbage_rarely() -> None:
 def lighten_imports() -> None:
     """Have SciPy and matplotlib not rewrite their docstrings while they are imported.
 
-    They do so for some 900 functions and classes, a sixteenth of a report.  What SciPy does without
-    is what it does under ``python -OO``.  To be called before either is imported; versions that
-    have no such names are left as they are.  SciPy's filters and emcee are imported here, without
-    what they bring along.
+    They do so for some 900 functions and classes, a sixteenth of a report, and matplotlib lists
+    what the `set` of each of 110 classes takes, a fiftieth.  What SciPy does without is what it
+    does under ``python -OO``.  To be called before either is imported; versions that have no such
+    names are left as they are.  SciPy's optimisers, its filters and emcee are imported here,
+    without what they bring along.
     """
     with suppress(ImportError, AttributeError):
         from scipy._lib import _docscrape
@@ -46,20 +54,25 @@ def lighten_imports() -> None:
         import matplotlib.artist
 
         matplotlib.artist.kwdoc = lambda artist: ""
-    _import_lightly("scipy.signal", "emcee")
+        every: Any = matplotlib.artist.Artist  # what matplotlib's stubs leave out
+        every._update_set_signature_and_docstring = classmethod(lambda cls: None)
+    _import_lightly("scipy.optimize", "scipy.signal", "emcee")
 
 
 def _import_lightly(*names: str) -> None:
     """Import modules while what they hardly use is stood in for.
 
-    SciPy's filters and emcee import its statistics, splines, trees and optimisers for functions
-    that no report calls: 0.4 s of the 8 s of processor time that a report of
-    data/recordings/phantom-free.csv.gz takes (median difference of six alternating pairs of runs).
-    Whatever they call of it is imported then.  Where that does not work they are as not imported.
+    SciPy's filters and optimisers import its statistics, splines and trees, and NumPy's tests and
+    its compiler of Fortran; emcee imports tqdm: for functions that no report calls, 0.5 s of the
+    5 s of processor time of a clean report.  Whatever they call of it is imported then.  Where that
+    does not work they are as not imported.
     """
     before = set(sys.modules)
-    away = [name for name in _LATER if name not in before]
-    sys.modules.update({name: _Later(name) for name in away})
+    away = {name: name.rpartition(".") for name in _LATER if name not in before}
+    for name, (package, _, own) in away.items():
+        sys.modules[name] = _Later(name)
+        if package:  # asked for under this name, too
+            setattr(import_module(package), own, sys.modules[name])
     try:
         for name in names:
             import_module(name)
@@ -68,9 +81,11 @@ def _import_lightly(*names: str) -> None:
             if any(f"{name}.".startswith(f"{one}.") for one in names):
                 del sys.modules[name]
     finally:
-        for name in away:
+        for name, (package, _, own) in away.items():
             if isinstance(sys.modules.get(name), _Later):
                 del sys.modules[name]
+                if package:
+                    delattr(sys.modules[package], own)
 
 
 class _Later(ModuleType):
