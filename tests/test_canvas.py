@@ -109,6 +109,17 @@ def test_texts_of_a_page_are_texts_as_wide_as_they_were_laid_out() -> None:
             assert float(of["textLength"]) == pytest.approx(width * points, abs=points)
 
 
+@pytest.mark.parametrize("words", ["ace", "two\nlines, \u00c5g", ""])
+@pytest.mark.parametrize("weight", ["normal", "bold"])
+def test_texts_are_as_high_as_matplotlib_finds_them(words: str, weight: str) -> None:
+    figure = style.new_figure(1.0)
+    text = figure.text(0.3, 0.4, words, size=style.SMALL, weight=weight)
+    theirs = text.get_window_extent(RendererAgg(400, 100, style.DPI)).bounds
+    draw_both(figure)
+    ours = text.get_window_extent(figure.canvas.get_renderer()).bounds  # type: ignore[attr-defined]
+    assert ours == pytest.approx(theirs)
+
+
 @pytest.mark.parametrize("angle", [0.0, 90.0])
 def test_texts_are_those_of_matplotlib_on_whole_pixels(angle: float) -> None:
     font = FontProperties(size=style.FONT)

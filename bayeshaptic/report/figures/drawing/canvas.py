@@ -20,7 +20,7 @@ from matplotlib.colors import rgb2hex
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D, Bbox, TransformedPath
 
-from bayeshaptic.report.figures.drawing.letters import in_pixels, letters
+from bayeshaptic.report.figures.drawing.letters import heights, in_pixels, letters
 from bayeshaptic.report.figures.drawing.png import png
 from bayeshaptic.types import Bytes
 
@@ -261,6 +261,10 @@ class _Both(RendererBase):
         if ismath:
             return self._pixels.get_text_width_height_descent(s, prop, ismath)
         return letters(s, prop, self.dpi).size
+
+    def _get_font_height_metrics(self, font: Any) -> tuple[float | None, ...]:
+        """What matplotlib reads from two tables of a font at each look at each text."""
+        return heights(font, self.dpi)
 
     def get_canvas_width_height(self) -> tuple[float, float]:
         return self._size

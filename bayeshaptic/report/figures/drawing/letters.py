@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import RendererAgg, get_hinting_flag
-from matplotlib.font_manager import FontProperties
+from matplotlib.font_manager import FontProperties, fontManager, get_font
 
 from bayeshaptic.types import Bytes
 
@@ -56,6 +56,23 @@ def _set(text: str, font: FontProperties, dpi: float) -> Letters:
         (width / units, height / units, prepared.get_descent() / units),
         (across / units, down / units),
     )
+
+
+def heights(font: FontProperties, dpi: float) -> tuple[float | None, ...]:
+    """Ascent, descent and gap between lines in pixels; none where the font does not say so."""
+    return _heights(font.copy(), dpi)
+
+
+@lru_cache(_KEPT)
+def _heights(font: FontProperties, dpi: float) -> tuple[float | None, ...]:
+    face: Any = get_font(fontManager._find_fonts_by_props(font))  # type: ignore[attr-defined]
+    table = face.get_sfnt_table("OS/2")
+    if table is None:
+        return None, None, None
+    pixels = 1 / face.get_sfnt_table("head")["unitsPerEm"] * font.get_size_in_points() * dpi / 72
+    names = "sTypoAscender", "sTypoDescender", "sTypoLineGap"
+    ascent, below, gap = (table[name] * pixels for name in names)
+    return ascent, -below, gap
 
 
 def in_pixels(
