@@ -62,9 +62,10 @@ def width_rows(table: LimitTable) -> tuple[tuple[str, ...], ...]:
     rows = []
     for part in table.filters:
         shown: dict[tuple[str, ...], list[float]] = {}
-        for risk in table.risks:
+        for risk, undamped in zip(table.risks, table.stiffness, strict=True):
             width = part.width(risk)
-            row: tuple[str, ...] = ("too few draws to say", *(3 * (_DASH,)))
+            why = "too few draws to say" if undamped is None else "too few draws over damping"
+            row: tuple[str, ...] = (why, *(3 * (_DASH,)))
             if width is not None:
                 row = (
                     quantity(width.stiffness, table.unit),

@@ -10,6 +10,7 @@ import numpy as np
 
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Damping
+from bayeshaptic.stability.walls.fitted_tail import fitted_boundary
 from bayeshaptic.stability.walls.joint import (
     JointRegion,
     Lowest,
@@ -37,6 +38,8 @@ class FilterLimits:
         Limits of some draws of each case, each column in ascending order.
     tails : tuple of Tail, or None
         The lowest limits of more draws of each case, for small risks.
+    fitted : mapping
+        Risk to the stiffness from fitted tails, shape (J,), where the draws are too few otherwise.
     undamped : mapping
         Risk to the stiffness without damping that is stated from all draws, or None: the boundary
         begins there, and is not stated where that is not.
@@ -46,6 +49,7 @@ class FilterLimits:
     damping: Floats = field(repr=False)
     limits: tuple[Floats, ...] = field(repr=False)
     tails: tuple[Tail, ...] | None = field(repr=False, default=None)
+    fitted: Mapping[float, Floats] = field(repr=False, default_factory=dict)
     undamped: Mapping[float, float | None] = field(repr=False, default_factory=dict)
 
     @property
@@ -70,9 +74,13 @@ class FilterLimits:
         if self.region.says(risk):
             return Boundary(risk, self.damping, self.quantile(risk))
         if self.tails is None or risk > min(tail.risk for tail in self.tails):
-            return None
-        tails = lowest([tail.limits for tail in self.tails], [tail.total for tail in self.tails])
-        return Boundary(risk, self.damping, tails.quantile(risk))
+            fitted = self.fitted.get(risk)
+            return None if fitted is None else Boundary(risk, self.damping, fitted)
+        return Boundary(risk, self.damping, self._from_tails(risk))
+
+    def _from_tails(self, risk: float) -> Floats:
+        tails = self.tails or ()
+        return lowest([t.limits for t in tails], [t.total for t in tails]).quantile(risk)
 
     @cached_property
     def _lowest(self) -> Lowest:
@@ -101,7 +109,26 @@ def filter_limits(
             np.insert(own, place, new[:, 0], axis=1) for own, new in zip(limits, there, strict=True)
         )
         tails = tuple(tail.at(levels) for tail in tails)
-    return FilterLimits(region, levels, tuple(np.sort(part, axis=0) for part in limits), tails)
+    ordered = tuple(np.sort(part, axis=0) for part in limits)
+    return _with_fitted(FilterLimits(region, levels, ordered, tails), risks)
+
+
+def _with_fitted(part: FilterLimits, risks: tuple[float, ...]) -> FilterLimits:
+    """With tails fitted for the risks that draws do not say; none below one that is not stated."""
+    effective = [region.effective for region in part.region.regions]
+    larger = np.full(len(part.damping), np.inf)
+    for risk in sorted(risks, reverse=True):
+        if part.boundary(risk) is None:
+            fitted = fitted_boundary(part.limits, effective, risk, larger)
+            if fitted is None:
+                break
+            if part.tails is not None:  # what they say of a smaller risk is not above
+                fitted = np.maximum(fitted, part._from_tails(min(risks)))
+            part = replace(part, fitted={**part.fitted, risk: fitted})
+        known = part.boundary(risk)
+        assert known is not None
+        larger = known.stiffness
+    return part
 
 
 def _tails(
