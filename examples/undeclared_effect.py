@@ -68,7 +68,9 @@ def closed(recording: bh.Recording, ess: float) -> bh.Closed:
         for name, estimate in effect.estimates.items():
             sd = "" if estimate.sd != estimate.sd else f" ± {estimate.sd:.2g}"
             print(f"   {effect.name}: {name} {estimate.mean:.3g}{sd} {estimate.unit}")
-    for when, error in (("before", found.before), ("after", found.after)):
+    # Both beside the same measurement: that with the friction taken off it.
+    before = found.before_like_after or found.before
+    for when, error in (("before", before), ("after", found.after)):
         limit = error["critical_stiffness"]
         print(
             f"5. {when}: held-out error {error['held_out_weighted_rms']:.2f} times the noise, "

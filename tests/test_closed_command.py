@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bayeshaptic import cli
@@ -46,7 +47,20 @@ def test_hidden_friction_is_found_and_taken_out_of_the_limit(report: Any) -> Non
     # K_CR of the bench's linear part is 22.268 kN/m; one decibel is twelve per cent.
     assert error["after"]["critical_stiffness"]["q50"] == pytest.approx(22_268, rel=0.12)
     assert any(c["accepted"] for c in diagnosis["candidates"])
-    assert set(error["before"]) == set(error["after"])
+    assert set(error["before"]) == set(error["after"]) == set(error["before_like_after"])
+    limit = found["critical_stiffness"]
+    # Friction holds the device still: as it was measured the response has a stiffer limit, which
+    # the declared model fits. Beside what is left without the friction it is far off.
+    assert limit["etfe_as_measured"]["q50"] > 1.3 * limit["etfe"]["q50"]
+    assert abs(error["before"]["critical_stiffness_db"]) < 0.5
+    alike = error["before_like_after"]
+    assert alike["critical_stiffness"] == error["before"]["critical_stiffness"]
+    apart = 20 * np.log10(alike["critical_stiffness"]["q50"] / limit["etfe"]["q50"])
+    assert alike["critical_stiffness_db"] == pytest.approx(apart)
+    for key in ("weighted_rms", "held_out_weighted_rms"):
+        assert alike[key] > 5 * error["after"][key]
+    assert f"from {alike['held_out_weighted_rms']:.3g}" in page
+    assert "before, corrected" in page and "as measured" in page
     assert "What the model lacked" in page and "friction force" in page
 
 
@@ -60,7 +74,10 @@ def test_a_clean_recording_is_left_alone(report: Any) -> None:
     limits = ("critical_stiffness", "critical_stiffness_db")
     for key in set(error["before"]) - set(limits):
         assert error["before"][key] == error["after"][key]
+    assert error["before_like_after"] == error["before"]
     declared = found["critical_stiffness"]["declared"]
+    assert found["critical_stiffness"]["etfe_as_measured"] == found["critical_stiffness"]["etfe"]
+    assert "corrected" not in page
     assert declared["q50"] == error["before"]["critical_stiffness"]["q50"]
     assert declared["q05"] > found["critical_stiffness"]["q05"]
     # 1 is noise: a quarter of some 100 windows of three complex numbers scatters by 6 per cent.

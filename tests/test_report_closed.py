@@ -29,7 +29,14 @@ from bayeshaptic.report.assumptions import assumptions
 from bayeshaptic.report.figures import LOOP_PICTURES
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.loop.tables import candidates, errors, estimates, found, outcomes
+from bayeshaptic.report.loop.tables import (
+    candidates,
+    error_heads,
+    errors,
+    estimates,
+    found,
+    outcomes,
+)
 from bayeshaptic.report.loop.words import in_short, lacked, subject, verdict
 from bayeshaptic.report.words import widened
 
@@ -47,6 +54,24 @@ def test_what_was_lacking_in_one_sentence() -> None:
     assert "adding it (1 parameter) cut the held-out error from 1.60 to 1.02 times" in text
     # 1.66 is 4.4 dB.
     assert re.search(r"K_CR moved from 3\d\.\d+ to 2\d\.\d+ kN/m \(−4\.4 dB\)", text), text
+
+
+def test_errors_before_and_after_are_beside_one_measurement() -> None:
+    closed = fake_closed()
+    assert error_heads(closed) == ("", "before", "after")
+    alike = {**closed.before, "weighted_rms": 7.0, "held_out_weighted_rms": 8.0}
+    closed = replace(closed, before_like_after=alike)
+    heads, rows = error_heads(closed), errors(closed)
+    assert heads == ("", "before, as measured", "before, corrected", "after, corrected")
+    assert {len(row) for row in rows} == {4}
+    assert rows[0][1:] == ("1.60", "7.00", "1.02")
+    assert "cut the held-out error from 8.00 to 1.02 times" in lacked(closed)
+    changing = replace(fake_closed(family="time-varying"), before_like_after=alike)
+    assert error_heads(changing)[1:] == (
+        "before, whole recording",
+        "before, worst part",
+        "after, worst part",
+    )
 
 
 def test_an_effect_that_changes_little_is_said_so() -> None:

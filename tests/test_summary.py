@@ -63,6 +63,7 @@ KEYS: dict[str, set[str]] = {
         "tip",
         "crossings",
         "etfe",
+        "etfe_as_measured",
         "safe",
         "declared",
         "reason",
@@ -70,11 +71,13 @@ KEYS: dict[str, set[str]] = {
     "critical_stiffness.db": QUANTILES,
     "critical_stiffness.frequency_hz": QUANTILES,
     "critical_stiffness.etfe": QUANTILES,
+    "critical_stiffness.etfe_as_measured": QUANTILES,
     "critical_stiffness.safe": {"0.05", "0.01", "0.001"},
     "diagnosis": {"verdict", "residual_class", "effects", "candidates", "not_tried"},
-    "error": {"before", "after"},
+    "error": {"before", "before_like_after", "after"},
     "provenance": {"command", "options", "versions", "seed", "file", "sha256", "seconds"},
     "error.before": ERROR,
+    "error.before_like_after": ERROR,
     "error.after": ERROR,
     "error.before.critical_stiffness": QUANTILES,
     "error.after.critical_stiffness": QUANTILES,
@@ -208,6 +211,7 @@ def test_what_closing_the_loop_adds() -> None:
             "effects": [{"name": "coulomb_friction"}],
         },
         before={"weighted_rms": 12.5},
+        before_like_after={"weighted_rms": 40.0},
         after={"weighted_rms": np.float64(1.02), "critical_stiffness_db": math.nan},
     )
     found = strictly_parsed(summary_json(closed))
@@ -215,6 +219,7 @@ def test_what_closing_the_loop_adds() -> None:
     assert found["diagnosis"]["candidates"] is None
     assert found["model"]["effects"] == ["coulomb_friction"]
     assert found["error"]["before"]["weighted_rms"] == 12.5
+    assert found["error"]["before_like_after"]["weighted_rms"] == 40.0
     assert found["error"]["after"]["critical_stiffness_db"] is None
     assert found["error"]["after"]["critical_stiffness"] == dict.fromkeys(QUANTILES)
     assert found["model"]["name"] == "rigid"

@@ -14,7 +14,8 @@ from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
 from bayeshaptic.diagnosis.base.begun import fitted
 from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.battery import residual_tests
-from bayeshaptic.diagnosis.closed import Closed, limit_alone
+from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.model_error import limit_alone
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.traced import UNEXPLAINED

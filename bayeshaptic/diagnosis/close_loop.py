@@ -8,8 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bayeshaptic.diagnosis.analyse import finish, without_sampling
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.alignment import perhaps_late
@@ -18,7 +16,7 @@ from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
 from bayeshaptic.diagnosis.base.opened import Opened, opened
 from bayeshaptic.diagnosis.by_all_lines import by_all_lines
-from bayeshaptic.diagnosis.closed import Closed, limit_alone
+from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
@@ -28,9 +26,9 @@ from bayeshaptic.diagnosis.feedback.explain import (
 from bayeshaptic.diagnosis.feedback.mode_above_band import mode_above_band
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
+from bayeshaptic.diagnosis.model_error import error_beside, limit_alone, model_error
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.excess import noise_besides
-from bayeshaptic.diagnosis.state import held_out_rms
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
@@ -125,7 +123,15 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
     stated, louder = wide or analysis.posterior, analysis.noise_scale
     wide = with_rest(stated, state.fit, traced, louder, seed) or wide
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)
-    return Closed(base, analysis, traced, _error(base), _error(analysis))
+    before_like_after = None if state.etfe is begun.etfe else error_beside(base, analysis)
+    return Closed(
+        base,
+        analysis,
+        traced,
+        model_error(base),
+        model_error(analysis),
+        before_like_after=before_like_after,
+    )
 
 
 def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:
@@ -161,7 +167,7 @@ def _refused(begun: Begun, force: ForceExplained | None, options: Options) -> Cl
     """
     analysis = without_sampling(begun, options)
     traced = left_alone(begun.etfe, begun.fit, force)
-    error = _error(analysis)
+    error = model_error(analysis)
     return Closed(analysis, analysis, traced, error, error, force)
 
 
@@ -197,7 +203,7 @@ def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed
         return closed
     seconds = {**analysis.seconds, "what could hide": time.perf_counter() - began}
     analysis = replace(analysis, limit=found[0], hidden=found[1], seconds=seconds)
-    after = _error(analysis)
+    after = model_error(analysis)
     return replace(closed, analysis=analysis, after={key: after[key] for key in closed.after})
 
 
@@ -221,21 +227,3 @@ def _stages(
     if after is not base:
         stages["the model as declared"] = sum(base.values()) - sum(begun.values())
     return stages | {name: spent for name, spent in after.items() if name not in begun}
-
-
-def _error(analysis: Analysis) -> dict[str, Any]:
-    """How far the model is from the measurement."""
-    fit, etfe = analysis.fit, analysis.etfe
-    ratio = fit.response(etfe.frequency_hz) / etfe.value
-    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
-    own = analysis.etfe_limit.q50
-    with np.errstate(divide="ignore", invalid="ignore"):
-        db = 20 * np.log10(q50 / own) if own else None
-    return {
-        "weighted_rms": float(np.sqrt(fit.reduced_chi_square)),
-        "held_out_weighted_rms": held_out_rms(fit),
-        "gain_db_rms": float(np.sqrt(np.mean((20 * np.log10(np.abs(ratio))) ** 2))),
-        "phase_deg_rms": float(np.sqrt(np.mean(np.degrees(np.angle(ratio)) ** 2))),
-        "critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)},
-        "critical_stiffness_db": float(db) if db is not None and np.isfinite(db) else None,
-    }

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from bayeshaptic.diagnosis.analysis import Analysis, limit_line
 from bayeshaptic.diagnosis.feedback.explain import ForceExplained
 from bayeshaptic.diagnosis.state import Accepted
@@ -31,7 +29,10 @@ class Closed(Shown):
         With the accepted effects, and the limit widened by what is unexplained.
     traced : Traced
     before, after : mapping
-        Errors in the form of ``summary.json``.
+        Errors in the form of ``summary.json``, each against its own measurement.
+    before_like_after : mapping or None
+        Of the model as declared against the measurement that `after` is against, where something
+        was taken off that or it is a part; None where it is the one that `before` is against.
     force : ForceExplained or None
         The force as the motion explains it, where nothing is read from the response.
     """
@@ -42,6 +43,7 @@ class Closed(Shown):
     before: Mapping[str, Any]
     after: Mapping[str, Any]
     force: ForceExplained | None = None
+    before_like_after: Mapping[str, Any] | None = None
 
     @property
     def measured(self) -> Analysis:
@@ -99,14 +101,3 @@ class Closed(Shown):
             f"added to the model {self.base.model.name}: {found}",
             limit_line(self.analysis),
         )
-
-
-def limit_alone(analysis: Analysis) -> dict[str, Any]:
-    """Errors of an analysis that is not compared with the response: its limit.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    """
-    q05, q50, q95 = analysis.limit.quantile(np.array([0.05, 0.5, 0.95]))
-    return {"critical_stiffness": {"q05": float(q05), "q50": float(q50), "q95": float(q95)}}

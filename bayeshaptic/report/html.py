@@ -14,7 +14,7 @@ from bayeshaptic.report.assumptions import assumptions, priors
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
 from bayeshaptic.report.figures.style import Drawn
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.loop import change_words, force_words
 from bayeshaptic.report.loop import tables as loop_tables
 from bayeshaptic.report.loop import words as loop_words
 from bayeshaptic.report.loop.motion_words import motion_words
@@ -88,6 +88,7 @@ def render(
         words=words,
         tables=tables,
         loop_words=loop_words,
+        change_words=change_words,
         force_words=force_words,
         motion_words=motion_words(analysis),
         loop_tables=loop_tables,

@@ -23,6 +23,7 @@ from bayeshaptic.version import __version__
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.stability.critical import CriticalStiffness
+    from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 _ERROR = {
     "weighted_rms": None,
@@ -54,7 +55,7 @@ def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str
     analysis = result.analysis
     closed = result.closed
     diagnosis = _DIAGNOSIS | dict(closed.diagnosis if closed else {})
-    error = errors(closed) if closed else dict.fromkeys(("before", "after"))
+    error = errors(closed) if closed else dict.fromkeys(("before", "before_like_after", "after"))
     return plain(
         {
             "version": __version__,
@@ -67,7 +68,7 @@ def summary(result: Result, origin: Mapping[str, Any] | None = None) -> dict[str
             },
             "least_squares": _least_squares(analysis),
             "posterior": _posterior(result),
-            "critical_stiffness": _critical_stiffness(analysis),
+            "critical_stiffness": _critical_stiffness(result),
             "recommendation": recommendation(headline(result)),
             "hidden": _hidden(analysis),
             "diagnosis": diagnosis,
@@ -190,11 +191,15 @@ def _posterior(result: Result) -> dict[str, Any] | None:
     }
 
 
-def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
-    limit, own = analysis.limit, analysis.etfe_limit
+def _critical_stiffness(result: Result) -> dict[str, Any]:
+    analysis = result.analysis
+    limit = analysis.limit
     tip = tip_limit(analysis)
     reason = unstated(analysis)
-    measured = {name: None if own is None else getattr(own, name) for name in QUANTILES}
+    measured = {
+        "etfe": _read_off(analysis.etfe_limit),
+        "etfe_as_measured": _read_off(result.measured.etfe_limit),
+    }
     if reason is not None:
         missing = dict.fromkeys(QUANTILES)
         return {
@@ -204,7 +209,7 @@ def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
             "frequency_hz": missing,
             "tip": None,
             "crossings": [],
-            "etfe": measured,
+            **measured,
             "safe": {f"{risk:g}": None for risk in RISKS},
             "declared": {**missing, "db": missing},
             "reason": reason,
@@ -219,7 +224,7 @@ def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
             {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
             for c in limit.crossings
         ],
-        "etfe": measured,
+        **measured,
         "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
         "declared": {
             **_quantiles(analysis.declared),
@@ -227,6 +232,11 @@ def _critical_stiffness(analysis: Analysis) -> dict[str, Any]:
         },
         "reason": None,
     }
+
+
+def _read_off(own: EtfeCriticalStiffness | None) -> dict[str, float | None]:
+    """The limit of a measured response by itself."""
+    return {name: None if own is None else getattr(own, name) for name in QUANTILES}
 
 
 def _hidden(analysis: Analysis) -> list[dict[str, Any]] | None:

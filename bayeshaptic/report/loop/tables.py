@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.quantities import estimate, percent, quantity, scale
+from bayeshaptic.report.loop.change_words import part
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
 from bayeshaptic.report.numbers.titles import question, title_of
@@ -140,13 +141,27 @@ def raised(closed: Closed) -> bool:
     )
 
 
+def error_heads(closed: Closed) -> tuple[str, ...]:
+    """The columns of `errors`: which model, beside which measurement."""
+    if closed.before_like_after is None:
+        return "", "before", "after"
+    other = "worst part" if part(closed) else "corrected"
+    whole = "whole recording" if part(closed) else "as measured"
+    return "", f"before, {whole}", f"before, {other}", f"after, {other}"
+
+
 def errors(closed: Closed) -> Rows:
-    """(what, before, after) of the error table of ``summary.json``, without what is missing."""
+    """(what, before, after) of the error table of ``summary.json``, without what is missing.
+
+    Where the measurement is another one after than before, (what, before, before beside that other
+    one, after): the last two can be compared.
+    """
     stated, unit = stated_errors(closed), closed.analysis.limit.unit
-    before, after = stated["before"], stated["after"]
+    keys = ("before", "before_like_after", "after")
+    columns = [stated[key] for key in keys[:: 1 if closed.before_like_after is not None else 2]]
 
     def row(title: str, key: str, suffix: str, places: int | None = None) -> tuple[str, ...]:
-        return (title, *(_number(e.get(key), suffix, places) for e in (before, after)))
+        return (title, *(_number(e.get(key), suffix, places) for e in columns))
 
     def limits(e: Mapping[str, Any]) -> str:
         q = e["critical_stiffness"]
@@ -159,7 +174,7 @@ def errors(closed: Closed) -> Rows:
         row("residual over the noise, data held out", "held_out_weighted_rms", ""),
         row("gain, model minus measurement (rms)", "gain_db_rms", " dB"),
         row("phase, model minus measurement (rms)", "phase_deg_rms", "\N{DEGREE SIGN}"),
-        ("critical stiffness, median (90 %)", limits(before), limits(after)),
+        ("critical stiffness, median (90 %)", *map(limits, columns)),
         row("median, model minus the measurement's own", "critical_stiffness_db", " dB", 2),
     )
     return tuple(row for row in rows if set(row[1:]) != {_DASH})

@@ -5,25 +5,20 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bayeshaptic.diagnosis.traced import CONSISTENT, UNEXPLAINED
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.quantities import (
-    estimate,
     pretty_unit,
     pure,
-    quantity,
     scale,
 )
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.report.loop import force_words
+from bayeshaptic.report.loop.change_words import error_change, limit_change, moved, noise_change
 from bayeshaptic.report.loop.motion_words import determined
 from bayeshaptic.report.loop.unexplained import remainder, worst
-from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
-from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
@@ -84,8 +79,8 @@ def lacked(closed: Closed) -> str:
     taking = "mending that" if _is_mended(closed) else "taking that for noise"
     doing = " and ".join(([taking] if measured else []) + ([adding] if added else []))
     return (
-        f"{text[0].upper()}{text[1:]}; {doing} {_error_change(closed)}{_noise_change(closed)}; "
-        f"{_limit_change(closed)}."
+        f"{text[0].upper()}{text[1:]}; {doing} {error_change(closed)}{noise_change(closed)}; "
+        f"{limit_change(closed)}."
     )
 
 
@@ -114,7 +109,7 @@ def in_short(closed: Closed) -> str:
     if added:
         here = "it is" if len(_measured_and_added(closed)[1]) == 1 else "they are"
         found.append(f"The model as declared lacked {added}; here {here} in the model.")
-    return f"{' '.join(found)} {_moved(closed)}."
+    return f"{' '.join(found)} {moved(closed)}."
 
 
 def _measured_and_added(closed: Closed) -> tuple[list[Accepted], list[Accepted]]:
@@ -150,12 +145,6 @@ def scope(closed: Closed) -> str:
     if "time-varying" in families:
         found.append("of what changes over time, the worst part or state counts")
     return "".join(f"; {text}" for text in found)
-
-
-def part(closed: Closed) -> str:
-    """Which part of the recording the numbers after are of; empty where it is all of it."""
-    changes = any(effect.family == "time-varying" for effect in closed.effects)
-    return ", in the worst part alone, whose response scatters more" if changes else ""
 
 
 def force_caption(closed: Closed) -> str:
@@ -232,64 +221,6 @@ def _numbers(closed: Closed, effect: Accepted) -> str:
         ]
     most_numbers = 3
     return f" ({', '.join(shown[:most_numbers])})" if shown else ""
-
-
-def _error_change(closed: Closed) -> str:
-    key, what = "held_out_weighted_rms", "held-out error"
-    if key not in closed.before:  # in closed loop nothing can be held out
-        key, what = "weighted_rms", "error"
-    before, after = (e[key] for e in (closed.before, closed.after))
-    if part(closed):
-        return f"leaves {_times(after)} times the noise in the worst part"
-    same = 0.005  # relative change of an error that is not worth a word
-    if abs(after / before - 1) < same:
-        return f"left the {what} at {_times(after)} times the noise"
-    verb = "cut" if after < before else "raised"
-    return f"{verb} the {what} from {_times(before)} to {_times(after)} times the noise"
-
-
-def _noise_change(closed: Closed) -> str:
-    """What had passed for noise: a force that is not linear scatters the response."""
-    old, new = closed.base.fit, closed.analysis.fit
-    if old.windows is None or new.windows is None:
-        return ""
-    if len(old.windows.scatter) != len(new.windows.scatter):
-        return ""
-    ratio = new.likelihood.noise_variance / old.likelihood.noise_variance
-    share = float(np.sqrt(np.median(ratio)))
-    less = 0.9  # of the noise, to be worth a word
-    if share >= less:
-        return ""
-    return f", and cut the noise itself to {pure(share, 2)} of what it seemed"
-
-
-def _times(error: float) -> str:
-    """Three digits, also where they are zeros."""
-    return quantity(error, "")
-
-
-def _limit_change(closed: Closed) -> str:
-    if any(unstated(one) is not None for one in (closed.base, closed.analysis)):
-        return "K_CR is not stated"
-    before, after = (e["critical_stiffness"] for e in (closed.before, closed.after))
-    unit = closed.analysis.limit.unit
-    old, new = before["q50"], after["q50"]
-    if not (old > 0 and new > 0 and math.isfinite(old) and math.isfinite(new)):
-        return f"K_CR went from {quantity(old, unit)} to {quantity(new, unit)}"
-    step = decibel(new) - decibel(old)
-    same_db = 0.05
-    if abs(step) < same_db:
-        return f"K_CR stayed at {estimate(new, after['q05'], after['q95'], unit)}"
-    row = scale((old, new), unit)
-    gap = abs(new - old) / 5
-    old_text, new_text = (row.number(value, gap, least=3) for value in (old, new))
-    change = f"{step:+.1f} dB".replace("-", "\N{MINUS SIGN}")
-    return f"K_CR moved from {old_text} to {new_text} {row.unit} ({change})"
-
-
-def _moved(closed: Closed) -> str:
-    text = _limit_change(closed)
-    return text.replace("K_CR", "With that the median limit", 1)
 
 
 def _with_article(title: str) -> str:

@@ -42,7 +42,12 @@ def unstated(analysis: Analysis) -> str | None:
 
 
 def errors(closed: Closed) -> dict[str, dict[str, Any]]:
-    """Errors before and after closing the loop, without limits that are not stated."""
+    """Errors before and after closing the loop, without limits that are not stated.
+
+    ``before_like_after`` is of the model as declared beside the measurement that ``after`` is of:
+    these two can be compared.
+    """
+    alike = closed.before if closed.before_like_after is None else closed.before_like_after
 
     def stated(error: Mapping[str, Any], analysis: Analysis) -> dict[str, Any]:
         limits = {"critical_stiffness": None, "critical_stiffness_db": None}
@@ -50,5 +55,6 @@ def errors(closed: Closed) -> dict[str, dict[str, Any]]:
 
     return {
         "before": stated(closed.before, closed.base),
+        "before_like_after": stated(alike, closed.base),
         "after": stated(closed.after, closed.analysis),
     }

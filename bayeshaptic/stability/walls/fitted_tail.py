@@ -7,6 +7,7 @@ that a risk that is stated for K_CR is stated for walls with damping, too.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -39,9 +40,7 @@ def fitted_boundary(
         columns = [part[:, level] for part in limits]
         place = np.searchsorted(joint.share[:, level], shares)
         samples = joint.places[np.minimum(place, len(joint.places) - 1), level]
-        value = low_quantile(
-            samples, risk, lambda at, own=columns: _effective_at(own, effective, at)
-        )
+        value = low_quantile(samples, risk, partial(_effective_at, columns, effective))
         if value is None:
             return None
         found[level] = min(max(value.value, 0.0), larger[level])
