@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_analysis import CASES, fake_analysis
 
-from bayeshaptic.report.figures import PICTURES
+from bayeshaptic.report.figures import PICTURES, marginals, stiffness
 from bayeshaptic.report.figures.pairs import correlation, strongest
 from bayeshaptic.report.figures.sampler import rank_histogram
 from bayeshaptic.report.figures.style import drawn
@@ -68,7 +69,7 @@ def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     yield drawn
 
 
-@pytest.mark.parametrize("case", ["grasped", "wide", "amperes", "table"])
+@pytest.mark.parametrize("case", ["grasped", "wide", "amperes", "table", "narrow"])
 def test_no_text_of_a_figure_covers_another_or_is_cut_off(
     case: str, drawn_texts: list[Any]
 ) -> None:
@@ -92,6 +93,35 @@ def test_no_text_of_a_figure_covers_another_or_is_cut_off(
                 wide = min(box.x1, other.x1) - max(box.x0, other.x0)
                 high = min(box.y1, other.y1) - max(box.y0, other.y0)
                 assert wide < 1.5 or high < 1.5, (picture.name, text, words)
+
+
+def test_decibels_of_a_limit_over_a_decade_have_room(drawn_texts: list[Any]) -> None:
+    analysis = fake_analysis("rigid")
+    samples = np.linspace(37.0, 275.0, len(analysis.limit.samples))
+    analysis.limit = replace(analysis.limit, samples=samples)
+    figure = stiffness.draw(analysis)
+    drawn_texts.clear()
+    figure.canvas.draw()
+    (top,) = figure.axes[0].child_axes
+    names = {text.get_text() for text in top.get_xticklabels()}
+    ends = sorted((box.x0, box.x1) for box, text in drawn_texts if text in names)
+    above = [pair for pair in ends if pair]
+    assert {"30", "40", "45"} <= names and len(above) >= 4
+    assert all(left[1] < right[0] for left, right in zip(above, above[1:], strict=False))
+
+
+def test_long_numbers_below_a_marginal_have_room(drawn_texts: list[Any]) -> None:
+    analysis = fake_analysis("grasped")
+    draws = np.array(analysis.stated.draws)
+    draws[:, 0] = np.linspace(0.18992, 0.19008, len(draws))  # known to 0.02 %
+    analysis.posterior = replace(analysis.posterior, chains=draws[None, :, None])
+    figure = marginals.draw(analysis)
+    drawn_texts.clear()
+    figure.canvas.draw()
+    long = [(box.x0, box.x1) for box, text in drawn_texts if text.startswith(("0.189", "0.190"))]
+    boxes = sorted(long)
+    assert len(boxes) >= 2
+    assert all(left[1] + 3 < right[0] for left, right in zip(boxes, boxes[1:], strict=False))
 
 
 def test_figures_are_the_same_in_threads_and_need_no_display() -> None:

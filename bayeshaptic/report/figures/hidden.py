@@ -25,6 +25,7 @@ def draw(hidden: Hidden) -> Figure:
     figure = style.new_figure(0.85 + 0.26 * max(len(shown), 1))
     axes = style.panel(figure.subplots(), "change of the critical stiffness, dB")
     axes.grid(False, axis="y")
+    axes.locator_params(axis="x", nbins=5)  # small changes have long numbers
     _declared(axes, hidden)
     for place, effect in enumerate(shown):
         low, middle, high = effect.shift_db

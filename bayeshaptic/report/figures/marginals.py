@@ -94,7 +94,12 @@ def _range(
 
 
 def _ticks(axes: Axes) -> None:
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import FixedLocator, MaxNLocator
 
-    axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 2.5, 5, 10]))
+    low, high = axes.get_xlim()
+    usual = MaxNLocator(3, steps=[1, 2, 2.5, 5, 10])
+    ticks = [tick for tick in usual.tick_values(low, high) if low <= tick <= high]
+    long = 6  # letters of a number that leave no room for three of them
+    crowded = len(ticks) > 2 and max(len(f"{tick:.7g}") for tick in ticks) >= long
+    axes.xaxis.set_major_locator(FixedLocator([ticks[0], ticks[-1]]) if crowded else usual)
     axes.ticklabel_format(axis="x", useOffset=False, style="plain")

@@ -126,13 +126,26 @@ def _decibel_axis(axes: Axes, row: Scale, unit: str) -> None:
     step = next(step for step in steps if (high - low) / step <= 7)
     ticks = np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
     top = axes.secondary_xaxis("top")
-    top.xaxis.set_major_locator(FixedLocator(list(10 ** (ticks / 20) * row.factor)))
+    places = _apart(axes, 10 ** (ticks / 20) * row.factor)
+    top.xaxis.set_major_locator(FixedLocator(places))
     top.xaxis.set_minor_locator(NullLocator())
     top.xaxis.set_minor_formatter(NullFormatter())
-    places = max(-int(np.floor(np.log10(step) + 1e-9)), 0)
+    decimals = max(-int(np.floor(np.log10(step) + 1e-9)), 0)
     top.xaxis.set_major_formatter(
-        FuncFormatter(lambda value, _: f"{decibel(value / row.factor):.{places}f}")
+        FuncFormatter(lambda value, _: f"{decibel(value / row.factor):.{decimals}f}")
     )
     top.tick_params(labelsize=style.FONT - 0.5, width=0.6, length=3)
     top.spines["top"].set_linewidth(0.6)
     top.set_xlabel(f"dB re 1 {unit}", fontsize=style.FONT)
+
+
+def _apart(axes: Axes, places: NDArray[Any]) -> list[float]:
+    """Those of ascending places whose numbers have room: decibels crowd at the soft end."""
+    ends = np.column_stack([places, np.ones(len(places))])
+    across = (axes.transScale + axes.transLimits).transform(ends)[:, 0]
+    room = 0.07  # of the axis
+    kept: list[int] = []
+    for index in reversed(range(len(places))):
+        if not kept or across[kept[-1]] - across[index] >= room:
+            kept.append(index)
+    return [float(places[index]) for index in reversed(kept)]

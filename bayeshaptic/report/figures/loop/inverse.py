@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import scale
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.loop.force_words import titles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,9 +60,10 @@ def _errors(axes: Axes, force: ForceExplained, unit: str) -> None:
     steps = force.further.steps
     row = scale(max(step.held_out_rms for step in steps), unit)
     errors = [row.factor * step.held_out_rms for step in steps]
-    names = ["linear", *(step.term.replace("_", " ") for step in steps[1:])]
-    bars = axes.barh(names, errors, color=style.MODEL, height=0.6)
+    known = titles(force.further)
+    names = ["mass, damper, constant", *(known[step.term] for step in steps[1:])]
+    bars = axes.barh(range(len(steps)), errors, color=style.MODEL, height=0.6)
     axes.bar_label(bars, fmt="%.3g", fontsize=style.SMALL, padding=2)
-    axes.invert_yaxis()
+    style.rows(axes, [textwrap.fill(name, 22) for name in names])
     axes.set_xlim(0, 1.15 * max(errors))
     style.panel(axes, f"error on the other half, {row.unit} rms", grid=False)

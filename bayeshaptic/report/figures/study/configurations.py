@@ -73,6 +73,6 @@ def _draw(axes: Axes, study: StudyAnalysis, one: ConfigurationLimits, band: Band
             markersize=3.8,
             linewidth=1.0,
             capsize=2.5,
-            label=None if labelled else "recordings, 90 %",
+            label=None if labelled else f"recordings, {who}",
         )
         labelled = True

@@ -99,6 +99,8 @@ def _row(
     ends = [decibel(limit.quantile(p)) for p in (0.05, 0.25, 0.5, 0.75, 0.95)]
     if not np.isfinite(ends).all():
         return
-    axes.plot([ends[0], ends[4]], [place, place], color=colour, linewidth=width)
-    axes.plot([ends[1], ends[3]], [place, place], color=colour, linewidth=2.8 * width)
+    # Caps would reach beyond the ends, and stand out behind the marker where a limit is well known.
+    bar: dict[str, Any] = {"color": colour, "solid_capstyle": "butt"}
+    axes.plot([ends[0], ends[4]], [place, place], linewidth=width, **bar)
+    axes.plot([ends[1], ends[3]], [place, place], linewidth=2.8 * width, **bar)
     axes.plot([ends[2]], [place], marker, color=colour, markersize=4.5, markeredgecolor="white")
