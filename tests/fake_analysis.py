@@ -257,6 +257,7 @@ CASES: dict[str, dict[str, Any]] = {
     "feedback": {"notices": (FEEDBACK,), "title": LONG_NAME},
     "not-converged": {"converged": False},
     "table": {"table": True, "name": "rigid"},
+    "narrow": {"spread": 1e-4},
 }
 
 

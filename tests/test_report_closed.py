@@ -29,6 +29,7 @@ from bayeshaptic.report.assumptions import assumptions
 from bayeshaptic.report.figures import LOOP_PICTURES
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.loop.tables import (
     candidates,
     error_heads,
@@ -72,6 +73,29 @@ def test_errors_before_and_after_are_beside_one_measurement() -> None:
         "before, worst part",
         "after, worst part",
     )
+
+
+def test_a_response_with_a_force_taken_off_is_not_called_as_measured() -> None:
+    closed = fake_closed(misfit=13.0)
+    closed = replace(closed, analysis=closed.analysis)
+    closed.analysis.etfe = replace(closed.analysis.etfe)  # another one than before
+    (said,) = (text for text in headline(closed).details if "puts the limit at" in text)
+    assert "after dry (Coulomb) friction at the motor was taken off it" in said
+    assert "without a model" not in said
+    bare = headline(fake_analysis("grasped", misfit=13.0))
+    assert any("itself, without a model, puts the limit at" in text for text in bare.details)
+
+
+def test_several_effects_are_one_sentence() -> None:
+    assert listed([]) == "" and listed(["a"]) == "a" and listed(["a", "b"]) == "a and b"
+    closed = fake_closed()
+    (one,) = closed.effects
+    titles = ("cogging: a force that ripples along the way", "compliant base", "gravity")
+    state = closed.traced.state
+    several = tuple(replace(one, title=title) for title in titles)
+    traced = replace(closed.traced, state=replace(state, accepted=several))
+    text = in_short(replace(closed, traced=traced))
+    assert f"lacked {titles[0]}, a compliant base and gravity; here they are" in text
 
 
 def test_an_effect_that_changes_little_is_said_so() -> None:

@@ -9,6 +9,7 @@ from bayeshaptic.models.structures import QUANTITIES
 from bayeshaptic.quantities import interval, pretty_unit, pure, quantity
 from bayeshaptic.recordings.signals.sweeps import is_sweep
 from bayeshaptic.report import words
+from bayeshaptic.report.listed import listed
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -106,7 +107,7 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
 def _constancy(analysis: Analysis, closed: Closed | None) -> str:
     found = [] if closed is None else closed.effects
     names = [effect.title for effect in found if effect.family in ("nonlinear", "time-varying")]
-    but = f", but for what was found ({' and '.join(names)})" if names else ""
+    but = f", but for what was found ({listed(names)})" if names else ""
     text = (
         f"The device is linear and does not change during the recording{but}. The limit is that "
         "of the linear part: it holds at amplitudes where dry friction no longer helps."

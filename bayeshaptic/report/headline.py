@@ -12,7 +12,7 @@ from bayeshaptic.quantities import estimate, percent, pretty_unit, pure, quantit
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.loop.words import in_short
-from bayeshaptic.report.numbers.estimates import decibel, own_limit
+from bayeshaptic.report.numbers.estimates import decibel, own_limit, read_off
 from bayeshaptic.report.numbers.misfit import misfit_is_faint
 from bayeshaptic.report.numbers.result import is_unexplained, tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
@@ -63,7 +63,7 @@ def headline(result: Result) -> Headline:
     analysis = result.analysis
     objections = why_none(result)
     if objections:
-        return _untrusted(analysis, objections, result.closed)
+        return _untrusted(result, objections, result.closed)
     limit = analysis.limit
     risk = next((r for r in HEADLINE_RISKS if limit.safe(r) is not None), None)
     if risk is None:
@@ -71,7 +71,7 @@ def headline(result: Result) -> Headline:
             "the sampler's draws are too few to state a risk of "
             f"{percent(HEADLINE_RISKS[-1])} (fewer than 20 of them lie below any such stiffness)"
         )
-        return _untrusted(analysis, (few,))
+        return _untrusted(result, (few,))
     if limit.safe(risk) == math.inf:
         sure = percent(1 - risk)
         unlimited = f"Nothing limits the stiffness: any is stable with a probability of {sure}."
@@ -80,9 +80,9 @@ def headline(result: Result) -> Headline:
 
 
 def _untrusted(
-    analysis: Analysis, objections: tuple[str, ...], closed: Closed | None = None
+    result: Result, objections: tuple[str, ...], closed: Closed | None = None
 ) -> Headline:
-    limit = analysis.limit
+    analysis, limit = result.analysis, result.analysis.limit
     sentence = f"Do not ship a stiffness from this report: {_joined(objections)}."
     middle, low, high = (limit.quantile(p) for p in (0.5, 0.05, 0.95))
     shown = estimate(middle, low, high, limit.unit)
@@ -102,7 +102,7 @@ def _untrusted(
     if own is not None and not has_feedback(analysis.notices):
         low, middle, high = own
         details.append(
-            "The measured response itself, without a model, puts the limit at "
+            f"The measured response {read_off(result)} puts the limit at "
             f"{estimate(middle, low, high, limit.unit)}. What misleads the model may mislead that, "
             "too."
         )
@@ -126,9 +126,9 @@ def _recommended(result: Result, risk: float) -> Headline:
         )
     else:
         sentence = (
-            f"Stay below {stated.with_level}: the measured response itself puts the limit lower "
-            f"than the model does ({quantity(safe, limit.unit)} at {percent(risk)} risk), and the "
-            "two must agree before the model's figure is used."
+            f"Stay below {stated.with_level}: the measured response {read_off(result)} puts the "
+            f"limit lower than the model does ({quantity(safe, limit.unit)} at {percent(risk)} "
+            "risk), and the two must agree before the model's figure is used."
         )
     details = [] if closed is None else [text for text in (in_short(closed),) if text]
     details += _of_the_limit(analysis, stated.value, ends)

@@ -158,7 +158,8 @@ def measured(analysis: Analysis) -> Rows:
         rows.append(("Measurement", "a frequency response table, without its recording"))
     else:
         rows.append(("Recording", recording.name))
-        rows.append(("Held by", recording.user or "no user named"))
+        who = "somebody" if analysis.model.held else "nobody"
+        rows.append(("Held by", recording.user or f"no user named; by the model {who}"))
         for title, value in (
             ("Configuration", recording.configuration),
             ("Trial", recording.trial),

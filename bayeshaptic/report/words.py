@@ -164,7 +164,9 @@ def _apart(analysis: Analysis, own: Witness) -> str:
     overlap = own.low <= limit.quantile(0.95) and limit.quantile(0.05) <= own.high
     side = "above" if difference > 0 else "below"
     verdict = "their 90 % intervals overlap" if overlap else "their 90 % intervals do not overlap"
-    text = f"The model's median lies {abs(difference):.2f} dB {side} that, and {verdict}."
+    shown = f"{abs(difference):.2f}"
+    where = f"lies {shown} dB {side} that" if float(shown) else "is the same to 0.01 dB"
+    text = f"The model's median {where}, and {verdict}."
     low, high = limit.quantile(0.05), limit.quantile(0.95)
     if min(own.low, low) <= 0:
         return text

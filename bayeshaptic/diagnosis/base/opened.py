@@ -23,10 +23,15 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
-from bayeshaptic.recordings.through_reference import through_reference, too_weak, unusable
+from bayeshaptic.recordings.through_reference import through_reference, too_weak
 from bayeshaptic.threads import single_threaded
 
 _WIDEST = 0.4  # of the sampling rate: a band's upper end
+_NEEDS_NONE = Notice(
+    "note",
+    "reference",
+    "The reference is not used: one mass is followed in time, which needs none.",
+)
 MOST_PERIODS = 100  # of a loop's delay: haptic loops have one or two, across a network some tens
 
 
@@ -82,7 +87,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             notices += told(measurement.feedback, check_recording(whole, device))
             if one_mass:  # followed in time instead
                 if measurement.reference is not None and has_feedback(notices):
-                    notices += (unusable("one mass is followed in time, which needs none"),)
+                    notices += (_NEEDS_NONE,)
                 measurement = replace(measurement, reference=None)
             else:
                 measurement, notices = through_reference(measurement, notices)

@@ -9,6 +9,7 @@ import numpy as np
 
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.report.figures.style import short
+from bayeshaptic.report.listed import listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,7 +87,7 @@ def _lead(shares: VarianceShares) -> str:
     spread = f"± {pure(_DB * shares.log_sd, 2)} dB (one standard deviation)"
     if not parts:
         return f"The critical stiffness is known to {spread}. No parameter stands out in that."
-    text = f"The critical stiffness is known to {spread}. That comes from {_listed(parts)}."
+    text = f"The critical stiffness is known to {spread}. That comes from {listed(parts)}."
     return f"{text} {_DOUBT}" if shares.beyond >= _NAMED else text
 
 
@@ -99,7 +100,7 @@ def _name(share: Share) -> str:
     names = [short(name) for name in share.names]
     if len(names) == 1:
         return names[0]
-    return f"{_listed(names)} together"
+    return f"{listed(names)} together"
 
 
 def _overlap(shares: VarianceShares) -> str:
@@ -202,7 +203,3 @@ def _next(shares: VarianceShares, experiments: Sequence[Experiment]) -> str:
 
 def _lower(label: str) -> str:
     return label if label.startswith("Nyquist") else label[:1].lower() + label[1:]
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import interval, pure, quantity
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.misfit import is_far_off
 from bayeshaptic.report.numbers.unstated import unstated
 
@@ -35,7 +36,7 @@ def remainder(closed: Closed) -> tuple[str, ...]:
     where = "" if top.frequency_hz is None else f", around {quantity(top.frequency_hz, 'Hz')}"
     first = (
         f"There is something {more}here that has no name in the library. Its class is "
-        f"{' and '.join(families)}{where}: {top.text} (noticed from {pure(top.threshold)} on). "
+        f"{listed(families)}{where}: {top.text} (noticed from {pure(top.threshold)} on). "
         f"{_tried(closed)}"
     )
     advice = [MEASURE_NEXT[family] for family in families if family in MEASURE_NEXT]

@@ -14,6 +14,7 @@ from bayeshaptic.quantities import (
 )
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import is_certain
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop.change_words import error_change, limit_change, moved, noise_change
 from bayeshaptic.report.loop.motion_words import determined
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 _OVER = "_last_over_first"
 _WORST = "worst_part"  # the evidence says which
 # Titles with one of these words take no article.
-_UNCOUNTABLE = {"backlash", "damping", "delay", "drag", "friction", "quantisation", "stiffness"}
+_UNCOUNTABLE = {"backlash", "cogging", "damping", "delay", "drag", "friction", "gravity", "jitter"}
+_UNCOUNTABLE |= {"quantisation", "stiffness"}
 _PLURAL = {"rows", "samples", "saturation", "steps"}
 
 
@@ -71,7 +73,7 @@ def lacked(closed: Closed) -> str:
     parts = []
     for what, effects in (("the recording has", measured), ("the model lacked", added)):
         named = [f"{_with_article(e.title)}{_numbers(closed, e)}" for e in effects]
-        parts += [f"{what} {' and '.join(named)}"] if named else []
+        parts += [f"{what} {listed(named)}"] if named else []
     text = "; ".join(parts)
     count = sum(_count(effect) for effect in added)
     size = f" ({count} parameter{'' if count == 1 else 's'})" if count else ""
@@ -99,7 +101,7 @@ def in_short(closed: Closed) -> str:
     if not closed.effects:
         return ""
     measured, added = (
-        " and ".join(_with_article(effect.title) for effect in effects)
+        listed(_with_article(effect.title) for effect in effects)
         for effects in _measured_and_added(closed)
     )
     found = []
@@ -224,7 +226,7 @@ def _numbers(closed: Closed, effect: Accepted) -> str:
 
 
 def _with_article(title: str) -> str:
-    words = set(pretty_unit(title).lower().replace("(", "").replace(")", "").split())
+    words = {word.strip("():") for word in pretty_unit(title).lower().split()}
     if title.startswith(("a ", "an ", "the ")) or words & (_UNCOUNTABLE | _PLURAL):
         return title
     return f"{'an' if title[0].lower() in 'aeiou' else 'a'} {title}"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.result import families_of
 
 if TYPE_CHECKING:
@@ -98,7 +99,14 @@ def correction(result: Result) -> str:
     if not found:
         return ""
     helped = " with the model's help" if any(e.family == "nonlinear" for e in found) else ""
-    return f"after {' and '.join(e.title for e in found)} was taken off it{helped}"
+    were = "was" if len(found) == 1 else "were"
+    return f"after {listed(e.title for e in found)} {were} taken off it{helped}"
+
+
+def read_off(result: Result) -> str:
+    """How the crossing that stands beside the model was read: after "the measured response"."""
+    changed = correction(result)
+    return f"{changed}," if changed else "itself, without a model,"
 
 
 def _measured(result: Result) -> tuple[Witness, ...]:

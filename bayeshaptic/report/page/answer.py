@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import estimate, percent
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.hidden import in_short
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
@@ -107,7 +108,7 @@ def _model(result: Result) -> str:
     text = f"{structure.name}: {structure.title.partition(', equation')[0]}"
     added = [] if closed is None else [e.title for e in closed.effects if e.family != "measurement"]
     if added:
-        text += f"; with {' and '.join(added)}"
+        text += f"; with {listed(added)}"
     return text
 
 

@@ -64,7 +64,9 @@ def lights(result: Result) -> tuple[Light, ...]:
 
 def _recording(analysis: Analysis) -> Light:
     found = {n.topic for n in analysis.notices if n.level == "warning"} - _ELSEWHERE
-    for topic in found & _SPOILING:
+    # Feedback spoils the response, and not what a motion says that was followed through it.
+    spoiling = _SPOILING - ({"feedback"} if analysis.in_loop is not None else set())
+    for topic in found & spoiling:
         return Light("Recording", BAD, topic, "notices")
     if found:
         return Light("Recording", DOUBT, ", ".join(sorted(found)), "notices")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import interval, quantity
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.loop.motion_words import motion_words
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.version import __version__
@@ -126,7 +127,7 @@ def _laws(analysis: Analysis) -> str:
     titles = [law.effect.title for law in analysis.in_loop.laws]
     if analysis.in_loop.motion.hums:
         titles.append("tones")
-    return f", with {' and '.join(titles)}, which its error called for" if titles else ""
+    return f", with {listed(titles)}, which its error called for" if titles else ""
 
 
 def _model(analysis: Analysis) -> str:
@@ -157,10 +158,14 @@ def _loop(result: Result) -> tuple[str, ...]:
     closed = result.closed
     if closed is None:
         return ()
-    found = " and ".join(effect.title for effect in closed.effects)
+    found = listed(effect.title for effect in closed.effects)
     count = len(closed.traced.before)
     text = f"The residual was put to {count} tests for effects that the model lacks"
-    text += f", and {found} was added." if found else "; none was added."
+    text += (
+        f", and {found} {'was' if len(closed.effects) == 1 else 'were'} added."
+        if found
+        else "; none was added."
+    )
     if is_unexplained(result):
         text += " What remained unexplained widens limit and parameters by a random discrepancy "
         text += "[kennedy2001]."

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from bayeshaptic.quantities import percent, quantity, rounded_down
 from bayeshaptic.report.headline import Headline, headline, sentence_of, warned_of
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.cases import is_free
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.report.status import CAUTION, UNTRUSTED, status_of
-from bayeshaptic.report.study.words import listed, missing
+from bayeshaptic.report.study.words import missing
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.quantities import estimate, percent, pure
+from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.bands import band_of
 from bayeshaptic.report.numbers.cases import is_free
 from bayeshaptic.report.numbers.estimates import decibel
@@ -175,13 +176,6 @@ def missing(study: StudyAnalysis) -> tuple[str, ...]:
 
 def _median_db(cases: list[Case]) -> float:
     return min(decibel(case.limit.quantile(0.5)) for case in cases)
-
-
-def listed(parts: list[str]) -> str:
-    """ "a, b and c"."""
-    if len(parts) < 2:
-        return "".join(parts)
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def configurations(study: StudyAnalysis) -> tuple[str, ...]:

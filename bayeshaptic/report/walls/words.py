@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import Scale, percent, percents, pure, quantity, rounded_down, scale
+from bayeshaptic.report.listed import listed
 from bayeshaptic.stability.tail import quantiles
 
 if TYPE_CHECKING:
@@ -182,7 +183,7 @@ def _rules(rules: Rules) -> str:
     ]
     return (
         "Abbott and Okamura's rule for coarse encoders, K ≤ min(2b/T, 2fc/Δ), is left out: "
-        f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not known here."
+        f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} not known here."
     )
 
 
