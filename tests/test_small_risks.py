@@ -117,6 +117,16 @@ def test_a_tail_of_two_humps_is_not_fitted():
     assert low_quantile(high[:300], 0.001, lambda _: 300.0) is None  # too few
 
 
+def test_an_error_that_no_use_asks_for_is_small_enough() -> None:
+    # 5 % of 900 draws: an exponential tail at 0.1 % has a third of the 90 % interval for an error.
+    samples = 1e4 - np.random.default_rng(4).exponential(size=900)
+    alone = low_quantile(samples, 0.001, lambda _: 900.0)
+    assert alone is None
+    found = low_quantile(samples, 0.001, lambda _: 900.0, enough=100.0)
+    assert found is not None and found.fitted
+    assert found.value == pytest.approx(1e4 + np.log(0.001), abs=3 * found.error)
+
+
 def test_what_was_found_of_all_draws_is_not_taken_for_what_a_thinned_run_holds():
     whole = independent(40)
     half = critical_stiffness(Chains(whole.model, whole.chains[:, :20]))

@@ -3,7 +3,7 @@
 Where 20 effective draws lie below a quantile of the draws, it is stated as it is.  Beyond that a
 generalised Pareto distribution is fitted to the lowest draws, as in Pareto smoothed importance
 sampling, and its quantile is stated; the fit must pass a test of Kolmogorov and Smirnov, and its
-error be small beside the central 90 % interval.
+error be small beside the central 90 % interval, or beside what a caller has a use for.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class LowQuantile:
 
 
 def low_quantile(
-    samples: Floats, risk: float, effective: Callable[[float], float]
+    samples: Floats, risk: float, effective: Callable[[float], float], enough: float = 0.0
 ) -> LowQuantile | None:
     """The quantile at `risk` of what `samples`, shape (n,), are draws of.
 
@@ -61,8 +61,10 @@ def low_quantile(
     effective : callable
         From a threshold to the number of independent draws that would give the share of samples
         below it as well.
+    enough : float
+        An error that is small enough for any use, however narrow the interval is.
     """
-    if 2 * risk <= LARGEST and low_quantile(samples, 2 * risk, effective) is None:
+    if 2 * risk <= LARGEST and low_quantile(samples, 2 * risk, effective, enough) is None:
         return None
     ordered = np.sort(samples)
     own = quantile_with_error(ordered, risk, effective)
@@ -73,7 +75,7 @@ def low_quantile(
     while share > risk:  # the same tails for all risks: none is stated where a larger one is not
         tail = _fitted(ordered, risk, share, effective)
         if tail is not None:
-            return tail if tail.error <= PRECISE * (high - low) else None
+            return tail if tail.error <= max(PRECISE * (high - low), enough) else None
         share /= 2
     return None
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Damping
-from bayeshaptic.stability.walls.fitted_tail import fitted_boundary
+from bayeshaptic.stability.walls.fitted_tail import effective_of, fitted_boundary
 from bayeshaptic.stability.walls.joint import (
     JointRegion,
     Lowest,
@@ -110,12 +110,16 @@ def filter_limits(
         )
         tails = tuple(tail.at(levels) for tail in tails)
     ordered = tuple(np.sort(part, axis=0) for part in limits)
-    return _with_fitted(FilterLimits(region, levels, ordered, tails), risks)
+    return _with_fitted(cases, FilterLimits(region, levels, ordered, tails), risks)
 
 
-def _with_fitted(part: FilterLimits, risks: tuple[float, ...]) -> FilterLimits:
+def _with_fitted(
+    cases: Sequence[Case], part: FilterLimits, risks: tuple[float, ...]
+) -> FilterLimits:
     """With tails fitted for the risks that draws do not say; none below one that is not stated."""
-    effective = [region.effective for region in part.region.regions]
+    effective = [
+        effective_of(case.limit, len(own)) for case, own in zip(cases, part.limits, strict=True)
+    ]
     larger = np.full(len(part.damping), np.inf)
     for risk in sorted(risks, reverse=True):
         if part.boundary(risk) is None:

@@ -6,18 +6,26 @@ that a risk that is stated for K_CR is stated for walls with damping, too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 
 import numpy as np
 
+from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.tail import low_quantile
 from bayeshaptic.stability.walls.joint import lowest
 from bayeshaptic.types import Floats
 
+_NOTHING = 0.01  # of the stiffest wall
+_ALIKE = 0.01  # of a stiffness: 0.1 dB, less than any use asks for; but no less than
+_STEEP = 0.5  # times that of the stiffest, since the boundary falls steeply at its ends
+
 
 def fitted_boundary(
-    limits: Sequence[Floats], effective: Sequence[float], risk: float, larger: Floats
+    limits: Sequence[Floats],
+    effective: Sequence[Callable[[float], float]],
+    risk: float,
+    larger: Floats,
 ) -> Floats | None:
     """The stiffness at a small risk at each damping, shape (J,); None where no tail says it.
 
@@ -25,8 +33,9 @@ def fitted_boundary(
     ----------
     limits : sequence of ndarray, shapes (n_c, J)
         Of each case, each column in ascending order; cases are independent.
-    effective : sequence of float
-        Effective number of draws of each case.
+    effective : sequence of callable
+        Of each case, from a share of the lowest limits to the effective number of draws that it is
+        counted from; see `effective_of`.
     risk : float
     larger : ndarray, shape (J,)
         The stiffness at a larger risk, which that at a smaller one is never above.
@@ -34,27 +43,47 @@ def fitted_boundary(
     joint = lowest(limits, [len(part) for part in limits])
     count = max(len(part) for part in limits)
     shares = (np.arange(count) + 0.5) / count
-    found = np.zeros(len(larger))
-    # Where as many draws as the risk have no stable wall at all, there is nothing to fit: 0 it is.
-    for level in np.flatnonzero((larger > 0) & (joint.quantile(risk) > 0)):
+    found = joint.quantile(risk)
+    # Where as many draws as the risk have no stable wall, or hardly any, there is nothing to fit.
+    stiffest = float(found.max())
+    for level in np.flatnonzero(found > _NOTHING * stiffest):
         columns = [part[:, level] for part in limits]
         place = np.searchsorted(joint.share[:, level], shares)
         samples = joint.places[np.minimum(place, len(joint.places) - 1), level]
-        value = low_quantile(samples, risk, partial(_effective_at, columns, effective))
+        worth = partial(_effective_at, columns, effective)
+        enough = _ALIKE * max(float(found[level]), _STEEP * stiffest)
+        value = low_quantile(samples, risk, worth, enough)
         if value is None:
             return None
-        found[level] = min(max(value.value, 0.0), larger[level])
-    return found
+        found[level] = max(value.value, 0.0)
+    return np.minimum(found, larger)
 
 
-def _effective_at(columns: Sequence[Floats], effective: Sequence[float], stiffness: float) -> float:
+def effective_of(limit: CriticalStiffness, kept: int) -> Callable[[float], float]:
+    """Of `kept` draws of a limit, the effective number behind a share of the lowest.
+
+    Which draws have the lowest limits over damping changes from step to step of the sampler as
+    which have the lowest without.
+    """
+
+    @cache
+    def behind(share: float) -> float:
+        return min(float(kept), limit.effective_at(limit.quantile(share)))
+
+    return lambda share: behind(round(share, 4))
+
+
+def _effective_at(
+    columns: Sequence[Floats], effective: Sequence[Callable[[float], float]], stiffness: float
+) -> float:
     """Independent draws that the share below a stiffness is as well known from.
 
-    As in `DeviceLimit.effective_at`, with one effective number for each case.
+    As in `DeviceLimit.effective_at`.
     """
-    shares = [np.searchsorted(own, stiffness) / len(own) for own in columns]
+    shares = [float(np.searchsorted(own, stiffness) / len(own)) for own in columns]
+    draws = [behind(share) for behind, share in zip(effective, shares, strict=True)]
     if max(shares) >= 1 or max(shares) == 0:
-        return float(min(effective))
+        return min(draws)
     above = float(np.prod([1 - share for share in shares]))
-    variance = sum(s / (1 - s) / n for s, n in zip(shares, effective, strict=True))
+    variance = sum(s / (1 - s) / n for s, n in zip(shares, draws, strict=True))
     return float((1 - above) / (above * variance))
