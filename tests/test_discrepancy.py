@@ -22,7 +22,7 @@ from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import read_recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.stability.binding import BindingCrossing, moved
+from bayeshaptic.stability.binding import BindingCrossing, as_known
 from bayeshaptic.stability.critical import critical_stiffness
 
 
@@ -238,12 +238,14 @@ def test_the_end_of_a_gains_course_is_known_as_its_neighbours_agree() -> None:
 
 def test_a_crossing_is_named_where_it_binds() -> None:
     """A measured arm's page said 0.273 Hz in one table and 20 Hz in the other."""
-    crossing = BindingCrossing("rigid body at 0.273 Hz", 0.273, 0.98)
-    there = np.array([19.0, 19.9, 1500.0])
-    assert moved(crossing, there).label == "rigid body at 19.9 Hz"
-    assert moved(crossing, 100 * there).label == "rigid body at 1.99 kHz"
-    assert moved(crossing, np.array([0.25, 0.3])) == crossing
-    assert moved(crossing, np.array([])) == crossing
+    known = BindingCrossing("rigid body at 0.273 Hz", 0.273, 0.98)
+    far = BindingCrossing("rigid body at 19.9 Hz", 19.9, 0.4)
+    near = BindingCrossing("rigid body at 0.3 Hz", 0.3, 0.3)
+    nearer = BindingCrossing("rigid body at 0.27 Hz", 0.27, 0.2)
+    other = BindingCrossing("vibration mode at 0.3 Hz", 0.3, 0.1)
+    crossings, group = as_known((far, near, nearer, other), np.arange(4), (known,))
+    assert crossings == (far, replace(known, probability=0.5), other)
+    assert group.tolist() == [0, 1, 1, 2]
     closed = fake_closed("unexplained", "linear")
     one = closed.analysis
     wide = with_discrepancy(one.limit, one.posterior, one.fit, one.fit, closed.traced)
@@ -252,3 +254,21 @@ def test_a_crossing_is_named_where_it_binds() -> None:
         assert len(bound) > 0
         assert found.probability == pytest.approx(len(bound) / len(wide.samples))
         assert found.frequency_hz == pytest.approx(np.median(bound), rel=0.25)
+
+
+def test_crossings_of_a_bent_response_are_told_apart_by_their_frequency(monkeypatch) -> None:
+    """A page named one crossing at 79 Hz, with 100 %, and had 21 Hz for its 5 % quantile."""
+    closed = fake_closed("unexplained", "linear")
+    one, rng = closed.analysis, np.random.default_rng(0)
+
+    def bent(g: np.ndarray, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        low = rng.random(len(g)) < 0.3
+        return np.where(low, 15e3, 22e3), np.where(low, 8.0, 103.0) * rng.uniform(0.99, 1.01)
+
+    monkeypatch.setattr("bayeshaptic.diagnosis.widening.discrepancy._lowest_crossing", bent)
+    wide = with_discrepancy(one.limit, one.posterior, one.fit, one.fit, closed.traced)
+    first, second = wide.crossings
+    assert first == replace(one.limit.crossings[0], probability=first.probability)
+    assert second.label.startswith("rigid body at") and second.frequency_hz < 9
+    assert second.probability == pytest.approx(0.3, abs=0.05)
+    assert np.all(wide.frequency_hz[wide.group == 1] < 9)

@@ -102,7 +102,7 @@ def _untrusted(
     if own is not None and not has_feedback(analysis.notices):
         low, middle, high = own
         details.append(
-            f"The measured response {read_off(result)} puts the limit at "
+            f"The measured response{read_off(result)} puts the limit at "
             f"{estimate(middle, low, high, limit.unit)}. What misleads the model may mislead that, "
             "too."
         )
@@ -126,7 +126,7 @@ def _recommended(result: Result, risk: float) -> Headline:
         )
     else:
         sentence = (
-            f"Stay below {stated.with_level}: the measured response {read_off(result)} puts the "
+            f"Stay below {stated.with_level}: the measured response{read_off(result)} puts the "
             f"limit lower than the model does ({quantity(safe, limit.unit)} at {percent(risk)} "
             "risk), and the two must agree before the model's figure is used."
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -112,19 +113,36 @@ def group_crossings(kinds: Ints, frequency_hz: Floats) -> tuple[tuple[BindingCro
     return tuple(crossing for crossing, _ in found), group
 
 
-def moved(crossing: BindingCrossing, places: Floats) -> BindingCrossing:
-    """The crossing with the frequency where it is now; as it was where it hardly went.
+def as_known(
+    crossings: tuple[BindingCrossing, ...], group: Ints, known: Iterable[BindingCrossing]
+) -> tuple[tuple[BindingCrossing, ...], Ints]:
+    """Crossings and groups as of `group_crossings`, by the names that they have elsewhere.
 
-    What a model leaves over may bend its response so that the phase crosses elsewhere.
+    What a model leaves over bends its response, so that the phase crosses a little beside where it
+    does without, which is the same crossing, or at another place altogether.
     """
-    hardly = 0.25  # of the frequency: as far as the draws of one crossing lie apart anyway
-    if crossing.frequency_hz is None or len(places) == 0:
-        return crossing
-    median = float(np.median(places))
-    if abs(median - crossing.frequency_hz) <= hardly * crossing.frequency_hz:
-        return crossing
-    title = crossing.label.partition(" at ")[0]
-    return replace(crossing, label=title + _at(median), frequency_hz=median)
+    names = [_known_as(one, known) for one in crossings]
+    labels = list(dict.fromkeys(one.label for one in names))
+    joined = tuple(
+        replace(
+            next(one for one in names if one.label == label),
+            probability=sum(one.probability for one in names if one.label == label),
+        )
+        for label in labels
+    )
+    return joined, np.array([labels.index(one.label) for one in names])[group]
+
+
+def _known_as(crossing: BindingCrossing, known: Iterable[BindingCrossing]) -> BindingCrossing:
+    beside = 0.25  # of the frequency: as far as the draws of one crossing lie apart anyway
+    kind = crossing.label.partition(" at ")[0]
+    for one in known:
+        if crossing.frequency_hz is None or one.frequency_hz is None:
+            continue
+        near = abs(crossing.frequency_hz - one.frequency_hz) <= beside * one.frequency_hz
+        if near and one.label.partition(" at ")[0] == kind:
+            return replace(one, probability=crossing.probability)
+    return crossing
 
 
 def _at(hertz: float) -> str:

@@ -22,7 +22,7 @@ from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.stability.binding import moved
+from bayeshaptic.stability.binding import as_known, binding_kinds, group_crossings
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
@@ -197,12 +197,12 @@ def _with_linear(
     assert period is not None
     grid = 1500
     frequency = np.geomspace(0.05 * fit.frequency_hz.min(), 0.5 / period, grid)
-    found = deviation(fit)
+    bend = deviation(fit)
     # Below the band the mechanism alone speaks; above it the deviation may go on.
-    beyond = np.arange(found.log_f[-1] + 0.05, np.log10(frequency[-1]), 0.05)
-    knots = np.concatenate([found.log_f, beyond])
+    beyond = np.arange(bend.log_f[-1] + 0.05, np.log10(frequency[-1]), 0.05)
+    knots = np.concatenate([bend.log_f, beyond])
     draws = 2000
-    delta = _draws_of_deviation(found, knots, draws, rng)
+    delta = _draws_of_deviation(bend, knots, draws, rng)
     rng.shuffle(delta)
     knots = np.concatenate([[knots[0] - 0.1], knots])
     delta = np.concatenate([np.zeros((draws, 1)), delta], axis=1)
@@ -222,15 +222,10 @@ def _with_linear(
         samples[rows], places[rows] = _lowest_crossing(g * np.exp(bent), frequency)
     kept = np.isfinite(samples)
     samples, places = samples[kept], places[kept]
-    centres = np.log([c.frequency_hz or 1e-9 for c in limit.crossings])
-    group = np.argmin(np.abs(np.log(places)[:, None] - centres[None, :]), axis=1)
-    bind, group = np.unique(group, return_inverse=True)
-    crossings = tuple(
-        moved(limit.crossings[one], places[group == i]) for i, one in enumerate(bind.tolist())
-    )
-    crossings = tuple(
-        replace(c, probability=float(np.mean(group == i))) for i, c in enumerate(crossings)
-    )
+    # A bent response may cross where none of the model's draws does: by what moves there.
+    system = fit.model.system(posterior.draws[pick[kept]])
+    bound = group_crossings(binding_kinds(system, places, period), places)
+    crossings, group = as_known(*bound, limit.crossings)
     return CriticalStiffness(samples, places, limit.unit, crossings, group, notices=limit.notices)
 
 

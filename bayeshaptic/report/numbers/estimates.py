@@ -106,7 +106,7 @@ def correction(result: Result) -> str:
 def read_off(result: Result) -> str:
     """How the crossing that stands beside the model was read: after "the measured response"."""
     changed = correction(result)
-    return f"{changed}," if changed else "itself, without a model,"
+    return f", {changed}," if changed else " itself, without a model,"
 
 
 def _measured(result: Result) -> tuple[Witness, ...]:
