@@ -14,7 +14,7 @@ from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.spectra import TableSpectra
+from bayeshaptic.recordings.response.table_spectra import TableSpectra
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability import critical_stiffness, etfe_critical_stiffness
 from bayeshaptic.stability.from_etfe import _caveat, _runs

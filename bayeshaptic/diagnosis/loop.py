@@ -1,14 +1,13 @@
 """Closing the loop: find the residual, trace it, add what explains it, and look again.
 
 One loop for every kind of excitation.  How candidates are fitted, and on what they are judged, is
-that of a `Trials`; what is accepted is in `bayeshaptic.diagnosis.acceptance`.
+that of its `Trials`; what is accepted is in `bayeshaptic.diagnosis.acceptance`.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Protocol
 
 from bayeshaptic.diagnosis import acceptance
 from bayeshaptic.diagnosis.battery import is_periodic
@@ -16,44 +15,12 @@ from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State, Trial, compared_errors, worth
 from bayeshaptic.diagnosis.traced import Candidate, Traced
+from bayeshaptic.diagnosis.trials.protocol import Trials
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.numerics.spending import BUDGET_S, RATE, Meter, counting
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.types import Progress, Tick
-
-
-class Trials(Protocol):
-    """How candidates are fitted to a kind of recording, and on what they are judged."""
-
-    @property
-    def first(self) -> State:
-        """The state that the loop begins with."""
-
-    def tests(self, state: State) -> tuple[Test, ...]:
-        """The tests of a state's residual."""
-
-    def mended(self, state: State) -> State:
-        """With what is wrong with the samples mended; the very same where nothing is."""
-
-    def explains(
-        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
-    ) -> bool | None:
-        """Whether an effect explains everything at first sight; None where that is no question."""
-
-    def trials(
-        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick, patient: bool = True
-    ) -> list[Trial]:
-        """Trials of every class that a test raises; at first sight where there is no patience."""
-
-    def beside(self, state: State) -> tuple[Test, ...]:
-        """Tests for another force beside those that a state has."""
-
-    def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
-        """With another law in the place of an earlier force, or the very same."""
-
-    def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
-        """Without the earlier effect that a later one made needless, or the very same."""
+from bayeshaptic.types import Progress
 
 
 def trials_for(etfe: Etfe, fit: Fit, like: Trials | None = None) -> Trials:

@@ -18,6 +18,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.diagnosis.residuals.columns import drift_velocity, line_transform
 from bayeshaptic.diagnosis.state import Change, State, fit_part, log_likelihoods
+from bayeshaptic.diagnosis.trials.taken_off import with_forces
 from bayeshaptic.effects.nonlinear.internal_force import (
     CONNECTION,
     LOAD,
@@ -32,7 +33,6 @@ from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress
-from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
@@ -278,24 +278,6 @@ class ForceBench:
 
     def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
         return log_likelihoods(self.model, windows, theta)
-
-
-def with_forces(etfe: Etfe, changes: Sequence[Change], sign: float = 1.0) -> Etfe:
-    """The measurement with what forces took off put back; with a sign of -1 once more without."""
-    own, spectra = etfe.recording, etfe.spectra
-    assert own is not None and isinstance(spectra, RandomSpectra)
-    for change in changes:
-        own = replace(
-            own,
-            force=own.force + sign * change.command,
-            position=own.position + sign * change.motion,
-        )
-        spectra = replace(
-            spectra,
-            force=spectra.force + sign * change.force,
-            position=spectra.position + sign * change.position,
-        )
-    return replace(etfe, spectra=spectra, recording=own)
 
 
 def _between(samples: Floats) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point, with_forces
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.force_search import (
     Variants,
     beside_others,
@@ -23,6 +23,7 @@ from bayeshaptic.diagnosis.trials.force_search import (
     worth_following,
 )
 from bayeshaptic.diagnosis.trials.force_slopes import spread
+from bayeshaptic.diagnosis.trials.taken_off import with_forces
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place

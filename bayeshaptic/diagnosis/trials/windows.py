@@ -13,10 +13,10 @@ from bayeshaptic.diagnosis.samples.mend import SampleLook, look_at_samples, repa
 from bayeshaptic.diagnosis.state import Change, State, Trial, fit_part, log_likelihoods
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.drift import drift_trials
-from bayeshaptic.diagnosis.trials.force_bench import with_forces
 from bayeshaptic.diagnosis.trials.linear import Sight, first_sight, linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import found_anew, nonlinear_trials, reconsidered
 from bayeshaptic.diagnosis.trials.ripples import ripple_trials
+from bayeshaptic.diagnosis.trials.taken_off import with_forces
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.numerics.spending import Meter

@@ -17,8 +17,8 @@ from bayeshaptic.recordings.response.spectra import (
     PeriodicSpectra,
     RandomSpectra,
     Spectra,
-    TableSpectra,
 )
+from bayeshaptic.recordings.response.table_spectra import TableSpectra
 from bayeshaptic.recordings.response.windows import Reference, Windows
 from bayeshaptic.shown import Shown, data_frame
 

@@ -22,7 +22,7 @@ from bayeshaptic.recordings.response.frf_kinds import (
     told,
     with_images_allowed_for,
 )
-from bayeshaptic.recordings.response.spectra import TableSpectra
+from bayeshaptic.recordings.response.table_spectra import TableSpectra
 from bayeshaptic.recordings.units import base_unit, choose_units
 from bayeshaptic.types import Complexes
 
