@@ -226,8 +226,9 @@ def test_what_one_mass_that_is_followed_sets_aside_is_said(given: dict, words: s
     level = "note" if given == {"model": "rigid"} else "warning"
     told = [n.text for n in closed.analysis.notices if n.level == level]
     assert any(words in text for text in told)
-    # The response is spoiled, the motion is not: the page does recommend what it says.
-    assert lights(closed)[0].state != "bad"
+    # The response is spoiled, the motion is not, where the page recommends what that says.
+    recommended = headline(closed).stiffness is not None
+    assert (lights(closed)[0].state == "bad") is not recommended
     doubted = replace(closed.analysis.in_loop, doubts=("in doubt",))
     result = replace(closed, analysis=replace(closed.analysis, in_loop=doubted))
     steps = next_steps(headline(result), result)

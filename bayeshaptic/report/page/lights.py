@@ -14,6 +14,7 @@ from bayeshaptic.report.numbers.misfit import (
     residual_is_noticed,
 )
 from bayeshaptic.report.numbers.result import is_unexplained
+from bayeshaptic.report.objections import why_none
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -59,13 +60,15 @@ class Light:
 def lights(result: Result) -> tuple[Light, ...]:
     """The four lights of a result."""
     analysis = result.analysis
-    return _recording(analysis), _fit(result), _loop(result), _sampler(analysis)
+    return _recording(result), _fit(result), _loop(result), _sampler(analysis)
 
 
-def _recording(analysis: Analysis) -> Light:
+def _recording(result: Result) -> Light:
+    analysis = result.analysis
     found = {n.topic for n in analysis.notices if n.level == "warning"} - _ELSEWHERE
     # Feedback spoils the response, and not what a motion says that was followed through it.
-    spoiling = _SPOILING - ({"feedback"} if analysis.in_loop is not None else set())
+    followed = analysis.in_loop is not None and not why_none(result)
+    spoiling = _SPOILING - ({"feedback"} if followed else set())
     for topic in found & spoiling:
         return Light("Recording", BAD, topic, "notices")
     if found:

@@ -123,7 +123,7 @@ def _with_fitted(
     larger = np.full(len(part.damping), np.inf)
     for risk in sorted(risks, reverse=True):
         if part.boundary(risk) is None:
-            fitted = fitted_boundary(part.limits, effective, risk, larger)
+            fitted = fitted_boundary(part.damping, part.limits, effective, risk, larger)
             if fitted is None:
                 break
             if part.tails is not None:  # what they say of a smaller risk is not above

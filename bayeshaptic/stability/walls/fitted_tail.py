@@ -17,11 +17,11 @@ from bayeshaptic.stability.walls.joint import lowest
 from bayeshaptic.types import Floats
 
 _NOTHING = 0.01  # of the stiffest wall
-_ALIKE = 0.01  # of a stiffness: 0.1 dB, less than any use asks for; but no less than
-_STEEP = 0.5  # times that of the stiffest, since the boundary falls steeply at its ends
+_ALIKE = 0.01  # of a stiffness, 0.1 dB, or of the damping where the boundary is steep
 
 
 def fitted_boundary(
+    damping: Floats,
     limits: Sequence[Floats],
     effective: Sequence[Callable[[float], float]],
     risk: float,
@@ -31,6 +31,8 @@ def fitted_boundary(
 
     Parameters
     ----------
+    damping : ndarray, shape (J,)
+        Ascending.
     limits : sequence of ndarray, shapes (n_c, J)
         Of each case, each column in ascending order; cases are independent.
     effective : sequence of callable
@@ -44,15 +46,17 @@ def fitted_boundary(
     count = max(len(part) for part in limits)
     shares = (np.arange(count) + 0.5) / count
     found = joint.quantile(risk)
+    if not np.isfinite(found).all():
+        return None
     # Where as many draws as the risk have no stable wall, or hardly any, there is nothing to fit.
-    stiffest = float(found.max())
-    for level in np.flatnonzero(found > _NOTHING * stiffest):
+    slope = np.gradient(found, damping) if len(damping) > 1 else np.zeros(1)
+    enough = _ALIKE * (found + damping * np.abs(slope))
+    for level in np.flatnonzero(found > _NOTHING * found.max()):
         columns = [part[:, level] for part in limits]
         place = np.searchsorted(joint.share[:, level], shares)
         samples = joint.places[np.minimum(place, len(joint.places) - 1), level]
         worth = partial(_effective_at, columns, effective)
-        enough = _ALIKE * max(float(found[level]), _STEEP * stiffest)
-        value = low_quantile(samples, risk, worth, enough)
+        value = low_quantile(samples, risk, worth, float(enough[level]))
         if value is None:
             return None
         found[level] = max(value.value, 0.0)
