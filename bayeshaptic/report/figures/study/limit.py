@@ -103,4 +103,6 @@ def _row(
     bar: dict[str, Any] = {"color": colour, "solid_capstyle": "butt"}
     axes.plot([ends[0], ends[4]], [place, place], linewidth=width, **bar)
     axes.plot([ends[1], ends[3]], [place, place], linewidth=2.8 * width, **bar)
-    axes.plot([ends[2]], [place], marker, color=colour, markersize=4.5, markeredgecolor="white")
+    # A wide edge would leave nothing of a small marker.
+    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.4}
+    axes.plot([ends[2]], [place], marker, color=colour, markersize=5.5, **edge)
