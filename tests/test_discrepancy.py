@@ -181,6 +181,19 @@ def test_what_friction_leaves_in_a_loop_widens_the_limit_by_its_share(monkeypatc
     assert np.quantile(ratio, [0.05, 0.95]) == pytest.approx([-0.9 * width, 0.9 * width], rel=0.05)
 
 
+@pytest.mark.parametrize("usual, widened", [(12.0, True), (None, False)])
+def test_what_a_raised_threshold_lets_pass_in_a_loop_widens_all_the_same(
+    monkeypatch, usual, widened
+) -> None:
+    """Half of the friction in a hand was found, and the limit lay above the truth by 2 %."""
+    closed = in_a_loop(100.0, 15.0)
+    after = tuple(replace(t, threshold=18.0, usual=usual) for t in closed.traced.after)
+    traced = replace(closed.traced, verdict="explained", after=after)
+    base = too_damped(closed.analysis.fit)
+    monkeypatch.setattr(Etfe, "direct", True)
+    assert bool(np.abs(log_ratios(closed, traced, base)).max() > 1e-3) == widened
+
+
 def test_a_small_rest_of_friction_may_stay() -> None:
     threshold = in_a_loop(100.0, 20.0).traced.after[0].threshold
     seen = 12 * threshold

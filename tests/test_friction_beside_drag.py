@@ -20,7 +20,9 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.objections import _rubs_otherwise
 
 
-def closed(statistic: float, held: bool = False, strength: str = "friction_force") -> Any:
+def closed(
+    statistic: float, held: bool = False, strength: str = "friction_force", direct: bool = False
+) -> Any:
     """A loop that explains a force, and leaves a test over the load's velocity."""
     left = residual.Test("sign(v2)", "nonlinear", statistic, 17.6, None, "", usual=4.4)
     found = Accepted("law", "law", "nonlinear", "", {strength: Estimate(1.0, 0.1, "N")})
@@ -29,6 +31,7 @@ def closed(statistic: float, held: bool = False, strength: str = "friction_force
         traced=SimpleNamespace(after=(left,)),
         effects=(found,),
         model=SimpleNamespace(held=held),
+        analysis=SimpleNamespace(etfe=SimpleNamespace(direct=direct)),
         force=None,
     )
 
@@ -40,6 +43,7 @@ def closed(statistic: float, held: bool = False, strength: str = "friction_force
         (closed(3.0), False),
         (closed(8.6, held=True), False),
         (closed(8.6, strength="half_gap"), True),
+        (closed(8.6, direct=True), False),  # what it would do is in the interval
     ],
 )
 def test_what_a_force_leaves_over_the_velocity_counts_where_nobody_holds(

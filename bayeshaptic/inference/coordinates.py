@@ -185,3 +185,10 @@ def reach(model: Model, prior_sds: float) -> tuple[Floats, Floats]:
     low = np.array([p.support[0] if p.coordinate == "linear" else p.quantile(tail) for p in priors])
     low = np.where(np.isfinite(low), low, [float(p.quantile(tail)) for p in priors])
     return low, np.array([float(p.quantile(1 - tail)) for p in priors])
+
+
+def believed(model: Model, here: Coordinates) -> Floats:
+    """Standard deviations of the priors in the coordinates, shape (P,)."""
+    ends = np.array([model.prior(name).quantile(np.array([0.16, 0.84])) for name in model.names])
+    low, high = (here.coordinate(end) for end in ends.T)
+    return np.asarray(0.5 * (high - low))

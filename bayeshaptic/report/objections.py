@@ -232,11 +232,13 @@ def _rubs_otherwise(closed: Closed) -> bool:
 
     After a force was taken off a test's threshold is higher.  Where nobody holds the device what is
     below it may be another force, which was looked for and not found: so it is of none of 17
-    recordings with one force or none, and of one of 18 with two.
+    recordings with one force or none, and of one of 18 with two.  In a loop that is fitted to all
+    lines what such a force would do to the limit is in its interval.
     """
     left = _left(closed)
     acts = any(effect.family == "nonlinear" for effect in closed.effects)
-    if acts and closed.force is None and not closed.model.held:
+    direct = closed.analysis.etfe.direct
+    if acts and closed.force is None and not (direct or closed.model.held):
         left |= {test.name for test in closed.traced.after if test.noticed}
     return bool(variables(left) & {VELOCITY, LOAD_VELOCITY, ALONG})
 

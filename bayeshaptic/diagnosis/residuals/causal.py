@@ -15,7 +15,7 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import columns, force_test, line_transform
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test, chi_square_score
-from bayeshaptic.inference.coordinates import coordinates
+from bayeshaptic.inference.coordinates import believed, coordinates
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
@@ -43,6 +43,16 @@ class Scores:
         share = self.covariance[new, known] @ inverse
         left = self.covariance[new, new] - share @ self.covariance[known, new]
         return Scores(self.score[new] - share @ self.score[known], left, self.size[new])
+
+    def followed(self, spread: Floats) -> tuple[float, ...]:
+        """How far the first changes go, fitted anew, with a unit of the last one.
+
+        `spread` are the standard deviations of their priors: what only these know stays there.
+        """
+        own, size = slice(0, len(spread)), self.size[: len(spread)]
+        known = self.covariance[own, own] * np.outer(size, size) + np.diag(spread**-2)
+        along = self.covariance[own, -1] * size * self.size[-1]
+        return tuple((-np.linalg.solve(known, along)).tolist())
 
 
 def causal_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
@@ -124,11 +134,11 @@ def _force_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
     found = []
     moved = columns(fit, recording, frequency_hz, at_lines, in_loop=True)
     for name, (inputs, rms) in moved.items():
-        score, sd = _beside_linear(fit, etfe, smooth, inputs[0])
-        found.append(force_test(name, abs(score), ForceSeen(score * sd, sd, rms)))
+        score, sd, moves = _beside_linear(fit, etfe, smooth, inputs[0])
+        found.append(force_test(name, abs(score), ForceSeen(score * sd, sd, rms, moves)))
     time = np.linspace(-1.0, 1.0, recording.samples)
     later = fit.response(frequency_hz) * at_lines(recording.force * time)
-    score, _ = _beside_linear(fit, etfe, smooth, later)
+    score, _, _ = _beside_linear(fit, etfe, smooth, later)
     text = f"a gain that changes in time stands {abs(score):.1f} standard deviations out"
     test = Test("gain in time", "time-varying", abs(score), thresholds.two_sided(), None, text)
     return [*found, test]
@@ -136,11 +146,14 @@ def _force_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
 
 def _beside_linear(
     fit: Fit, etfe: Etfe, smooth: Complexes, motion: Complexes
-) -> tuple[float, float]:
-    """Score of a motion, and the standard deviation of its strength."""
+) -> tuple[float, float, tuple[float, ...]]:
+    """Score of a motion, the standard deviation of its strength, and what a unit of it moves."""
     windows = etfe.spectra.windows(fit.response, motion[None])
-    found = scores(fit, windows, smooth).beside(smooth.shape[2])
+    every = scores(fit, windows, smooth)
+    found = every.beside(smooth.shape[2])
     information = float(found.covariance[0, 0])
     if information < _LEAST:
-        return 0.0, np.inf
-    return float(found.score[0] / information**0.5), float(1 / (found.size[0] * information**0.5))
+        return 0.0, np.inf, ()
+    spread = believed(fit.model, coordinates(fit.model))
+    sd = float(1 / (found.size[0] * information**0.5))
+    return float(found.score[0] / information**0.5), sd, every.followed(spread)

@@ -31,11 +31,15 @@ class ForceSeen:
         In the unit of force.
     rms : float
         Of the motion.
+    moves : tuple of float
+        How far a unit of it, in the model, moves the fitted parameters' coordinates; empty where
+        nobody asked.
     """
 
     strength: float
     sd: float
     rms: float
+    moves: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

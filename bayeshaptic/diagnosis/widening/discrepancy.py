@@ -17,6 +17,7 @@ import numpy as np
 from bayeshaptic.diagnosis.residuals.excess import changing_share, noise_besides
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced, share_left
 from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern
+from bayeshaptic.diagnosis.widening.forces_left import forces_left
 from bayeshaptic.diagnosis.widening.friction import with_friction_for_damping
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
@@ -26,6 +27,7 @@ from bayeshaptic.stability.binding import as_known, binding_kinds, group_crossin
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
+_FARTHEST = 2.3  # log stiffness that a rest may take a limit: a factor of ten
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -60,7 +62,8 @@ def with_discrepancy(
     left = flagged if traced.verdict == UNEXPLAINED else set()
     if "linear" in left and not traced.state.etfe.direct:
         limit = _with_linear(limit, posterior, fit, rng)
-    elif "linear" in left:  # windows that feedback biases do not show how the response deviates
+    elif traced.state.etfe.direct and _notices(traced, "linear"):
+        # Windows that feedback biases do not show how the response deviates.
         rest = _rest(base, fit, traced, "linear")
         factor = np.exp(rest * rng.uniform(-1.0, 1.0, size=len(limit.samples)))
         limit = replace(limit, samples=limit.samples * factor)
@@ -105,6 +108,14 @@ def changing_at_limit(limit: CriticalStiffness, fit: Fit, traced: Traced) -> flo
     return max((changing_share(fit, traced.state.etfe, frequency) for frequency in at), default=0.0)
 
 
+def _notices(traced: Traced, family: str) -> bool:
+    """Whether something is left that only a threshold raised for a force taken off lets pass.
+
+    That is for going on, and says nothing of what it may do.
+    """
+    return any(test.family == family and test.noticed for test in traced.after)
+
+
 def _upwards(limit: CriticalStiffness, width: float) -> float:
     """How far up a uniform factor must reach, over its reach down, to leave the 95 % point there.
 
@@ -118,12 +129,15 @@ def _upwards(limit: CriticalStiffness, width: float) -> float:
 def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
     """How far, in log stiffness, the rest of an effect may take the limit either way.
 
-    What tests still see of it, as a share of what they saw, times how far it moved the limit.
+    What tests still see of it, as a share of what they saw, times how far it moved the limit.  In a
+    loop they see a force faintly, or in the linear residual alone: of what they saw noise is a half
+    then, and what moved the limit far would leave it open.  There each says what it still sees.
     """
+    if family == "nonlinear" and traced.state.etfe.direct:
+        return min(forces_left(fit, traced.after).limit_log, _FARTHEST)
     limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
     moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
-    farthest = 2.3  # log stiffness: a factor of ten
-    return share_left(traced, family) * min(moved, farthest)
+    return share_left(traced, family) * min(moved, _FARTHEST)
 
 
 def _downwards(fit: Fit, traced: Traced, family: str) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.state import Accepted
 from bayeshaptic.diagnosis.traced import Traced, share_left
+from bayeshaptic.diagnosis.widening.forces_left import forces_left
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.types import Floats
@@ -38,8 +39,7 @@ def with_law_error(
     rng = np.random.default_rng([seed, 13])
     shape = posterior.chains.shape[:-1]
     sd = np.sqrt(sum(_relative_sd(law) ** 2 for law in laws))
-    left = share_left(traced, "nonlinear")
-    share = sd * rng.standard_normal(shape) + left * rng.uniform(-1.0, 1.0, shape)
+    strength, rest = sd * rng.standard_normal(shape), rng.uniform(-1.0, 1.0, shape)
     known = dict(zip(base.model.names, base.theta, strict=True))
     moved = np.array(
         [
@@ -47,8 +47,14 @@ def with_law_error(
             for name, value in zip(fit.model.names, fit.theta, strict=True)
         ]
     )
+    # What tests still see: in a loop each says it, elsewhere as a share of what they saw.
+    if traced.state.etfe.direct:
+        left = forces_left(fit, traced.after).parameters
+    else:
+        left = share_left(traced, "nonlinear") * moved
     lowest = np.array([posterior.model.prior(name).support[0] for name in posterior.names])
-    chains = _by(posterior.chains, share[..., None] * moved, lowest)
+    far = strength[..., None] * moved + rest[..., None] * left
+    chains = _by(posterior.chains, far, lowest)
     return replace(posterior, chains=chains)
 
 

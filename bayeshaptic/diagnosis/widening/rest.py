@@ -18,10 +18,9 @@ import numpy as np
 
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.widening.deviation import deviation, evidence, matern, modelled
-from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
+from bayeshaptic.inference.coordinates import Coordinates, believed, coordinates, reach
 from bayeshaptic.inference.fit import REACH_SDS, Fit, weighted_residuals
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Complexes, Floats
 
@@ -52,19 +51,19 @@ def with_rest(
     dampers = [n for n in fit.model.names if fit.model.parameter(n).dimension == "damping"]
     here = coordinates(fit.model, dampers)
     low, high = (here.coordinate(end) for end in reach(fit.model, REACH_SDS))
-    slopes, believed = _slopes(fit, here), _believed(fit.model, here)
+    slopes, spread = _slopes(fit, here), believed(fit.model, here)
     white = modelled(fit) / np.sqrt(fit.likelihood.noise_variance)[:, None]
     pull = np.einsum("wr,wrp->wp", white.conj(), slopes)
     size = np.sum(np.abs(white) ** 2, axis=1)[:, None]
-    bent = _bends(fit, left, believed * pull / size)
-    real = np.sqrt(2) * np.concatenate([slopes.real, slopes.imag]).reshape(-1, len(believed))
+    bent = _bends(fit, left, spread * pull / size)
+    real = np.sqrt(2) * np.concatenate([slopes.real, slopes.imag]).reshape(-1, len(spread))
     # Of the slopes, not of their square: that has lost what is known worst to rounding.
-    prior = np.diag(1 / believed)
+    prior = np.diag(1 / spread)
     root = np.asarray(np.linalg.qr(np.concatenate([real, prior]), mode="r")).T
     # In coordinates where the noise alone makes a unit: louder noise has made more of it already.
     follow = np.linalg.solve(root, 2 * pull.conj().T)
-    spread, axes = np.linalg.eigh(0.5 * np.real(follow @ bent @ follow.conj().T))
-    sd = np.sqrt(np.maximum(spread - (louder - 1.0), 0.0))
+    power, axes = np.linalg.eigh(0.5 * np.real(follow @ bent @ follow.conj().T))
+    sd = np.sqrt(np.maximum(power - (louder - 1.0), 0.0))
     rng = np.random.default_rng([seed, 17])
     moved = rng.standard_normal(posterior.chains.shape) @ (np.linalg.solve(root.T, axes) * sd).T
     chains = here.natural(np.clip(here.coordinate(posterior.chains) + moved, low, high))
@@ -101,10 +100,3 @@ def _slopes(fit: Fit, here: Coordinates) -> Complexes:
     slope = jacobian(weighted_residuals(fit.likelihood, here), here.coordinate(fit.theta[None]))[0]
     parts = slope.reshape(*fit.windows.target.shape, 2, -1) / np.sqrt(2)
     return np.asarray(parts[:, :, 0] + 1j * parts[:, :, 1])
-
-
-def _believed(model: Model, here: Coordinates) -> Floats:
-    """Standard deviations of the priors in the coordinates."""
-    ends = np.array([model.prior(name).quantile(np.array([0.16, 0.84])) for name in model.names])
-    low, high = (here.coordinate(end) for end in ends.T)
-    return np.asarray(0.5 * (high - low))
