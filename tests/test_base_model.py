@@ -237,7 +237,7 @@ def test_a_hand_explains_nothing_that_a_free_device_predicts_better(
 
 
 def test_what_was_given_up_takes_no_explanation_away(monkeypatch) -> None:
-    monkeypatch.setattr(best_base, "_criterion", lambda one, _: one.state.fit.reduced_chi_square)
+    monkeypatch.setattr(best_base, "criterion", lambda one, _: one.state.fit.reduced_chi_square)
     found = {
         "grasped": traced("grasped", EXPLAINED, 1.5, 1, 1),
         "free": traced("free", UNEXPLAINED, 1.0, 1),

@@ -12,14 +12,12 @@ from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
 from bayeshaptic.diagnosis.base.begun import fitted
+from bayeshaptic.diagnosis.base.best_in_any_loop import traced_in_any_loop
 from bayeshaptic.diagnosis.base.opened import Opened
-from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.model_error import limit_alone
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.traced import UNEXPLAINED
-from bayeshaptic.diagnosis.trials.all_lines import trace_by_all_lines, untraced
+from bayeshaptic.diagnosis.trials.all_lines import stands
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
@@ -50,22 +48,18 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
         begun = fitted(lines, model, options.within(0.0, 0.3))
     except InputError:
         return found
-    tests = residual_tests(begun.fit, begun.etfe)
-    traced, began = untraced(State(begun.etfe, begun.fit), tests), time.perf_counter()
-    one_mass = begun.fit.model.name == "rigid"
-    if not one_mass:
-        trying, meter = options.within(0.3, 0.5), Meter(options.budget_s * RATE)
-        with counting(meter):
-            traced = trace_by_all_lines(
-                traced, meter, lambda title: trying.report(0.5, f"trying {title}")
-            )
+    began = time.perf_counter()
+    trying, meter = options.within(0.3, 0.5), Meter(options.budget_s * RATE)
+    with counting(meter):
+        begun, traced = traced_in_any_loop(
+            begun, meter, lambda title: trying.report(0.5, f"trying {title}")
+        )
     tracing_s = time.perf_counter() - began
     fit = traced.state.fit
-    refused = traced.verdict == UNEXPLAINED and not traced.state.accepted
-    if refused or fit.impossible:
-        against = against_any_loop(fit, traced.after, found.etfe.through_reference)
+    if not stands(traced) or fit.impossible:
+        against = against_any_loop(fit, traced.before, found.etfe.through_reference)
         return replace(found, notices=(*found.notices, *against))
-    if one_mass:
+    if fit.model.name == "rigid":
         return found
     nothing = EtfeCriticalStiffness(None, None, None, None, fit.model.stiffness_unit, NO_WITNESS)
     base = finish(begun, begun.etfe, begun.fit, options.within(0.5, 0.7), witness=nothing)

@@ -192,13 +192,13 @@ def _comparable(
     two masses or one, with what they lack, predict the response better without it.
     """
     simple = {"rigid", "free"} - set(given_up)
-    unheld = [_criterion(one, noise) for name, one in found.items() if name in simple]
+    unheld = [criterion(one, noise) for name, one in found.items() if name in simple]
     least = min(unheld, default=np.inf)
     explains = {
         name: one
         for name, one in found.items()
         if one.verdict != UNEXPLAINED
-        and (not one.state.fit.model.held or _criterion(one, noise) < least)
+        and (not one.state.fit.model.held or criterion(one, noise) < least)
     }
     return explains or found
 
@@ -206,12 +206,12 @@ def _comparable(
 def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] = ()) -> str:
     """What explains comes first, then the information criterion; of equals the fewest effects."""
     among = _comparable(found, noise, given_up)
-    behind = {name: _criterion(traced, noise) for name, traced in among.items()}
+    behind = {name: criterion(traced, noise) for name, traced in among.items()}
     equals = [name for name in behind if behind[name] <= min(behind.values()) + _BARE_MENTION]
     return min(equals, key=lambda name: (len(found[name].state.accepted), behind[name]))
 
 
-def _criterion(traced: Traced, noise: float) -> float:
+def criterion(traced: Traced, noise: float) -> float:
     """BIC of the model with its effects; those beside the model count by their estimates."""
     beside = sum(len(effect.estimates) for effect in traced.state.accepted)
     return information_criterion(traced.state.fit, noise, beside)
@@ -219,7 +219,7 @@ def _criterion(traced: Traced, noise: float) -> float:
 
 def _said(best: str, found: Mapping[str, Traced], noise: float, given_up: Collection[str]) -> str:
     behind = {
-        name: _criterion(traced, noise) - _criterion(found[best], noise)
+        name: criterion(traced, noise) - criterion(found[best], noise)
         for name, traced in found.items()
     }
     words = []

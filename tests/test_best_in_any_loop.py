@@ -1,0 +1,149 @@
+"""Which base model, in a closed loop where the chosen one leaves something."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.base import best_in_any_loop
+from bayeshaptic.diagnosis.base.best_in_any_loop import traced_in_any_loop
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.residuals import residual
+from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
+from bayeshaptic.diagnosis.trials import all_lines
+from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
+from bayeshaptic.numerics.spending import Meter
+from benchmarks.through_reference import make
+
+SIZES = {"rigid": 3, "free": 7, "chain-2": 11, "grasped": 12}
+FRICTION, BASE = "friction_force", "compliant base"
+
+
+def fit(name: str) -> Any:
+    return SimpleNamespace(
+        model=SimpleNamespace(name=name, size=SIZES[name], held=name == "grasped")
+    )
+
+
+def ends(name: str, verdict: str, score: float, effect: str = "", limit: float = 1.0) -> Any:
+    """How a loop on a base model ends."""
+    found = (SimpleNamespace(title=effect, estimates={effect: 1.0}),) if effect else ()
+    state = SimpleNamespace(fit=fit(name), accepted=found)
+    return SimpleNamespace(verdict=verdict, state=state, score=score, limit=limit)
+
+
+def outcome(
+    monkeypatch: pytest.MonkeyPatch, chosen: str, *loops: Any, modelled: bool = True
+) -> tuple[str, Any, list[str]]:
+    """Name of the base model in the end, its loop, and the base models that were tried."""
+    by_name, tried = {loop.state.fit.model.name: loop for loop in loops}, []
+
+    def traced(base: Any, meter: Any, tick: Any) -> Any:
+        tried.append(base)
+        return by_name[base]
+
+    monkeypatch.setattr(best_in_any_loop, "untraced", lambda state, tests: state.fit.model.name)
+    monkeypatch.setattr(best_in_any_loop, "residual_tests", lambda fit, etfe: ())
+    monkeypatch.setattr(best_in_any_loop, "trace_by_all_lines", traced)
+    monkeypatch.setattr(best_in_any_loop, "stands", lambda one: one.verdict != UNEXPLAINED)
+    monkeypatch.setattr(best_in_any_loop, "criterion", lambda one, _: one.score)
+    monkeypatch.setattr(best_in_any_loop, "_limit", lambda one: one.limit)
+    monkeypatch.setattr(best_in_any_loop, "replace", _replaced)
+    monkeypatch.setattr(best_in_any_loop, "base_of", lambda begun, name: (None, fit(name)))
+    candidates = {name: ScoredFit(fit(name), 0.0) for name in SIZES}
+    choice = Choice(fit(chosen), "", candidates) if modelled else None
+    begun: Any = SimpleNamespace(etfe=None, fit=fit(chosen), choice=choice)
+    begun, found = traced_in_any_loop(begun, Meter())
+    return begun.fit.model.name, found, tried
+
+
+def _replaced(one: Any, **changes: Any) -> Any:
+    return SimpleNamespace(**{**vars(one), **changes})
+
+
+def test_friction_that_passed_for_a_second_mode(monkeypatch) -> None:
+    """Two masses and friction: a chain had left a little, with a limit of twice the truth."""
+    name, found, tried = outcome(
+        monkeypatch,
+        "chain-2",
+        ends("chain-2", UNEXPLAINED, 0.0),
+        ends("free", EXPLAINED, -200.0, FRICTION),
+        ends("grasped", UNEXPLAINED, -10.0),
+    )
+    assert (name, tried) == ("free", ["chain-2", "free", "grasped"])
+    assert found.verdict == EXPLAINED
+
+
+def test_a_base_that_gives_does_not_stand_where_friction_in_a_hand_is_likelier(monkeypatch) -> None:
+    """1.67 times the limit was recommended: what leaves noise may still be the wrong thing."""
+    name, found, _ = outcome(
+        monkeypatch,
+        "free",
+        ends("free", EXPLAINED, 0.0, BASE),
+        ends("grasped", UNEXPLAINED, -44.0, FRICTION),
+    )
+    assert name == "grasped" and found.verdict == UNEXPLAINED
+
+
+@pytest.mark.parametrize(
+    ("own", "modelled"),
+    [
+        (ends("free", EXPLAINED, 0.0, FRICTION), True),
+        (ends("free", CONSISTENT, 0.0), True),
+        (ends("free", UNEXPLAINED, 0.0), False),  # the model was asked for
+    ],
+)
+def test_no_other_base_model_is_tried_where_none_is_in_question(monkeypatch, own, modelled) -> None:
+    assert outcome(monkeypatch, "free", own, modelled=modelled)[::2] == ("free", ["free"])
+
+
+def test_one_mass_is_followed_in_time(monkeypatch) -> None:
+    name, found, tried = outcome(monkeypatch, "rigid")
+    assert (name, found, tried) == ("rigid", "rigid", [])
+
+
+@pytest.mark.parametrize(
+    ("behind", "name"), [(0.5 * UNDECIDED, "grasped"), (2 * UNDECIDED, "free")]
+)
+def test_of_two_that_stand_alike_the_lower_limit_is_taken(monkeypatch, behind, name) -> None:
+    found = outcome(
+        monkeypatch,
+        "free",
+        ends("free", EXPLAINED, 0.0, BASE, limit=2.0),
+        ends("grasped", EXPLAINED, behind, FRICTION, limit=1.0),
+    )
+    assert found[0] == name
+
+
+def test_friction_is_tried_where_all_lines_see_something_linear_alone(monkeypatch) -> None:
+    asked = []
+    monkeypatch.setattr(all_lines, "_linear_trials", lambda state, meter, tick: [])
+    monkeypatch.setattr(
+        all_lines, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
+    )
+    linear = residual.Test("causal change", "linear", 12.0, 5.0, None, "")
+    assert all_lines._trials(None, (linear,), Meter(), None) == []  # type: ignore[arg-type]
+    assert "sign(v)" in asked[0]
+    all_lines._trials(
+        None, (residual.Test("gain in time", "time-varying", 9.0, 4.4, None, ""),), Meter(), None
+    )  # type: ignore[arg-type]
+    assert len(asked) == 1, "drift calls for no force"
+
+
+def test_a_rubbing_loop_whose_friction_no_test_of_a_force_sees() -> None:
+    """Its base model is a chain, and one test, of the command's cube, is flagged just so."""
+    case = make(1069)
+    truth = case.bench.true_critical_stiffness()
+    closed = close_loop(case.recording, hidden=False)
+    assert closed.analysis.etfe.direct and closed.analysis.fit.model.name == "free"
+    assert [effect.name for effect in closed.effects] == ["coulomb_friction"]
+    low, high = (float(closed.analysis.limit.quantile(p)) for p in (0.05, 0.95))
+    assert low < truth < high and high < 1.4 * low
+    assert np.isclose(
+        closed.effects[0].estimates["friction_force"].mean,
+        case.friction * case.bench.force_rms,
+        rtol=0.1,
+    )
