@@ -108,7 +108,8 @@ def ripple_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     recording = etfe.unbroken
     if recording is None:
         return ()
-    return tuple(ripple_test(wave, find_ripple(wave, fit, etfe), recording) for wave in WAVES)
+    more = _explained_by_more(fit, etfe, recording)
+    return tuple(ripple_test(wave, find_ripple(wave, fit, etfe, more), recording) for wave in WAVES)
 
 
 def ripple_test(wave: Wave, found: Ripple | None, recording: Recording) -> Test:
@@ -134,7 +135,7 @@ def ripple_test(wave: Wave, found: Ripple | None, recording: Recording) -> Test:
     return Test(wave.test, "nonlinear", score, thresholds.LOG_CHANCE, None, text)
 
 
-def find_ripple(wave: Wave, fit: Fit, etfe: Etfe) -> Ripple | None:
+def find_ripple(wave: Wave, fit: Fit, etfe: Etfe, more: Floats | None = None) -> Ripple | None:
     """The ripple that stands out most; None where the periodogram has no line.
 
     A line of it is looked at again beside what any smooth response explains: a response that is a
@@ -145,16 +146,22 @@ def find_ripple(wave: Wave, fit: Fit, etfe: Etfe) -> Ripple | None:
     wave : Wave
     fit : Fit
     etfe : Etfe
+    more : ndarray, shape (N,), optional
+        What a unit of force more at each sample would explain, where it is known.
     """
     recording = etfe.unbroken
     if recording is None or recording.position.std() == 0:
         return None
     place = place_of_action(fit, recording)
-    product = _product(wave, fit, etfe, recording)
     rates = rates_along(place, recording)
     if not len(rates):
         return None
-    power = _periodogram(place, product, rates)
+    if more is None:
+        more = _explained_by_more(fit, etfe, recording)
+    product = wave.on(recording.force - recording.force.mean()) * more
+    product -= product.mean()
+    along = _gathered(place, product)
+    power = _periodogram(along, np.ptp(place), rates) / np.sum(product**2)
     # Two degrees of freedom: the chance of a power is its exponential.
     independent = len(rates) / STEPS
     least = np.log(independent) + thresholds.LOG_CHANCE * np.log(10)
@@ -163,7 +170,7 @@ def find_ripple(wave: Wave, fit: Fit, etfe: Etfe) -> Ripple | None:
         top = int(np.argmax(power))
         if power[top] < least:
             break
-        rate = _finer(place, product, rates, top)
+        rate = _finer(along, np.ptp(place), rates, top)
         looked.append(_looked_at(wave, fit, etfe, place, rate, independent))
         power[max(top - _FINER, 0) : top + _FINER] = 0.0
     return max(looked, key=lambda ripple: ripple.log_chance, default=None)
@@ -184,11 +191,8 @@ def place_of_action(fit: Fit, recording: Recording) -> Floats:
     return np.interp(middle, rows, position)
 
 
-def _product(wave: Wave, fit: Fit, etfe: Etfe, recording: Recording) -> Floats:
-    """What a unit of force more, at each sample, would explain of what the fit leaves.
-
-    Times what the wave is multiplied by.
-    """
+def _explained_by_more(fit: Fit, etfe: Etfe, recording: Recording) -> Floats:
+    """What a unit of force more, at each sample, would explain of what the fit leaves."""
     force = recording.force - recording.force.mean()
     frequency = np.asarray(np.fft.rfftfreq(recording.samples, recording.period_s), float)
     inside = (frequency >= etfe.band_hz[0]) & (frequency <= etfe.band_hz[1])
@@ -199,9 +203,7 @@ def _product(wave: Wave, fit: Fit, etfe: Etfe, recording: Recording) -> Floats:
     power = uniform_filter1d(np.abs(left) ** 2, _AROUND)
     seen = uniform_filter1d(inside.astype(float), _AROUND)
     weight = np.where(inside & (power > 0), seen / np.maximum(power, 1e-300), 0.0)
-    more = np.fft.irfft(weight * np.conj(response) * left, recording.samples)
-    product = wave.on(force) * more
-    return np.asarray(product - product.mean())
+    return np.asarray(np.fft.irfft(weight * np.conj(response) * left, recording.samples))
 
 
 def rates_along(place: Floats, recording: Recording) -> Floats:
@@ -224,19 +226,24 @@ def rates_along(place: Floats, recording: Recording) -> Floats:
     return np.asarray(step * np.arange(first, min(last, STEPS * _MOST_PERIODS)))
 
 
-def _periodogram(place: Floats, product: Floats, rates: Floats) -> Floats:
-    """Power at rates along the way, over its mean in noise."""
-    span = float(np.ptp(place))
-    bins = np.minimum((place - place.min()) / span * _PLACES, _PLACES - 1).astype(int)
-    along = np.bincount(bins, weights=product, minlength=_PLACES)
-    power = np.abs(np.fft.rfft(along, STEPS * _PLACES)) ** 2 / np.sum(product**2)
+def _gathered(place: Floats, product: Floats) -> Floats:
+    """The sums of a product at places along the way, shape (`_PLACES`,)."""
+    share = (place - place.min()) / np.ptp(place)
+    bins = np.minimum(share * _PLACES, _PLACES - 1).astype(int)
+    return np.asarray(np.bincount(bins, weights=product, minlength=_PLACES), float)
+
+
+def _periodogram(along: Floats, span: float, rates: Floats) -> Floats:
+    """Power at rates along the way."""
+    power = np.abs(np.fft.rfft(along, STEPS * _PLACES)) ** 2
     return np.asarray(power[np.rint(rates * STEPS * span / (2 * np.pi)).astype(int)])
 
 
-def _finer(place: Floats, product: Floats, rates: Floats, top: int) -> float:
+def _finer(along: Floats, span: float, rates: Floats, top: int) -> float:
     """The rate of a line, between its neighbours."""
     near = np.linspace(rates[max(top - 1, 0)], rates[min(top + 1, len(rates) - 1)], 2 * _FINER + 1)
-    power = [abs(np.sum(product * np.exp(-1j * rate * place))) for rate in near]
+    places = np.arange(_PLACES) * span / _PLACES
+    power = np.abs(np.exp(-1j * np.outer(near, places)) @ along)
     return float(near[int(np.argmax(power))])
 
 
