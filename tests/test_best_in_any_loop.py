@@ -133,6 +133,20 @@ def test_friction_is_tried_where_all_lines_see_something_linear_alone(monkeypatc
     assert len(asked) == 1, "drift calls for no force"
 
 
+def test_friction_is_tried_where_nothing_is_left_and_not_beside_what_leaves_nothing(
+    monkeypatch,
+) -> None:
+    asked = []
+    monkeypatch.setattr(
+        all_lines, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
+    )
+    noise = residual.Test("causal change", "linear", 2.0, 5.0, None, "")
+    for accepted in ((), (SimpleNamespace(family="linear"),)):
+        state = SimpleNamespace(accepted=accepted)
+        all_lines.trace_by_all_lines(SimpleNamespace(state=state, after=(noise,)), Meter())  # type: ignore[arg-type]
+    assert len(asked) == 1 and "sign(v)" in asked[0]
+
+
 def test_a_rubbing_loop_whose_friction_no_test_of_a_force_sees() -> None:
     """Its base model is a chain, and one test, of the command's cube, is flagged just so."""
     case = make(1069)

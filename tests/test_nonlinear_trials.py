@@ -17,9 +17,10 @@ from bayeshaptic.diagnosis.state import FIT, State, Trial, log_likelihoods, shar
 from bayeshaptic.diagnosis.trials import beside, force_search, force_slopes
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.beside import beside_tests
+from bayeshaptic.diagnosis.trials.force_along import Along
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.force_search import _damped, _scan
-from bayeshaptic.diagnosis.trials.force_slopes import Along, Form, linearised, nudges_of, spread
+from bayeshaptic.diagnosis.trials.force_slopes import Form, linearised, nudges_of, spread
 from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
 from bayeshaptic.diagnosis.trials.windows import WindowTrials

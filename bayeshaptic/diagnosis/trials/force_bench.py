@@ -9,7 +9,7 @@ and what one was taken for may be another's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -34,7 +34,7 @@ from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.windows import Windows
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Complexes, Floats
 
 SUBSTEPS = 8
 
@@ -91,6 +91,12 @@ class ForceBench:
     ----------
     before : tuple of Acting
         The forces of the state, which act beside what is tried.
+    frequency_hz : ndarray, shape (L,)
+        The lines of the spectra.
+    at_lines : callable
+        A signal, shape (N,), to its DFT there.
+    extra : ndarray, shape (N,)
+        What forces are taken to add when the slow motion is read off the encoder.
     """
 
     def __init__(self, state: State, recording: Recording) -> None:
@@ -103,8 +109,9 @@ class ForceBench:
         assert self._etfe.recording is not None
         self.recording = self._etfe.recording
         self.force = self.recording.force - self.recording.force.mean()
-        self._transform = line_transform(state.etfe, recording)
-        self._extra: Floats = np.zeros(recording.samples) + sum(c.motion for c in there)
+        self.frequency_hz: Floats = state.etfe.spectra.frequency_hz  # type: ignore[attr-defined]
+        self.at_lines: Callable[[Floats], Complexes] = line_transform(state.etfe, recording)
+        self.extra: Floats = np.zeros(recording.samples) + sum(c.motion for c in there)
         self._somewhere = state.fit.windows.frequency_hz.mean(axis=1)
         self._measured = _between(self.recording.position)
         self._base = self._likelihoods(state.fit.theta, state.fit.windows)
@@ -122,7 +129,7 @@ class ForceBench:
         found = {}
         along: Floats | float = 0.0
         # The measured position has what a hand does, and where the device stands.
-        besides = self.recording.position - x[::SUBSTEPS] - self._extra
+        besides = self.recording.position - x[::SUBSTEPS] - self.extra
         if {MOTOR, LOAD} & set(places):
             along = _between(self._hand(besides) if self.held else self._drift(besides, theta))
             found[MOTOR] = Motion(self._measured, v + along, command)
@@ -155,7 +162,7 @@ class ForceBench:
         period = self.recording.period_s
         x = linear_motion(self.model.system(theta), command, period)[0]
         driven = self.recording.position - x
-        slow = self._slow(driven - self._extra) if self.held else 0.0
+        slow = self._slow(driven - self.extra) if self.held else 0.0
         return _between(correction(driven - slow, period))
 
     def _drift(self, besides: Floats, theta: Floats) -> Floats:
@@ -217,7 +224,7 @@ class ForceBench:
         Not a motion that ran away (nan): with it every law after it would, too.
         """
         if np.isfinite(extra[0]):
-            self._extra = extra
+            self.extra = extra
 
     def point(self, forces: tuple[Acting, ...], theta: Floats, rounds: int = 1) -> Point:
         """Simulate, take off, fit; several times over, because the fit changes the motion."""
@@ -243,14 +250,14 @@ class ForceBench:
             if isinstance(one.effect, CommandEffect):
                 lost = one.effect.lost(one.strength, command)
                 command = command - lost
-                found.append(Change(None, one, self._transform(lost), 0.0, lost, 0.0))
+                found.append(Change(None, one, self.at_lines(lost), 0.0, lost, 0.0))
             else:
-                found.append(Change(None, one, 0.0, self._transform(motion), 0.0, motion))
+                found.append(Change(None, one, 0.0, self.at_lines(motion), 0.0, motion))
         return tuple(found)
 
-    def windows(self, etfe: Etfe, theta: Floats, columns: list[Floats] | None = None) -> Windows:
-        """Windows of a measurement, with motions as further inputs."""
-        inputs = np.stack([self._transform(column) for column in columns]) if columns else None
+    def windows(self, etfe: Etfe, theta: Floats, columns: list[Complexes] | None = None) -> Windows:
+        """Windows of a measurement, with motions, at its lines, as further inputs."""
+        inputs = np.stack(columns) if columns else None
         return compress(etfe, partial(self.model.response, theta), inputs)
 
     def _simulated(self, forces: tuple[Acting, ...], theta: Floats) -> _Simulated | None:
@@ -264,7 +271,7 @@ class ForceBench:
         added = self.added_motions(forces, theta)
         if np.isnan(added).any():
             return None
-        self._extra = added.sum(axis=0)
+        self.extra = added.sum(axis=0)
         changes = self.changes(forces, added)
         etfe = self.without(changes)
         return changes, etfe, self.windows(etfe, theta)

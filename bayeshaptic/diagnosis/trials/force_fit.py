@@ -11,8 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.diagnosis.state import FIT, fit_part
+from bayeshaptic.diagnosis.trials.force_along import Along, expect
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_slopes import NUDGE, Along, Form, linearised, nudges_of
+from bayeshaptic.diagnosis.trials.force_slopes import NUDGE, Form, linearised, nudges_of
+from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.types import Floats
@@ -52,13 +54,14 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     -------
     Point
     """
-    form, found = Form.of(found), bench.as_it_is(found.forces, found.theta)
+    form, found = Form.of(found), _near(bench, found, found.forces, found.theta)
     first, before, best = form.logs(found), found, found
     nudges, near, furthest = nudges_of(bench), np.ones(len(first)), 1.0
     rounds = 60 if bench.before else 20  # ridges of two forces are long
     along: Along | None = None
     for _ in range(rounds):
         logs = form.logs(best)
+        expect(bench, best, best.forces, best.theta)
         step, along = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near, along)
         if not np.isfinite([*step.theta, *step.logs]).all():  # slopes of a motion that runs away
             break
@@ -85,12 +88,13 @@ def _advanced(bench: ForceBench, form: Form, best: Point, step: _Step) -> tuple[
 
     def along(factor: float) -> Point:
         phi = np.clip(start + factor * (end - start), low, high)
-        return bench.as_it_is(form.at(logs + factor * step.logs), here.natural(phi[None])[0])
+        return _near(bench, best, form.at(logs + factor * step.logs), here.natural(phi[None])[0])
 
     factor, point = 1.0, along(1.0)
     if point.gain_fit < best.gain_fit:
         for factor in (_BACK, _BACK**2):
-            polished = _polished(bench, bench.point(form.at(logs + factor * step.logs), best.theta))
+            forces = form.at(logs + factor * step.logs)
+            polished = _polished(bench, _near(bench, best, forces, best.theta))
             point = max(along(factor), polished, key=lambda point: point.gain_fit)
             if point.gain_fit > best.gain_fit:
                 break
@@ -114,7 +118,14 @@ def _polished(bench: ForceBench, point: Point) -> Point:
     """
     if not np.isfinite(point.gain_fit):
         return point
-    return bench.as_it_is(point.forces, fit_part(bench.model, point.windows, point.theta))
+    theta = fit_part(bench.model, point.windows, point.theta)
+    return _near(bench, point, point.forces, theta)
+
+
+def _near(bench: ForceBench, known: Point, forces: tuple[Acting, ...], theta: Floats) -> Point:
+    """Forces and linear parameters as they are, beside the motion expected from a point near by."""
+    expect(bench, known, forces, theta)
+    return bench.as_it_is(forces, theta)
 
 
 def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
@@ -129,7 +140,8 @@ def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
     factor = 1.0
     while factor * np.abs(moved).max() < _MOST:
         phi = np.clip(end + factor * (end - start), low, high)
-        further = bench.as_it_is(form.at(logs + factor * moved), here.natural(phi[None])[0])
+        forces = form.at(logs + factor * moved)
+        further = _near(bench, best, forces, here.natural(phi[None])[0])
         if further.gain_fit < best.gain_fit + _NO_GAIN:
             break
         factor, best = _ON * factor, further

@@ -13,21 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.state import Change, share, weights
+from bayeshaptic.diagnosis.trials.force_along import Along, grown, slopes_along
 from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.recordings.response.windows import Windows
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Complexes, Floats
 
 NUDGE = 0.1  # relative, of strength and shape for the slopes
 _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
-# Coordinates and logarithms: how far slopes over linear parameters hold.  Fifteen fits of
-# friction on PHANToMs end where they do with new ones a round (log likelihoods -13 to 52 higher).
-_KEPT = 0.1
 _SMOOTH = 1e-3  # share of these distances where a sticking mass's motion goes smoothly
 
 
@@ -132,35 +129,6 @@ def nudges_of(bench: ForceBench) -> Floats:
     return np.clip(np.nan_to_num(_SDS * relative, nan=np.inf), _LEAST, _FARTHEST)
 
 
-@dataclass(frozen=True)
-class Along:
-    """Slopes of forces' motion over the linear parameters, and where they were taken.
-
-    They are six tenths of what a round of a fit costs, and what changes least in it.
-
-    Attributes
-    ----------
-    slopes : ndarray, shape (P, I, N)
-        Of the motion of each force that moves a mass; P = 0 where it hardly depends on the
-        parameters.
-    strengths : ndarray of int, shape (I,)
-        Which of the logarithms is that of its strength.
-    at : ndarray
-        Coordinates of the parameters, and logarithms of the strengths.
-    near : float
-        Share of the usual distances that they were taken over.
-    """
-
-    slopes: Floats
-    strengths: NDArray[np.intp]
-    at: Floats
-    near: float
-
-    def holds(self, at: Floats, near: float) -> bool:
-        """Whether they are those at another place, too, for distances as small as that."""
-        return bool(np.abs(at - self.at).max() <= _KEPT and 2 * near >= self.near)
-
-
 def linearised(
     bench: ForceBench,
     form: Form,
@@ -209,39 +177,37 @@ def linearised(
         The slopes over the linear parameters that were used.
     """
 
-    def motion(logs: Floats, theta: Floats) -> Floats:
-        forces = form.at(logs)
-        return bench.driven(forces, theta, bench.added_motions(forces, theta))
-
     further = motions or []
-    forces = form.at(logs)
+    forces, taken = form.at(logs), bench.extra
     added = bench.added_motions(forces, theta)
     inner, extra = added.sum(axis=0), bench.driven(forces, theta, added)
+
+    def slope(step: Floats, side: float) -> Floats:
+        now = form.at(logs + side * step)
+        if bench.held:  # what more they add is not the hand's
+            bench.remember(taken + grown(added, forces, now))
+        moved = bench.driven(now, theta, bench.added_motions(now, theta))
+        bench.remember(taken)
+        return (moved - extra) / side
+
     sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
-    slopes = [
-        (motion(logs + side * unit, theta) - extra) / side
-        for side, unit in zip(sides, np.eye(len(logs)), strict=True)
-    ]
+    slopes = [slope(unit, side) for side, unit in zip(sides, np.eye(len(logs)), strict=True)]
     here, _, _ = search_box(bench.model)
     phi = here.coordinate(theta[None])[0]
     strengths = ~form.shape
     at, nearest = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
     if along is None or not along.holds(at, nearest):
-        # The motor's motion under a hand is mostly measured: it hardly depends on the parameters.
-        linear = forces and not (bench.held and all(o.effect.place == MOTOR for o in forces))
-        around = here.natural(phi + np.diag(nearest * nudges)) if linear else ()
-        moving = np.flatnonzero([not isinstance(o.effect, CommandEffect) for o in forces])
-        moves = [
-            (bench.added_motions(forces, vector) - added)[moving] / (nearest * nudge)
-            for vector, nudge in zip(around, nudges, strict=False)
-        ]
-        each = np.array(moves).reshape(len(moves), len(moving), added.shape[1])
+        moving = [not isinstance(one.effect, CommandEffect) for one in forces]
+        each = slopes_along(bench, forces, theta, added, nearest * nudges)
         along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
     bench.remember(inner)  # not before: what is compared has the slow motion in common
-    slopes += list(along.slopes.reshape(-1, added.shape[1]))
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
-    slopes += further
-    windows, weight = _weighed_windows(bench, bench.changes(forces, added), theta, slopes, parts)
+    columns = [
+        *(bench.at_lines(slope) for slope in slopes),
+        *along.slopes.reshape(-1, along.slopes.shape[-1]),
+        *(bench.at_lines(motion) for motion in further),
+    ]
+    windows, weight = _weighed_windows(bench, bench.changes(forces, added), theta, columns, parts)
     start = np.concatenate([phi, np.zeros(len(logs) + len(further))])[None]
     return _residuals(bench.model, windows, weight, form.shape, moved, start, along), start, along
 
@@ -250,12 +216,12 @@ def _weighed_windows(
     bench: ForceBench,
     changes: tuple[Change, ...],
     theta: Floats,
-    slopes: list[Floats],
+    columns: list[Complexes],
     parts: tuple[int, ...],
 ) -> tuple[Windows, Floats]:
     """Windows without what forces changed, with slopes as inputs; and roots of their weights."""
     etfe = bench.without(changes)
-    windows = bench.windows(etfe, theta, slopes)
+    windows = bench.windows(etfe, theta, columns)
     # The many slopes leave too little of a window to read its noise from.
     left, scattered = weights(bench.model, bench.windows(etfe, theta), theta)
     nodes, rows = windows.frequency_hz.shape[1], windows.target.shape[1]

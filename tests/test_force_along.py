@@ -1,0 +1,98 @@
+"""What forces add under a hand, whose slow motion is measured: carried to other strengths."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.trials.force_along import expect, slopes_along
+from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.force_fit import fit_force
+from bayeshaptic.effects.nonlinear.friction import CoulombFriction
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.protocol import Acting
+from bayeshaptic.inference.fit import search_box
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.types import Floats
+from benchmarks.through_reference import make
+
+SEED = 3093  # a held LHIfAM under steps, 4.8 s
+AGAIN = 6  # evaluations in which a hand's slow motion settles
+
+
+@cache
+def held_in_a_loop() -> tuple[State, float, Floats]:
+    """The base model fitted to all lines, the friction that acted, and the true parameters."""
+    case = make(SEED)
+    etfe = estimate_in_any_loop(replace(case.recording, reference=None))
+    fit = least_squares(build_model("grasped", "lhifam"), etfe)
+    truth = {**case.bench.values, "delay_s": case.bench.delay_s}
+    theta = np.array([truth[name] for name in fit.model.names])
+    return State(etfe, fit), case.friction * case.bench.force_rms, theta
+
+
+def bench() -> ForceBench:
+    state, _, _ = held_in_a_loop()
+    assert state.etfe.unbroken is not None
+    return ForceBench(state, state.etfe.unbroken)
+
+
+def settled(here: ForceBench, friction: float, theta: Floats) -> Point:
+    for _ in range(AGAIN):
+        found = here.as_it_is((Acting(CoulombFriction(MOTOR), friction),), theta)
+    return found
+
+
+@pytest.mark.parametrize("factor, damper", [(1.5, 1.0), (1.0, 1.5)])
+def test_a_force_near_a_known_one_is_at_once_worth_what_it_is(factor: float, damper: float) -> None:
+    """Friction half as strong again, or a hand's damper: beside the motion before it lost tens."""
+    _, friction, theta = held_in_a_loop()
+    here = bench()
+    known = settled(here, 0.6 * friction, theta)
+    other = np.where(np.array(here.model.names) == "kh", damper * theta, theta)
+    forces = (Acting(known.effect, factor * known.strength),)
+    here.remember(np.asarray(known.changes[0].motion))
+    stale = here.as_it_is(forces, other)
+    expect(here, known, forces, other)
+    at_once = here.as_it_is(forces, other)
+    in_the_end = settled(here, forces[0].strength, other)
+
+    def away(found: Point) -> float:
+        return float(np.std(found.changes[0].motion - in_the_end.changes[0].motion))
+
+    assert away(at_once) < 0.6 * away(stale)
+
+
+def test_slopes_under_a_hand_are_those_of_a_motion_that_has_settled() -> None:
+    _, friction, theta = held_in_a_loop()
+    here = bench()
+    known = settled(here, friction, theta)
+    added = np.stack([np.asarray(change.motion) for change in known.changes])
+    scale, _, _ = search_box(here.model)
+    phi, step = scale.coordinate(theta[None])[0], 0.2
+    slopes = slopes_along(here, known.forces, theta, added, 0 * phi)
+    for name in ("b1", "b2", "bh", "kh"):  # of the others friction's motion hardly depends
+        number = here.model.names.index(name)
+        both = []
+        for side in (-1, 1):
+            moved = scale.natural((phi + side * step * (np.arange(len(phi)) == number))[None])[0]
+            expect(here, known, known.forces, moved)
+            both.append(settled(here, friction, moved).changes[0].motion)
+        found = here.at_lines((both[1] - both[0]) / (2 * step))
+        assert np.linalg.norm(slopes[number, 0] - found) < 0.6 * np.linalg.norm(found), name
+
+
+def test_friction_in_a_hand_is_found_in_a_loop() -> None:
+    """From a fifth of it; fits ended at a quarter, and gained 74."""
+    _, friction, theta = held_in_a_loop()
+    here = bench()
+    start = here.point((Acting(CoulombFriction(MOTOR), 0.2 * friction),), here.state.fit.theta)
+    found = fit_force(here, start)
+    assert start.gain_fit < 50 < 100 < found.gain_fit
+    assert 0.55 < found.strength / friction < 1.1
