@@ -17,7 +17,7 @@ from bayeshaptic.diagnosis.widening.friction import (
 )
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.report.objections import _rubs_otherwise
+from bayeshaptic.report.objections import _is_the_rest_of, _rubs_otherwise
 
 
 def closed(
@@ -87,3 +87,20 @@ def test_damping_may_be_the_friction_that_would_make_the_noise(
     assert left(0.01) == pytest.approx(1 - 0.5 * 0.8, abs=0.01)
     assert left(1e-6) == pytest.approx(1, abs=0.01)
     assert left(0.5) == 0.2
+
+
+@pytest.mark.parametrize(
+    ("family", "before", "objects"),
+    [("nonlinear", 11.0, True), ("nonlinear", 9.0, False), ("linear", 11.0, False)],
+)
+def test_a_limit_is_no_small_difference_of_two_large_ones(
+    family: str, before: float, objects: bool
+) -> None:
+    """Of five recordings of a rubbing motor three had 1.8 to 4.4 times the limit in green."""
+
+    def limited(to: float) -> SimpleNamespace:
+        return SimpleNamespace(limit=SimpleNamespace(quantile=lambda share: to))
+
+    effects = (SimpleNamespace(family=family),)
+    what: Any = SimpleNamespace(effects=effects, base=limited(before), analysis=limited(1.0))
+    assert _is_the_rest_of(what) == objects
