@@ -57,6 +57,7 @@ def test_no_stiffness_where_damping_changes_along_the_way_as_no_law_says() -> No
         traced=SimpleNamespace(after=(left,)),
         effects=(),
         model=SimpleNamespace(held=True),
+        analysis=SimpleNamespace(etfe=SimpleNamespace(direct=False)),
         force=None,
     )
     assert _rubs_otherwise(closed)

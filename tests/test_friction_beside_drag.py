@@ -17,7 +17,7 @@ from bayeshaptic.diagnosis.widening.friction import (
 )
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.report.objections import _is_the_rest_of, _rubs_otherwise
+from bayeshaptic.report.objections import _rubs_otherwise, is_the_rest
 
 
 def closed(
@@ -103,4 +103,4 @@ def test_a_limit_is_no_small_difference_of_two_large_ones(
 
     effects = (SimpleNamespace(family=family),)
     what: Any = SimpleNamespace(effects=effects, base=limited(before), analysis=limited(1.0))
-    assert _is_the_rest_of(what) == objects
+    assert is_the_rest(what) == objects

@@ -58,11 +58,11 @@ def why_none(result: Result) -> tuple[str, ...]:
             "a force that goes with the velocity is left, which no law of friction explains, and "
             "what the model takes for damping may be its part"
         )
-    if closed and _is_the_rest_of(closed):
+    if closed and is_the_rest(closed):
         found.append(
-            f"a force was taken off that made the limit seem {_MOSTLY:.0f} times as high and more, "
-            "so that what is left of the damping is less than an error of a tenth in that force: "
-            "record again, excited so strongly that friction is a small part of the force"
+            "a force was taken off that made the limit look more than "
+            f"{_MOSTLY:.0f} times as high, so that what is left of the damping is less than an "
+            "error of a tenth in that force"
         )
     if closed and GAIN.test in _left(closed):
         found.append(
@@ -252,7 +252,7 @@ def _rubs_otherwise(closed: Closed) -> bool:
     return bool(variables(left) & {VELOCITY, LOAD_VELOCITY, ALONG})
 
 
-def _is_the_rest_of(closed: Closed) -> bool:
+def is_the_rest(closed: Closed) -> bool:
     """Whether the limit is a small difference of two large ones, with a force and without it."""
     if not any(effect.family == "nonlinear" for effect in closed.effects):
         return False

@@ -16,7 +16,7 @@ from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
 from bayeshaptic.report.numbers.stiffest import too_stiff
-from bayeshaptic.report.objections import changes, is_open
+from bayeshaptic.report.objections import changes, is_open, is_the_rest
 
 if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline
@@ -126,6 +126,12 @@ def _after_fit(result: Result, command: str, new: str) -> Step:
         )
     if result.closed is None:
         return Step("Let the loop look for what the model lacks (leave out --no-loop):", command)
+    if is_the_rest(result.closed):
+        return Step(
+            "Let the force be two or three times as strong, so that friction is a small part of "
+            "it. Then:",
+            new,
+        )
     if changes(result.closed):
         grip = ", hold it alike all the time" if analysis.model.held else ""
         return Step(
