@@ -14,8 +14,7 @@ from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
 from bayeshaptic.diagnosis.base.begun import fitted
 from bayeshaptic.diagnosis.base.best_in_any_loop import traced_in_any_loop
 from bayeshaptic.diagnosis.base.opened import Opened
-from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.model_error import limit_alone
+from bayeshaptic.diagnosis.closed import Closed, limit_alone
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.trials.all_lines import stands
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy

@@ -16,7 +16,7 @@ from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
 from bayeshaptic.diagnosis.base.opened import Opened, opened
 from bayeshaptic.diagnosis.by_all_lines import by_all_lines
-from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.diagnosis.closed import Closed, error_beside, limit_alone, model_error
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
@@ -26,7 +26,6 @@ from bayeshaptic.diagnosis.feedback.explain import (
 from bayeshaptic.diagnosis.feedback.mode_above_band import mode_above_band
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
-from bayeshaptic.diagnosis.model_error import error_beside, limit_alone, model_error
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.excess import noise_besides
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
