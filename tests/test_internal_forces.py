@@ -10,7 +10,9 @@ import pytest
 from plain_stepping import step_through
 
 from bayeshaptic.diagnosis.state import State, fit_part
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.besides import Nothing
+from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.effects.nonlinear.internal_force import (
     CONNECTION,
@@ -85,7 +87,8 @@ BENCHS = {"rising_friction": "stribeck_friction"}  # with less at rest than in m
 
 def driven(bench: ForceBench, force: Acting, theta: Any) -> Any:
     """What it does to the motor's position."""
-    return bench.driven((force,), theta, bench.added_motions((force,), theta))
+    made = bench.simulation
+    return made.driven((force,), theta, made.added((force,), theta))
 
 
 @cache
@@ -160,7 +163,7 @@ def test_added_motion_is_that_of_the_bench(
     assert own.values is not None
     effect = effect_class(OURS.get(name, name))(place, shape)
     # It begins at rest, and no constant force acts: there is no drift to look for.
-    monkeypatch.setattr(ForceBench, "_drift", lambda bench, besides, theta: np.zeros(len(besides)))
+    monkeypatch.setattr(Simulation, "_besides", lambda *_: Nothing())
     bench = ForceBench(State(etfe, fit), with_force)
     found = driven(bench, Acting(effect, strength), own.values)
     # Moves in 50 ms: a mean and a slope do not matter.

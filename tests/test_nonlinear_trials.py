@@ -14,13 +14,15 @@ from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import FIT, State, Trial, log_likelihoods, share, weights
-from bayeshaptic.diagnosis.trials import beside, force_search, force_slopes
+from bayeshaptic.diagnosis.trials import beside
 from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.beside import beside_tests
-from bayeshaptic.diagnosis.trials.force_along import Along
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_search import _damped, _scan
-from bayeshaptic.diagnosis.trials.force_slopes import Form, linearised, nudges_of, spread
+from bayeshaptic.diagnosis.trials.forces import search, slopes
+from bayeshaptic.diagnosis.trials.forces.along import Along
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.search import _damped, _scan
+from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
+from bayeshaptic.diagnosis.trials.forces.slopes import Form, Reach, linearised, nudges_of, spread
 from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
@@ -151,18 +153,17 @@ def test_what_goes_with_a_friction_is_where_the_rest_fits_best() -> None:
     assert fall(moved=False) > 3 * fall(moved=True)
 
 
-def test_how_well_a_friction_is_known_does_not_depend_on_what_was_simulated_before() -> None:
-    """The slow motion is read off beside the motion before: in a difference both sides share it."""
+def test_what_a_force_is_worth_does_not_depend_on_what_was_simulated_before() -> None:
+    """The slow motion is found together with the forces' own, wherever that begins."""
     held = Bench.from_device("lhifam", held=True).with_effect("coulomb_friction", force=0.5)
     state = state_of(held, "grasped")
     assert state.etfe.unbroken is not None
-    bench = ForceBench(state, state.etfe.unbroken)
-    found = bench.point((Acting(CoulombFriction(MOTOR), 0.5),), state.fit.theta, rounds=3)
-    known, along = spread(bench, found)
-    bench.remember(0.9 * np.asarray(found.changes[0].motion))
-    again, moved = spread(bench, found)
-    np.testing.assert_allclose(again, known, rtol=0.1)
-    np.testing.assert_allclose(moved, along, atol=0.1 * np.abs(along).max())
+    bench, friction = ForceBench(state, state.etfe.unbroken), (Acting(CoulombFriction(MOTOR), 0.5),)
+    found = bench.as_it_is(friction, state.fit.theta)
+    assert found.motion is not None
+    for part in (0.5, 1.5):
+        again = bench.as_it_is(friction, state.fit.theta, part * found.motion)
+        assert again.gain_fit == pytest.approx(found.gain_fit, abs=2.0)
 
 
 def test_what_nobody_knows_goes_with_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,7 +172,7 @@ def test_what_nobody_knows_goes_with_no_force(monkeypatch: pytest.MonkeyPatch) -
     linear = rng.standard_normal((400, 3)) * [4.0, 1.0, 1e-4]
     forces = 30 * linear[:, :1] + 100 * rng.standard_normal((400, 1))
     parts = (np.zeros(400), linear, forces, np.ones(3, bool))
-    monkeypatch.setattr(force_slopes, "slopes_of_all", lambda *_: parts)
+    monkeypatch.setattr(slopes, "slopes_of_all", lambda *_: parts)
     nothing: Any = None
     covariance, along = spread(nothing, nothing)
     known = -np.linalg.lstsq(linear[:, :2], forces, rcond=None)[0]
@@ -187,8 +188,8 @@ def test_a_law_that_contains_the_friction_found_is_fitted_where_it_stands_out(
 ) -> None:
     only(monkeypatch, "coulomb_friction", "stribeck_friction", "friction_along_the_way")
     begun: list[Point] = []
-    own = force_search.fit_force
-    monkeypatch.setattr(force_search, "fit_force", lambda b, p: begun.append(p) or own(b, p))
+    own = search.fit_force
+    monkeypatch.setattr(search, "fit_force", lambda b, p: begun.append(p) or own(b, p))
     trials = nonlinear_trials(state_of(LHIFAM.with_effect(law)), {"sign(v)"}, Meter())
     # The way does not change, and takes no fit; Stribeck's law begins where Coulomb's ended.
     assert [trial.name for trial in trials] == list(dict.fromkeys(["coulomb_friction", law]))
@@ -229,16 +230,14 @@ def test_what_a_step_along_a_ridge_leaves_is_foreseen() -> None:
     assert state.etfe.unbroken is not None
     bench, damper = ForceBench(state, state.etfe.unbroken), state.model.names.index("b1")
     kind = next(kind for kind in effects("nonlinear") if kind.name == "drag")
-    velocity = bench.motions(state.fit.theta, (MOTOR,))[MOTOR].velocity
+    velocity = bench.simulation.motions(state.fit.theta, (MOTOR,))[MOTOR].velocity
     looks_like = np.mean(np.abs(velocity) ** 3) / np.mean(velocity**2)
     whole = float(state.fit.theta[damper] / looks_like)
 
     def at(drag: float) -> Point:
         theta = np.array(state.fit.theta)
         theta[damper] *= 1 - drag
-        for _ in range(3):  # the slow motion is read off beside the motion before
-            found = bench.as_it_is((Acting(kind(MOTOR), drag * whole),), theta)
-        return found
+        return bench.as_it_is((Acting(kind(MOTOR), drag * whole),), theta)
 
     there, here = at(0.75), at(0.5)
     chosen = share(here.windows, FIT)
@@ -248,9 +247,8 @@ def test_what_a_step_along_a_ridge_leaves_is_foreseen() -> None:
         of_windows = Likelihood(state.model, point.windows.part(chosen))
         return of_windows.deviations(point.theta[None])[0] * np.sqrt(2 * weight[chosen])[:, None]
 
-    form, logs = Form.of(here), np.log([here.strength])
-    near, nudges = np.full(1, 0.01), nudges_of(bench)
-    residuals, start, _ = linearised(bench, form, logs, here.theta, 0 * logs, nudges, near, FIT)
+    reach = Reach(nudges_of(bench), np.full(1, 0.01))
+    residuals, start, _ = linearised(bench, Form.of(here), here, np.zeros(1), reach, FIT)
     moved = np.append(search_box(state.model)[0].coordinate(there.theta[None])[0], np.log(1.5))
     foreseen = residuals(moved[None])[0].reshape(2, chosen.sum(), -1)[..., : left(here).shape[1]]
     error = np.linalg.norm(foreseen[0] + 1j * foreseen[1] - left(there))
@@ -291,33 +289,32 @@ def test_slopes_over_the_linear_parameters_are_taken_again_only_where_something_
     state, (trial,) = rubbed(0.5)
     assert state.etfe.recording and trial.accepted.change and trial.accepted.change.acting
     bench, theta = ForceBench(state, state.etfe.recording), trial.state.fit.theta
-    form = Form.of(bench.as_it_is((trial.accepted.change.acting,), theta))
-    logs, nudges, near = (
-        np.log([trial.accepted.change.acting.strength]),
-        nudges_of(bench),
-        np.ones(1),
-    )
+    begun = bench.as_it_is((trial.accepted.change.acting,), theta)
+    form, nudges, near = Form.of(begun), nudges_of(bench), np.ones(1)
     simulated: list[int] = []
-    own = ForceBench.added_motions
+    own = Simulation.added_near
 
     def counted(*given: Any) -> Any:
         simulated.append(1)
         return own(*given)
 
-    monkeypatch.setattr(ForceBench, "added_motions", counted)
+    monkeypatch.setattr(Simulation, "added_near", counted)
 
-    def cost(near: Floats, logs: Floats, along: Along | None) -> tuple[int, Along]:
+    def cost(near: Floats, stronger: float, along: Along | None) -> tuple[int, Along]:
         simulated.clear()
-        *_, used = linearised(bench, form, logs, theta, 0 * logs, nudges, near, (0, 2), along=along)
+        acting = replace(begun.forces[0], strength=np.exp(stronger) * begun.strength)
+        found = bench.as_it_is((acting,), theta)
+        reach = Reach(nudges, near)
+        *_, used = linearised(bench, form, found, np.zeros(1), reach, (0, 2), along=along)
         return len(simulated), used
 
-    base = 2  # the motion, and its slope over the strength
-    every, along = cost(near, logs, None)
+    base = 1  # the slope over the strength
+    every, along = cost(near, 0.0, None)
     assert every == base + state.model.size
-    assert cost(near, logs + 0.05, along) == (base, along)
-    assert cost(0.6 * near, logs, along) == (base, along)
-    assert cost(near, logs + 0.2, along)[0] == every
-    assert cost(0.1 * near, logs, along)[0] == every
+    assert cost(near, 0.05, along) == (base, along)
+    assert cost(0.6 * near, 0.0, along) == (base, along)
+    assert cost(near, 0.2, along)[0] == every
+    assert cost(0.1 * near, 0.0, along)[0] == every
 
 
 def test_the_gain_is_on_windows_that_were_not_fitted() -> None:
@@ -481,7 +478,6 @@ def test_a_law_that_takes_all_damping_and_a_motion_that_runs_away_spoil_no_other
     recording, without = state.etfe.unbroken, state.fit.theta
     assert recording is not None
     bench, friction = ForceBench(state, recording), Acting(CoulombFriction(MOTOR), 0.5)
-    bench.remember(np.full(recording.samples, np.nan))
     assert bench.point((friction,), without).gain_fit > 100
     ground = np.isin(state.model.names, ("b1", "b2"))
     damped = _damped(bench, np.where(ground, 0.0, without))

@@ -13,8 +13,8 @@ from __future__ import annotations
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench
-from bayeshaptic.diagnosis.trials.force_hints import hints
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.hints import hints
 from bayeshaptic.diagnosis.trials.nonlinear import is_there
 from bayeshaptic.effects.laws import BESIDE
 from bayeshaptic.effects.library import effects
@@ -41,7 +41,7 @@ def beside_tests(state: State) -> tuple[Test, ...]:
     if recording is None or state.etfe.through_reference:
         return ()
     bench = ForceBench(state, recording)
-    motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     looked_for = [
         effect
         for kind in effects("nonlinear")

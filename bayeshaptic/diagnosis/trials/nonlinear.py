@@ -13,8 +13,8 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_search import (
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.search import (
     Variants,
     beside_others,
     containing,
@@ -22,7 +22,7 @@ from bayeshaptic.diagnosis.trials.force_search import (
     search,
     worth_following,
 )
-from bayeshaptic.diagnosis.trials.force_slopes import spread
+from bayeshaptic.diagnosis.trials.forces.slopes import spread
 from bayeshaptic.diagnosis.trials.taken_off import with_forces
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.library import effects
@@ -60,7 +60,7 @@ def nonlinear_trials(
     if recording is None:
         return []
     bench = ForceBench(state, recording)
-    motion = bench.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     firsts, others = _called_for(state, variables(raised), motion)
 
     def searched(laws: Iterable[Variants], known: dict[str, Point]) -> list[Point]:
@@ -117,7 +117,7 @@ def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = 
     bare = State(etfe, least_squares(state.model, etfe, start=state.fit.theta), tuple(rest))
     assert etfe.recording
     bench = ForceBench(bare, etfe.recording)
-    motion = bench.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
+    motion = bench.simulation.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
     present = last.change.acting.effect
     own = search(bench, list(present.candidates(bare.model, motion)), motion, tick)
     laws, _ = _called_for(bare, set(present.over), motion)
@@ -140,13 +140,13 @@ def _instead_of(
     without = State(etfe, fit, rest)
     assert etfe.recording
     bench = ForceBench(without, etfe.recording)
-    motion = bench.motions(fit.theta, (MOTOR, LOAD, CONNECTION))
+    motion = bench.simulation.motions(fit.theta, (MOTOR, LOAD, CONNECTION))
     laws = [
         [e for e in law if (e.name, e.place) != (present.name, present.place)]
         for law in _called_for(without, set(present.over), motion)[0]
     ]
     here = bench.point((*bench.before, one.change.acting), state.fit.theta)
-    if not bench.stays(here.forces, here.theta):
+    if not bench.stays(here):
         return []
     others = beside_others(bench, [law for law in laws if law], meter, tick)
     return [_trial(bench, point) for point in (here, *others)]

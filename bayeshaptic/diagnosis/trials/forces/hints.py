@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_slopes import slopes_of_all
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.slopes import slopes_of_all
 from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
 
 _FAINT = 0.01  # of the faintest strength, or of the way to a law, for the slope over it
@@ -44,7 +44,7 @@ def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
         Not of actuators.
     """
     theta = bench.state.fit.theta
-    usual = bench.motions(theta, tuple({effect.place for effect in effects}))
+    usual = bench.simulation.motions(theta, tuple({effect.place for effect in effects}))
     tried = []
     for effect in effects:
         faint = _FAINT * float(effect.first_strengths(bench.model, theta, usual[effect.place])[0])
@@ -79,14 +79,18 @@ def _scored(
     tried: Sequence[tuple[NonlinearEffect, float, tuple[Acting, ...]]],
 ) -> list[Hint]:
     """Hints around a point: of each effect, a little of it, and the forces with that little."""
-    own = bench.added_motions(found.forces, found.theta).sum(axis=0)
+    own = bench.simulation.added(found.forces, found.theta, found.motion)
+    if not np.isfinite(own).all():
+        return []
     usable, moved = [], []
     for effect, little, acting in tried:
-        with_it = bench.added_motions(acting, found.theta).sum(axis=0)
-        if np.isfinite(with_it[0]):
+        near = np.zeros((len(acting), own.shape[1]))
+        near[: len(own)] = own
+        with_it = bench.simulation.added_near(acting, found.theta, near)
+        if np.isfinite(with_it).all():
             usable.append(effect)
-            moved.append((with_it - own) / little)
-    if not usable or not np.isfinite(own[0]):
+            moved.append((with_it - near).sum(axis=0) / little)
+    if not usable:
         return []
     residual, linear, forces, _ = slopes_of_all(bench, found, moved)
     known, further = np.split(forces, [forces.shape[1] - len(moved)], axis=1)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.state import Change, share, weights
-from bayeshaptic.diagnosis.trials.force_along import Along, grown, slopes_along
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.along import Along, slopes_along
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
@@ -25,6 +25,7 @@ from bayeshaptic.types import Complexes, Floats
 
 NUDGE = 0.1  # relative, of strength and shape for the slopes
 _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
+_ALL = (0, 1, 2, 3)  # windows
 _SMOOTH = 1e-3  # share of these distances where a sticking mass's motion goes smoothly
 
 
@@ -99,18 +100,9 @@ def slopes_of_all(
     over further `motions`; and which of the linear parameters are free.
     """
     form = Form.of(found)
-    logs, everything = form.logs(found), (0, 1, 2, 3)
-    residuals, start, _ = linearised(
-        bench,
-        form,
-        logs,
-        found.theta,
-        0 * logs,
-        nudges_of(bench),
-        _SMOOTH + 0 * logs,
-        everything,
-        motions,
-    )
+    none = 0 * form.logs(found)
+    reach = Reach(nudges_of(bench), _SMOOTH + none)
+    residuals, start, _ = linearised(bench, form, found, none, reach, _ALL, motions)
     here, size = residuals(start), bench.model.size
     slopes = jacobian(residuals, start, here)[0]
     _, low, high = search_box(bench.model)
@@ -129,14 +121,29 @@ def nudges_of(bench: ForceBench) -> Floats:
     return np.clip(np.nan_to_num(_SDS * relative, nan=np.inf), _LEAST, _FARTHEST)
 
 
+@dataclass(frozen=True)
+class Reach:
+    """How far slopes are taken over.
+
+    Attributes
+    ----------
+    linear : ndarray, shape (P,)
+        Usual distances of the linear parameters' coordinates: `nudges_of`.
+    near : ndarray, shape (J,)
+        Share of the usual distance of each logarithm; those of the linear parameters go with the
+        strengths'.
+    """
+
+    linear: Floats
+    near: Floats
+
+
 def linearised(
     bench: ForceBench,
     form: Form,
-    logs: Floats,
-    theta: Floats,
+    found: Point,
     moved: Floats,
-    nudges: Floats,
-    near: Floats,
+    reach: Reach,
     parts: tuple[int, ...],
     motions: list[Floats] | None = None,
     along: Along | None = None,
@@ -150,17 +157,11 @@ def linearised(
     ----------
     bench : ForceBench
     form : Form
-    logs : ndarray, shape (J,)
-        Logarithms of strengths and shapes, where the slopes are taken.
-    theta : ndarray, shape (P,)
-        The linear parameters there.
+    found : Point
+        Where the slopes are taken.
     moved : ndarray, shape (J,)
         How far the logarithms have come since the fit began.
-    nudges : ndarray, shape (P,)
-        Usual distances for slopes over the linear parameters: `nudges_of`.
-    near : ndarray, shape (J,)
-        Share of the usual distance to take each logarithm's slope over; those over the linear
-        parameters go with the strengths'.
+    reach : Reach
     parts : tuple of int
         Which of the windows are fitted.
     motions : list of ndarray, optional
@@ -176,19 +177,16 @@ def linearised(
     along : Along
         The slopes over the linear parameters that were used.
     """
-
-    further = motions or []
-    forces, taken = form.at(logs), bench.extra
-    added = bench.added_motions(forces, theta)
-    inner, extra = added.sum(axis=0), bench.driven(forces, theta, added)
+    further, simulation = motions or [], bench.simulation
+    logs, theta, near = form.logs(found), found.theta, reach.near
+    forces = form.at(logs)
+    added = simulation.added(forces, theta, found.motion)
+    total = simulation.driven(forces, theta, added)
 
     def slope(step: Floats, side: float) -> Floats:
         now = form.at(logs + side * step)
-        if bench.held:  # what more they add is not the hand's
-            bench.remember(taken + grown(added, forces, now))
-        moved = bench.driven(now, theta, bench.added_motions(now, theta))
-        bench.remember(taken)
-        return (moved - extra) / side
+        with_it = simulation.driven(now, theta, simulation.added_near(now, theta, added))
+        return (with_it - total) / side
 
     sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
     slopes = [slope(unit, side) for side, unit in zip(sides, np.eye(len(logs)), strict=True)]
@@ -198,9 +196,8 @@ def linearised(
     at, nearest = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
     if along is None or not along.holds(at, nearest):
         moving = [not isinstance(one.effect, CommandEffect) for one in forces]
-        each = slopes_along(bench, forces, theta, added, nearest * nudges)
+        each = slopes_along(bench, forces, theta, added, nearest * reach.linear)
         along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
-    bench.remember(inner)  # not before: what is compared has the slow motion in common
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
     columns = [
         *(bench.at_lines(slope) for slope in slopes),

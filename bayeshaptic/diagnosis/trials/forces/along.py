@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
 from bayeshaptic.inference.fit import search_box
@@ -87,29 +87,33 @@ def slopes_along(
         return np.asarray(relative[:, None] * np.stack([bench.at_lines(one) for one in own]))
     found = []
     for vector, distance in zip(here.natural(phi + np.diag(distances)), distances, strict=True):
-        moves = (bench.added_motions(forces, vector)[moving] - own) / distance
+        moves = (bench.simulation.added_near(forces, vector, added)[moving] - own) / distance
         usable = np.isfinite(moves[:, :1])  # not where it runs away
         found.append([bench.at_lines(move) for move in np.where(usable, moves, 0.0)])
     return np.array(found)
 
 
-def expect(bench: ForceBench, near: Point, forces: tuple[Acting, ...], theta: Floats) -> None:
-    """Have the bench read a hand's motion off beside what forces will add, from a point near by.
+def expected(
+    bench: ForceBench, near: Point, forces: tuple[Acting, ...], theta: Floats
+) -> Floats | None:
+    """What forces will add together, from a point near by: where their simulation begins.
 
-    Beside what they added at another place a hand seems to do the difference, and forces answer to
-    that: friction of twice the strength was worth 1,700 in log likelihood less at first, and no
-    step towards it was taken.
+    None where the point runs away.
 
     Parameters
     ----------
     bench : ForceBench
     near : Point
+        Those of `forces` with other strengths and shapes.
     forces : tuple of Acting
-        Those of `near` with other strengths and shapes.
     theta : ndarray, shape (P,)
+
+    Returns
+    -------
+    ndarray, shape (N,)
     """
-    if not bench.held or not near.changes:
-        return
+    if not near.changes:
+        return None
     samples = bench.recording.samples
     added = np.array([np.broadcast_to(change.motion, samples) for change in near.changes])
     extra = added.sum(axis=0) + grown(added, near.forces, forces)
@@ -118,7 +122,7 @@ def expect(bench: ForceBench, near: Point, forces: tuple[Acting, ...], theta: Fl
         frequency_hz[0] = frequency_hz[1]  # where a hand only damps there is no response at rest
         response = _response(bench, np.stack([near.theta, theta]), frequency_hz)
         extra = np.fft.irfft(np.fft.rfft(extra) * response[1] / response[0], samples)
-    bench.remember(extra)
+    return extra
 
 
 def grown(added: Floats, before: Sequence[Acting], now: Sequence[Acting]) -> Floats:

@@ -6,14 +6,14 @@ Gauss-Newton fit moves everything.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayeshaptic.diagnosis.state import FIT, fit_part
-from bayeshaptic.diagnosis.trials.force_along import Along, expect
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_slopes import NUDGE, Form, linearised, nudges_of
+from bayeshaptic.diagnosis.trials.forces.along import Along, expected
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.slopes import NUDGE, Form, Reach, linearised, nudges_of
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.numerics.gauss_newton import minimise
@@ -56,13 +56,11 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     """
     form, found = Form.of(found), _near(bench, found, found.forces, found.theta)
     first, before, best = form.logs(found), found, found
-    nudges, near, furthest = nudges_of(bench), np.ones(len(first)), 1.0
+    reach, furthest = Reach(nudges_of(bench), np.ones(len(first))), 1.0
     rounds = 60 if bench.before else 20  # ridges of two forces are long
     along: Along | None = None
     for _ in range(rounds):
-        logs = form.logs(best)
-        expect(bench, best, best.forces, best.theta)
-        step, along = _joint_step(bench, form, logs, best.theta, logs - first, nudges, near, along)
+        step, along = _joint_step(bench, form, best, form.logs(best) - first, reach, along)
         if not np.isfinite([*step.theta, *step.logs]).all():  # slopes of a motion that runs away
             break
         factor, point = _advanced(bench, form, best, step)
@@ -72,9 +70,10 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
         if gained >= max(_NO_GAIN, _SHARE * best.gain_fit):
             # Slopes over no more than what is still to go, each by itself.
             near = np.clip(factor * np.abs(step.logs) / NUDGE, _NEAREST, furthest)
+            reach = replace(reach, near=near)
         elif furthest > _CLOSE:  # once more, with slopes close by
             furthest = _CLOSE
-            near = np.full(len(first), _CLOSE)
+            reach = replace(reach, near=np.full(len(first), _CLOSE))
         else:
             break
     return best
@@ -124,8 +123,7 @@ def _polished(bench: ForceBench, point: Point) -> Point:
 
 def _near(bench: ForceBench, known: Point, forces: tuple[Acting, ...], theta: Floats) -> Point:
     """Forces and linear parameters as they are, beside the motion expected from a point near by."""
-    expect(bench, known, forces, theta)
-    return bench.as_it_is(forces, theta)
+    return bench.as_it_is(forces, theta, expected(bench, known, forces, theta))
 
 
 def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
@@ -151,20 +149,16 @@ def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
 def _joint_step(
     bench: ForceBench,
     form: Form,
-    logs: Floats,
-    theta: Floats,
+    best: Point,
     moved: Floats,
-    nudges: Floats,
-    near: Floats,
+    reach: Reach,
     along: Along | None,
 ) -> tuple[_Step, Along]:
     """To the linear parameters, strength and shape that fit best together."""
-    residuals, start, along = linearised(
-        bench, form, logs, theta, moved, nudges, near, FIT, along=along
-    )
+    residuals, start, along = linearised(bench, form, best, moved, reach, FIT, along=along)
     here, low, high = search_box(bench.model)
-    low = np.concatenate([low, np.full(len(logs), -_MOST)])
-    high = np.concatenate([high, np.minimum(form.highest - logs, _MOST)])
+    low = np.concatenate([low, np.full(len(moved), -_MOST)])
+    high = np.concatenate([high, np.minimum(form.highest - form.logs(best), _MOST)])
     phi, _ = minimise(residuals, start, low, high, 20, 1e-4)
     size = bench.model.size
     return _Step(np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:]), along

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from bayeshaptic.diagnosis.trials.force_bench import ForceBench, Point
-from bayeshaptic.diagnosis.trials.force_fit import fit_force
-from bayeshaptic.diagnosis.trials.force_hints import Hint, departures, hints
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.fit import fit_force
+from bayeshaptic.diagnosis.trials.forces.hints import Hint, departures, hints
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import Acting, Motion, NonlinearEffect
 from bayeshaptic.models.structures import GROUND_DAMPERS
@@ -43,7 +43,7 @@ def fitted(
         follow = worth and meter.affords(f"{point.effect.title}, its fit")
         found.append(fit_force(bench, point) if follow else point)
     # The linear parameters were fitted once more after the motion was simulated.
-    return [one for one in found if bench.stays(one.forces, one.theta)]
+    return [one for one in found if bench.stays(one)]
 
 
 def search(
@@ -139,7 +139,7 @@ def _followed(
         point = max((start(best, part) for part in _PARTS), key=lambda point: point.gain_fit)
         if np.isfinite(point.gain_fit) and meter.affords(best.effect.title):
             found.append(fit_force(bench, point))
-    return [one for one in found if bench.stays(one.forces, one.theta)]
+    return [one for one in found if bench.stays(one)]
 
 
 def _damped(bench: ForceBench, theta: Floats) -> Floats:

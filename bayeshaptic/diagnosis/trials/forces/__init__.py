@@ -1,0 +1,1 @@
+"""Trying internal forces on one recording: their motion, their fit, their search."""
