@@ -85,9 +85,13 @@ def slopes_along(
         response = _response(bench, around, bench.frequency_hz)
         relative = (response[1:] / response[0] - 1) / _STEP
         return np.asarray(relative[:, None] * np.stack([bench.at_lines(one) for one in own]))
-    found = []
+
+    def near(vector: Floats) -> Floats:
+        return bench.simulation.added_near(forces, vector, added)[moving]
+
+    found, own = [], near(theta)
     for vector, distance in zip(here.natural(phi + np.diag(distances)), distances, strict=True):
-        moves = (bench.simulation.added_near(forces, vector, added)[moving] - own) / distance
+        moves = (near(vector) - own) / distance
         usable = np.isfinite(moves[:, :1])  # not where it runs away
         found.append([bench.at_lines(move) for move in np.where(usable, moves, 0.0)])
     return np.array(found)

@@ -4,9 +4,9 @@ It is read off the encoder: what is measured, less what command and forces do.  
 so that what they do and it must be found together.  One read off beside what forces did in the
 last motion, over and over, comes to that by as little a step as friction is more of the damping
 than the damper: friction that was nearly all of it lay 12 mm apart from a motion of 0.5 mm, and a
-tenth less of it seemed to fit better.  Newton's steps are as large as is needed; how forces answer
-is told by the linear parameters that fit where no force is taken off, since these are the
-mechanism's with what forces do on the average (R. C. Booton, IRE Trans. Circuit Theory 1, 1954).
+tenth less of it seemed to fit better.  How forces answer is told by the linear parameters that fit
+where no force is taken off, since these are the mechanism's with what forces do on the average
+(R. C. Booton, IRE Trans. Circuit Theory 1, 1954): Newton's steps are then as large as is needed.
 """
 
 from __future__ import annotations
@@ -22,25 +22,38 @@ from scipy.signal import butter, sosfiltfilt
 
 from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
-_HAND_HZ = 20.0
-_ORDER = 2
-# Root mean square of velocities off, as a share of the motion's, and how many simulations at most.
-# Log likelihoods of 2,500 to 9,200 are then right to 2.
-_SETTLED, _MOST = 3e-4, 8
+# Hands tremble at up to 12 Hz, which has to come through whole; the encoder's steps are noise of
+# velocity that grows with the edge to the power of 3/2, and may be this share of the motion's.  At
+# the true parameters of held LHIfAMs that rub, under steps, log likelihoods rise from 132 and 1,556
+# to 285 and 1,601 when the edge goes from 20 Hz (and half the order) to 30; on the coarse encoder
+# of PHANToMs they fall from 58 and 27 to -19 and -48, and are 43 and 38 at 16 Hz.
+_ORDER, _LEAST_HZ, _MOST_HZ, _NOISE = 4, 14.0, 30.0, 0.01
+# Root mean square of what is off, as a share of all that is left, and how many simulations at most.
+_SETTLED, _MOST = 0.1, 8
+_MIXED = 5  # motions that a mixture has at most
 _ALIKE = 1e-14  # squares: motions that differ by a ten-millionth are one
 
 
 class Besides(Protocol):
     """What the encoder tells of a motion that nothing known makes."""
 
+    def begin(self, left: Floats) -> Floats:
+        """Where to begin, before anything is known of forces; shapes (N,)."""
+        ...
+
     def of(self, left: Floats) -> Floats:
         """That motion in what is left of the measured position, shapes (N,)."""
         ...
 
+    def off(self, taken: Floats, rest: Floats) -> Floats:
+        """How far all of the motion is off where `taken` leaves that `rest`."""
+        ...
+
     def step(self, off: Floats) -> Floats:
-        """How far to go where `of` what is left differs from what was taken by so much."""
+        """How far to go, where forces answer to it."""
         ...
 
     def answered(self, motion: Floats) -> Floats:
@@ -55,37 +68,41 @@ class Hand:
     Attributes
     ----------
     period_s : float
+    edge_hz : float
+        Of what is slow: `hand_edge_hz`.
     response, usual : LinearSystem
         The mechanism without forces, and that with what they do on the average; batches of one.
     """
 
     period_s: float
+    edge_hz: float
     response: LinearSystem
     usual: LinearSystem
 
+    def begin(self, left: Floats) -> Floats:
+        return self.of(left)  # what is slow is measured, with all that forces do
+
     def of(self, left: Floats) -> Floats:
-        rate = 1 / self.period_s
-        low = butter(_ORDER, self._edge_hz(), fs=rate, output="sos")
-        return np.asarray(sosfiltfilt(low, left))
+        return _slow(left, self.period_s, self.edge_hz)
+
+    def off(self, taken: Floats, rest: Floats) -> Floats:
+        return self.of(taken + rest) - taken
 
     def step(self, off: Floats) -> Floats:
-        return self.answered(off)
+        return (self.answered(off) + off) / 2  # what sticks does not answer
 
     def answered(self, motion: Floats) -> Floats:
         count = next_fast_len(len(motion), real=True)
         spectrum = np.fft.rfft(motion, count)
         far = 10.0  # edges, where a ten-thousandth of the motion counts as slow
         frequency_hz = np.fft.rfftfreq(count, self.period_s)[: len(spectrum)]
-        frequency_hz = frequency_hz[frequency_hz < far * self._edge_hz()]
+        frequency_hz = frequency_hz[frequency_hz < far * self.edge_hz]
         frequency_hz[0] = frequency_hz[1]  # where a hand only damps there is no response at rest
-        slow = 1 / (1 + (frequency_hz / self._edge_hz()) ** (2 * _ORDER))
+        slow = 1 / (1 + (frequency_hz / self.edge_hz) ** (2 * _ORDER))
         s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
         ratio = self.usual.continuous_response(s)[0] / self.response.continuous_response(s)[0]
         spectrum[: len(s)] /= 1 + slow * (ratio - 1)
         return np.fft.irfft(spectrum, count)[: len(motion)]
-
-    def _edge_hz(self) -> float:
-        return min(_HAND_HZ, 0.4 / self.period_s)
 
 
 @dataclass(frozen=True)
@@ -94,37 +111,42 @@ class Drift:
 
     Attributes
     ----------
-    own, usual : ndarray, shape (N, 3)
-        Motions of standing still, a constant force and a push, of the mechanism without forces and
-        of that with what they do on the average; each of size one.
-    size : ndarray, shape (3,)
-        Sizes of `own` over those of `usual`.
+    own, usual : ndarray, shape (N, 2 or 3)
+        `drifts` of the mechanism without forces, and of that with what they do on the average;
+        as many as are `remembered`.
     """
 
     own: Floats
     usual: Floats
-    size: Floats
+
+    def begin(self, left: Floats) -> Floats:
+        return np.zeros_like(left)  # at rest
 
     def of(self, left: Floats) -> Floats:
         return np.asarray(self.own @ _parts(self.own, left))
 
+    def off(self, taken: Floats, rest: Floats) -> Floats:
+        return np.asarray(self.usual @ _parts(self.usual, rest))
+
     def step(self, off: Floats) -> Floats:
-        return np.asarray(self.own @ self._answer(off))
+        return np.asarray(self.own @ _parts(self.usual, off))
 
     def answered(self, motion: Floats) -> Floats:
-        answer = self._answer(motion)
-        return np.asarray(motion - self.usual @ (answer / self.size) + self.own @ answer)
-
-    def _answer(self, motion: Floats) -> Floats:
-        return self.size * _parts(self.usual, motion)
+        return np.asarray(motion + (self.own - self.usual) @ _parts(self.usual, motion))
 
 
 @dataclass(frozen=True)
 class Nothing:
     """Where forces do not know of it."""
 
+    def begin(self, left: Floats) -> Floats:
+        return np.zeros_like(left)
+
     def of(self, left: Floats) -> Floats:
         return np.zeros_like(left)
+
+    def off(self, taken: Floats, rest: Floats) -> Floats:
+        return np.zeros_like(rest)
 
     def step(self, off: Floats) -> Floats:
         return off
@@ -133,22 +155,55 @@ class Nothing:
         return motion
 
 
-def drift_of(system: LinearSystem, usual: LinearSystem, samples: int, period_s: float) -> Drift:
-    """A free device's drift: see `Drift`."""
+def hand_edge_hz(position: Floats, period_s: float) -> float:
+    """Up to where the encoder tells better what a hand does than nothing, in Hz.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N,)
+        Measured.
+    period_s : float
+    """
+    most = min(_MOST_HZ, 0.4 / period_s)
+    count = increment_unit(position)
+    if count is None:
+        return most
+    velocity = float(np.std(np.gradient(_slow(position, period_s, most), period_s)))
+    # Rounding is white: its velocity up to an edge f has (2 pi)^2 2 T f^3 / 3 of its variance.
+    unit = count / np.sqrt(12) * 2 * np.pi * np.sqrt(2 * period_s / 3)
+    return float(np.clip((_NOISE * velocity / unit) ** (2 / 3), min(_LEAST_HZ, most), most))
+
+
+def _slow(motion: Floats, period_s: float, edge_hz: float) -> Floats:
+    low = butter(_ORDER, edge_hz, fs=1 / period_s, output="sos")
+    return np.asarray(sosfiltfilt(low, motion))
+
+
+def drifts(system: LinearSystem, samples: int, period_s: float) -> Floats:
+    """Standing still, and what a constant force and a push do, shape (N, 3)."""
     steady = np.ones(samples)
+    return np.stack([steady, *linear_motion(system, steady, period_s)], axis=1)
 
-    def motions(of: LinearSystem) -> Floats:
-        return np.stack([steady, *linear_motion(of, steady, period_s)], axis=1)
 
-    own, other = motions(system), motions(usual)
-    sizes, others = np.linalg.norm(own, axis=0), np.linalg.norm(other, axis=0)
-    return Drift(own / sizes, other / others, sizes / others)
+def remembered(columns: Floats) -> Floats:
+    """`drifts` without the push where that is forgotten within a hundredth of the recording.
+
+    It cannot be told from standing elsewhere then; but where forces are taken for less than they
+    are it goes far.
+    """
+    others, push = columns[:, :2], columns[:, 2]
+    own = push - others @ _parts(others, push)
+    forgotten = 0.1  # root of the time
+    return columns if np.std(own) > forgotten * np.sqrt(np.mean(push**2)) else others
 
 
 def settled(
-    besides: Besides, left: Floats, forced: Callable[[Floats], Floats], expected: Floats
+    besides: Besides, left: Floats, forced: Callable[[Floats], Floats], first: Floats
 ) -> Floats:
     """What forces add to the motion, in one that agrees with the measured one.
+
+    From the best mixture of the motions tried so far (D. G. Anderson, Journal of the ACM 12, 1965):
+    forces that are not the true ones answer unlike those that were there.
 
     Parameters
     ----------
@@ -158,8 +213,8 @@ def settled(
     forced : callable
         From the motion that nothing known makes to what each force adds, shape (F, N); nan where
         it runs away.
-    expected : ndarray, shape (N,)
-        What forces may be expected to add together, to begin with.
+    first : ndarray, shape (N,)
+        The motion that nothing known makes, to begin with.
 
     Returns
     -------
@@ -167,23 +222,32 @@ def settled(
         The best that was found, where none agrees: a motion that sticks, or is chaotic, answers
         unlike the average.
     """
-    taken = besides.of(left - expected)
-    best, least = forced(taken), np.inf
-    added = best
-    for _ in range(_MOST - 1):
-        total = added.sum(axis=0)
-        if not np.isfinite(total[-1]):
+    taken, least = first, np.inf
+    best = added = forced(first)
+    motions: list[Floats] = []
+    errors: list[Floats] = []
+    for _ in range(1, _MOST):
+        rest = left - added.sum(axis=0) - taken
+        if not np.isfinite(rest[-1]):
             break
-        off = besides.of(left - total) - taken
-        wrong = float(np.diff(off).std())
+        off = besides.off(taken, rest)
+        wrong = float(np.std(off))
         if wrong < least:
             best, least = added, wrong
-        # Measured, but without the encoder's steps.
-        if wrong <= _SETTLED * np.diff(taken + total).std() or wrong > least:
+        if wrong <= _SETTLED * np.std(rest):
             break
+        motions, errors = [*motions, taken][-_MIXED:], [*errors, off][-_MIXED:]
+        taken, off = _mixture(motions, errors)
         taken = taken + besides.step(off)
         added = forced(taken)
     return best
+
+
+def _mixture(motions: list[Floats], errors: list[Floats]) -> tuple[Floats, Floats]:
+    """The mixture of motions that is least off, and by how much, to first order."""
+    change = np.diff(errors, axis=0).T
+    parts = lstsq(change, errors[-1], rcond=1e-8)[0] if change.size else np.zeros(0)
+    return motions[-1] - parts @ np.diff(motions, axis=0), errors[-1] - change @ parts
 
 
 def one_step(
@@ -195,5 +259,7 @@ def one_step(
 
 
 def _parts(columns: Floats, motion: Floats) -> Floats:
-    """How much of each column, of size one, a motion has."""
-    return np.asarray(lstsq(columns.T @ columns, columns.T @ motion, rcond=_ALIKE)[0])
+    """How much of each column a motion has, by least squares."""
+    size = np.linalg.norm(columns, axis=0)
+    alike = columns.T @ columns / np.outer(size, size)
+    return np.asarray(lstsq(alike, columns.T @ motion / size, rcond=_ALIKE)[0] / size)

@@ -79,17 +79,19 @@ def _scored(
     tried: Sequence[tuple[NonlinearEffect, float, tuple[Acting, ...]]],
 ) -> list[Hint]:
     """Hints around a point: of each effect, a little of it, and the forces with that little."""
-    own = bench.simulation.added(found.forces, found.theta, found.motion)
+    theta, simulation = found.theta, bench.simulation
+    added = simulation.added(found.forces, theta, found.motion)
+    own = simulation.added_near(found.forces, theta, added).sum(axis=0)
     if not np.isfinite(own).all():
         return []
     usable, moved = [], []
     for effect, little, acting in tried:
-        near = np.zeros((len(acting), own.shape[1]))
-        near[: len(own)] = own
-        with_it = bench.simulation.added_near(acting, found.theta, near)
+        near = np.zeros((len(acting), len(own)))
+        near[: len(added)] = added
+        with_it = simulation.added_near(acting, theta, near).sum(axis=0)
         if np.isfinite(with_it).all():
             usable.append(effect)
-            moved.append((with_it - near).sum(axis=0) / little)
+            moved.append((with_it - own) / little)
     if not usable:
         return []
     residual, linear, forces, _ = slopes_of_all(bench, found, moved)

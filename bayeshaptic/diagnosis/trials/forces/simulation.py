@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.trials.forces.besides import (
     Besides,
+    Drift,
     Hand,
     Nothing,
-    drift_of,
+    drifts,
+    hand_edge_hz,
     one_step,
+    remembered,
     settled,
 )
 from bayeshaptic.effects.nonlinear.internal_force import (
@@ -69,6 +72,17 @@ class Simulation:
     def _measured(self) -> Floats:
         return _between(self.recording.position)
 
+    @cached_property
+    def _edge_hz(self) -> float:
+        return hand_edge_hz(self.recording.position, self.recording.period_s)
+
+    @cached_property
+    def _usual_drifts(self) -> Floats:
+        return remembered(self._drifts(self.usual))
+
+    def _drifts(self, theta: Floats) -> Floats:
+        return drifts(self.model.system(theta), self.recording.samples, self.recording.period_s)
+
     def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
         """Position and velocity at places, on the fine grid, beside the forces that are there."""
         linear = self._linear(theta, self.command)
@@ -89,10 +103,18 @@ class Simulation:
         theta : ndarray, shape (P,)
             Linear parameters beside them.
         expected : ndarray, shape (N,), optional
-            What they may be expected to add together: what those that are there do.
+            What they may be expected to add together, where something is known of that.
         """
-        at_first = self.there if expected is None else expected
-        return self._each(forces, lambda _: settled(*self._with(forces, theta), at_first))
+
+        def added(_: NDArray[np.bool_]) -> Floats:
+            besides, left, forced = self._with(forces, theta)
+            if expected is None:
+                first = besides.begin(left)
+            else:
+                first = besides.of(left - expected)
+            return settled(besides, left, forced, first)
+
+        return self._each(forces, added)
 
     def added_near(self, forces: tuple[Acting, ...], theta: Floats, near: Floats) -> Floats:
         """What forces add, to first order in how that differs from `near`, shapes (F, N)."""
@@ -159,11 +181,12 @@ class Simulation:
 
     def _besides(self, theta: Floats, places: tuple[Place, ...]) -> Besides:
         """What neither command nor forces make."""
-        own, usual = self.model.system(theta), self.model.system(self.usual)
         if self.model.held:
-            return Hand(self.recording.period_s, own, usual)
+            own, usual = self.model.system(theta), self.model.system(self.usual)
+            return Hand(self.recording.period_s, self._edge_hz, own, usual)
         if {MOTOR, LOAD} & set(places):
-            return drift_of(own, usual, self.recording.samples, self.recording.period_s)
+            kept = self._usual_drifts.shape[1]
+            return Drift(self._drifts(theta)[:, :kept], self._usual_drifts)
         return Nothing()  # that a spring between the masses would know of
 
     def _linear(self, theta: Floats, command: Floats) -> Floats:

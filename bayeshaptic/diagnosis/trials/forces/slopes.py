@@ -181,12 +181,14 @@ def linearised(
     logs, theta, near = form.logs(found), found.theta, reach.near
     forces = form.at(logs)
     added = simulation.added(forces, theta, found.motion)
-    total = simulation.driven(forces, theta, added)
+
+    def driven(acting: tuple[Acting, ...]) -> Floats:
+        return simulation.driven(acting, theta, simulation.added_near(acting, theta, added))
+
+    total = driven(forces)  # as near as the others, so that differences are theirs
 
     def slope(step: Floats, side: float) -> Floats:
-        now = form.at(logs + side * step)
-        with_it = simulation.driven(now, theta, simulation.added_near(now, theta, added))
-        return (with_it - total) / side
+        return (driven(form.at(logs + side * step)) - total) / side
 
     sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
     slopes = [slope(unit, side) for side, unit in zip(sides, np.eye(len(logs)), strict=True)]
