@@ -145,7 +145,30 @@ def test_a_loop_that_repeats_exactly_is_seen_by_its_law() -> None:
     assert not causality(replace(recording, reference=None)).has_feedback
     assert share_by_a_law(recording) > 0.9
     assert has_feedback(check_recording(replace(recording, reference=None)))
-    assert share_by_a_law(in_loop("noise")[0]) == 0
+    assert share_by_a_law(replace(in_loop("noise")[0], reference=None)) == 0
+
+
+def test_a_loop_that_follows_noise_is_seen_by_its_law_where_that_was_written_down() -> None:
+    """A stiff spring to the reference answers so little to chance that predictions do not err."""
+    bench = Bench.from_device("lhifam", False, "free")
+    bench = replace(bench, encoder_resolution=0.1 * bench.encoder_resolution)
+    law = Feedback((bench.values["m1"] + bench.values["m2"]) * 8.0**2)
+    target = wanted("noise", bench, bench.force_rms / law.proportional)
+    recording = following(bench, law, target)
+    assert not has_feedback(check_recording(replace(recording, reference=None)))
+    assert share_by_a_law(recording) > 0.99
+    found = [n for n in check_recording(recording) if n.topic == "feedback"]
+    assert len(found) == 1 and "linear law of positions and reference" in found[0].text
+
+
+@pytest.mark.parametrize("kind", ["noise", "steps"])
+def test_an_open_loop_has_no_law_whatever_stands_beside_it(kind: str) -> None:
+    bench = Bench.from_device("lhifam", held=False)
+    made = simulate(bench, wanted(kind, bench, bench.force_rms), seed=1)
+    recording = recording_from_arrays(made.force, made.position, bench.period_s)
+    slow = np.cumsum(made.force - made.force.mean())
+    for beside in (made.force, np.roll(made.force, 1), slow, made.position, np.gradient(slow)):
+        assert share_by_a_law(replace(recording, reference=beside)) == 0
 
 
 @pytest.mark.parametrize("early", [0, 1])

@@ -11,6 +11,7 @@ from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, begin
 from bayeshaptic.diagnosis.base.opened import Clock
 from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
 from bayeshaptic.diagnosis.options import Options, options_from
@@ -120,6 +121,9 @@ def finish(
         limit = watch.limit_of(posterior)
         etfe_limit = witness or etfe_critical_stiffness(etfe, seed=options.seed)
     options.report(0.9, "writing the report")
+    notices = begun.notices
+    if etfe.direct or etfe.through_reference:
+        notices = with_units_of(fit, etfe.recording, begun.device, notices)
     return Analysis(
         recording=etfe.recording,
         etfe=etfe,
@@ -130,7 +134,7 @@ def finish(
         posterior=posterior,
         limit=limit,
         etfe_limit=etfe_limit,
-        notices=begun.notices + limit.notices + _misfit_notice(fit.reduced_chi_square, scale),
+        notices=notices + limit.notices + _misfit_notice(fit.reduced_chi_square, scale),
         seconds=clock.seconds,
         noise_scale=scale,
         lever_m=begun.lever_m,

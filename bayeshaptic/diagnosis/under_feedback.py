@@ -16,6 +16,7 @@ from bayeshaptic.diagnosis.feedback.in_loop import (
 )
 from bayeshaptic.diagnosis.feedback.lacking import Lacking
 from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
+from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
 from bayeshaptic.diagnosis.limit_known import LimitKnown
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.samples.sinusoids import in_words
@@ -93,6 +94,8 @@ def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
         return None
     questions = open_questions(found, posterior, limit, begun.one_mass)
     told = tuple(replace(n, text=_BIASED) if n.topic == "feedback" else n for n in begun.notices)
+    if not open_loop:
+        told = with_units_of(fit, recording, begun.device, told)
     return Analysis(
         recording=recording,
         etfe=begun.etfe,

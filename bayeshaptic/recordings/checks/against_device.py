@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,11 @@ from numpy.typing import NDArray
 from bayeshaptic.devices import STRUCTURES, Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.sufficiency import LEAST_COHERENCE
-from bayeshaptic.recordings.checks.units_in_doubt import implausible_mass, other_units
+from bayeshaptic.recordings.checks.units_in_doubt import (
+    implausible_mass,
+    not_of_the_position,
+    other_units,
+)
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
@@ -109,6 +114,28 @@ def response_ratio(
         ratios = ratios[:, lowest]
     # Nobody knows here whether the device was held: the nearest of its models counts.
     return float(min(np.median(ratios, axis=1), key=lambda ratio: abs(np.log(ratio))))
+
+
+def against_response(
+    notices: Iterable[Notice], recording: Recording, device: Device | None, rough: RoughResponse
+) -> tuple[Notice, ...]:
+    """What was said of units, with what a response says of them.
+
+    Parameters
+    ----------
+    notices : iterable of Notice
+        That the response of the device may confirm to be harmless.
+    recording : Recording
+    device : Device or None
+    rough : RoughResponse
+        That holds: in closed loop a fitted model's, since the measured one is biased.
+    """
+    told = tuple(notices)
+    if confirms(response_ratio(recording, device, rough)):
+        told = not_of_the_position(told)
+    # A slip of units need not be found twice.
+    slipped = any((n.level, n.topic) == ("warning", "units") for n in told)
+    return (*told, *compare_response(recording, device, rough, slipped))
 
 
 def confirms(ratio: float | None) -> bool:

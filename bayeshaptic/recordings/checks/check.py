@@ -7,19 +7,17 @@ import numpy as np
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.against_device import (
+    against_response,
     compare_resolution,
-    compare_response,
-    confirms,
-    response_ratio,
 )
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
 from bayeshaptic.recordings.checks.units_in_doubt import (
     degrees,
     mixed_units,
-    not_of_the_position,
     whole_numbers,
 )
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
+from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
@@ -66,16 +64,15 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *compare_resolution(recording, device),
     )
     rough = rough_response(recording)
-    if confirms(response_ratio(recording, device, rough)):
-        scales = not_of_the_position(scales)
-    # A slip of units need not be found twice.
-    slipped = any((n.level, n.topic) == ("warning", "units") for n in scales)
+    driven = what_drives_what(recording, rough, where)
+    # A controller biases the response: there a fit that holds in the loop is asked instead.
+    if recording.feedback is None and not has_feedback(driven):
+        scales = against_response(scales, recording, device, rough)
     return (
         *recording.notices,
         *scales,
-        *compare_response(recording, device, rough, slipped),
         *says_nothing_of_the_actuator(recording),
-        *what_drives_what(recording, rough, where),
+        *driven,
     )
 
 

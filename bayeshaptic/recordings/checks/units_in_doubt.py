@@ -36,7 +36,12 @@ def in_doubt(quantity: str, notices: Iterable[Notice]) -> bool:
 
 def not_of_the_position(notices: Iterable[Notice]) -> tuple[Notice, ...]:
     """The same, without doubt of the position's unit: the device's file confirms it."""
-    return tuple(replace(n, about=tuple(a for a in n.about if a != "position")) for n in notices)
+    return tuple(
+        replace(n, about=tuple(a for a in n.about if a != "position"))
+        if (n.level, n.topic) == ("warning", "units")
+        else n
+        for n in notices
+    )
 
 
 def mixed_units(recording: Recording) -> list[Notice]:

@@ -36,7 +36,8 @@ def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> 
     if found.has_feedback:
         return [_feedback(found.evidence, against)]
     if not measured and (share := share_by_a_law(recording)) > 0:
-        law = f"in {percent(share)} of the samples a linear law of the positions makes it exactly"
+        known = "the positions" if recording.reference is None else "positions and reference"
+        law = f"in {percent(share)} of the samples a linear law of {known} makes it exactly"
         return [_feedback(law, against)]
     if found.doubtful:
         return [_doubt(found.evidence)]

@@ -9,6 +9,7 @@ left side zero in most samples are its law, and what is left in the others is wh
 
 Of 30 simulated loops each it is read off in 27 that step and 16 that ramp (the others have too few
 changes, were cut off or rub), and in none that follow noise, where there is nothing to be read.
+That the force is computed shows there, too, where the reference was written down beside it.
 """
 
 from __future__ import annotations
@@ -54,8 +55,10 @@ def _cut_off(force: Floats) -> bool:
 def share_by_a_law(recording: Recording) -> float:
     """In which share of the samples a linear law makes the force of the positions, exactly.
 
-    Zero where it is less than half, where the force's own past says it as well, or where nothing
-    changes that a controller may follow: positions without noise are an exact law of the force.
+    Where it was written down what the controller followed is in the law, too, so that the law need
+    not wait for a reference that rests.  Zero where it is less than half, where the force's own
+    past (and the reference) says it as well, or where nothing changes that a controller may follow:
+    positions without noise are an exact law of the force.
 
     Parameters
     ----------
@@ -63,13 +66,19 @@ def share_by_a_law(recording: Recording) -> float:
     """
     piece = max(recording.pieces, key=lambda one: one.samples)
     found = _left_over(piece)
-    if found is None or np.count_nonzero(_changes(found)) < _FEWEST_CHANGES:
+    if found is None:
         return 0.0
+    followed, changes = False, np.count_nonzero(_changes(found))
+    if piece.reference is not None and (told := _left_over(piece, followed=True)) is not None:
+        explained = np.count_nonzero(np.abs(found) > _EXACT)
+        explained -= np.count_nonzero(np.abs(told) > _EXACT)
+        if explained >= _FEWEST_CHANGES:
+            followed, found, changes = True, told, explained
     left = float(np.mean(np.abs(found) > _EXACT))
-    if left > 1 - _MOST:
+    if changes < _FEWEST_CHANGES or left > 1 - _MOST:
         return 0.0
-    by_itself = _left_over(piece, own=True)
-    if by_itself is None or left > _HALF * float(np.mean(np.abs(by_itself) > _EXACT)):
+    by_itself = _left_over(piece, own=True, followed=followed)
+    if by_itself is None or not left < _HALF * float(np.mean(np.abs(by_itself) > _EXACT)):
         return 0.0
     return 1 - left
 
@@ -90,20 +99,26 @@ def _changes(left: Floats) -> Bools:
     return np.asarray(size > most)
 
 
-def _left_over(piece: Recording, own: bool = False) -> Floats | None:
+def _left_over(piece: Recording, own: bool = False, followed: bool = False) -> Floats | None:
     """What the sparsest law leaves of second differences of the force, over their size.
 
-    With `own` a law of the force's past alone; None where one of them does not move.
+    With `own` a law without the positions, with `followed` one with the reference; None where a
+    signal of the law does not move.
     """
-    force, position = (np.diff(signal, 2) for signal in (piece.force, piece.position))
-    commanded, moved = float(np.std(force)), float(np.std(position))
-    if commanded == 0 or moved == 0:
+    force = np.diff(piece.force, 2)
+    others = [] if own else [piece.position]
+    others += [piece.reference] if followed and piece.reference is not None else []
+    signals = [force, *(np.diff(other, 2) for other in others)]
+    sizes = [float(np.std(signal)) for signal in signals]
+    if min(sizes) == 0:
         return None
     rows = len(force) - _LAGS
-    columns = [force[_LAGS - lag : _LAGS - lag + rows] / commanded for lag in range(1, _LAGS + 1)]
-    if not own:
-        columns += [position[_LAGS - lag : _LAGS - lag + rows] / moved for lag in range(_LAGS + 1)]
-    design, target = np.stack(columns, axis=1), force[_LAGS:] / commanded
+    columns = [
+        signal[_LAGS - lag : _LAGS - lag + rows] / size
+        for signal, size in zip(signals, sizes, strict=True)
+        for lag in range(int(signal is force), _LAGS + 1)
+    ]
+    design, target = np.stack(columns, axis=1), force[_LAGS:] / sizes[0]
     return np.asarray(target - design @ _sparsest(design[:_FITTED], target[:_FITTED]))
 
 
