@@ -71,7 +71,7 @@ def test_the_rule_asks_for_more_until_the_limit_is_known():
     whole = independent(64, device="lhifam")
     rule = LimitKnown(whole.model)
     early = rule(whole.chains[:, :24])
-    assert not early.done and early.share < 0.9
+    assert not (early.done or early.known) and early.share < 0.9
     many = independent(256, device="lhifam")
     late = rule(many.chains)
     assert late.done and late.share >= 1
@@ -85,14 +85,16 @@ def test_the_rule_asks_for_more_until_the_limit_is_known():
 def test_without_small_risks_fewer_draws_do():
     whole = independent(48, device="lhifam")
     assert LimitKnown(whole.model, ())(whole.chains).done
-    assert not LimitKnown(whole.model)(whole.chains).done
+    # A report said "not converged" of what met everything that it listed but for a small risk.
+    waiting = LimitKnown(whole.model)(whole.chains)
+    assert waiting.known and not waiting.done
 
 
 def test_ensembles_that_are_apart_are_not_done():
     whole = independent(256, device="lhifam")
     whole.chains[0, ..., whole.model.names.index("b2")] *= 1.006
     verdict = LimitKnown(whole.model)(whole.chains)
-    assert verdict.diagnostics.rhat.max() > 1.01 and not verdict.done
+    assert verdict.diagnostics.rhat.max() > 1.01 and not (verdict.known or verdict.done)
 
 
 @pytest.mark.parametrize("name", ["norm", "gumbel_r", "gumbel_l"])

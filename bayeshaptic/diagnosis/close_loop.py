@@ -202,8 +202,10 @@ def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed
         return closed
     seconds = {**analysis.seconds, "what could hide": time.perf_counter() - began}
     analysis = replace(analysis, limit=found[0], hidden=found[1], seconds=seconds)
-    after = model_error(analysis)
-    return replace(closed, analysis=analysis, after={key: after[key] for key in closed.after})
+    # Windows of a loop cannot be held out by themselves: there the limit alone is an error.
+    after = limit_alone(analysis) if analysis.etfe.direct else model_error(analysis)
+    after = {key: after.get(key, value) for key, value in closed.after.items()}
+    return replace(closed, analysis=analysis, after=after)
 
 
 def _declared_alone(analysis: Analysis, error: Exception) -> Analysis:

@@ -44,7 +44,8 @@ class LimitKnown:
     The Monte-Carlo error of every reported quantile of K_CR is below 5 % of its 90 % interval (or
     the quantile is counted from 4000 effective draws), that of a small risk's below 10 %; R-hat of
     K_CR and of every parameter that the data know is below 1.01; every parameter has 400 effective
-    draws.
+    draws.  Where evaluations run out before a small risk is known so, the rest is known all the
+    same: that risk is stated as it can be, or not at all.
 
     Attributes
     ----------
@@ -68,19 +69,19 @@ class LimitKnown:
         found = diagnose(chains, EFFECTIVE)
         share = found.ess / EFFECTIVE
         if share < _HOPELESS or np.median(found.rhat) > _APART:
-            return self._verdict(found, False, share, "the limit was not looked at")
+            return self._verdict(found, False, share, share, "the limit was not looked at")
         limit = self._limit(chains)
         data = ~np.array(prior_dominated(self.model, chains.reshape(-1, chains.shape[-1])))
         rhat = max([_rhat(limit, chains), *found.rhat[data]])
         error, worth = _worst(limit, QUANTILES)
         risky = self._risks(limit, chains)
-        done = rhat < RHAT_LIMIT and min(share, worth) >= 1
+        known = rhat < RHAT_LIMIT and min(share, worth) >= 1
         facts = (
             f"every reported quantile of the critical stiffness is known to {100 * error:.1f} % of "
             "its 90 % interval, R-hat between the independent ensembles is at most "
             f"{rhat:.4f} (of the critical stiffness and of what the data know)"
         )
-        return self._verdict(found, done and risky >= 1, min(share, worth, risky), facts)
+        return self._verdict(found, known, min(share, worth), risky, facts)
 
     def limit_of(self, posterior: Any) -> CriticalStiffness:
         """The limit over all draws of `posterior`, whose chains were watched."""
@@ -112,11 +113,14 @@ class LimitKnown:
                 shares.append(below)
         return min(shares)
 
-    def _verdict(self, found: Diagnostics, done: bool, share: float, facts: str) -> Verdict:
+    def _verdict(
+        self, found: Diagnostics, known: bool, share: float, risky: float, facts: str
+    ) -> Verdict:
         fewest = self.model.names[int(np.argmin(found.fewest))]
         facts += f", and every parameter has at least {found.ess:.0f} effective draws ({fewest})"
         asked = f"{PRECISION:.0%}, {RHAT_LIMIT} and {EFFECTIVE:.0f}"
-        return Verdict(found, bool(done), share, facts, asked)
+        done = bool(known and risky >= 1)
+        return Verdict(found, bool(known), done, min(share, risky), facts, asked)
 
 
 def _width(limit: CriticalStiffness) -> float:

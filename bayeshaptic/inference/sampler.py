@@ -162,7 +162,7 @@ def sample(
         here.natural(run.chains),
         _log_likelihoods(density, run.chains, run.values),
         verdict.diagnostics,
-        verdict.done and not lost,
+        verdict.known and not lost,
         _LOST if lost else _message(verdict, counted.count),
         time.perf_counter() - began,
         seed,
@@ -209,6 +209,11 @@ def _log_likelihoods(density: Density, chains: Floats, values: Floats) -> Floats
 def _message(verdict: Verdict, evaluations: int) -> str:
     if verdict.done:
         return f"Converged because {verdict.facts}."
+    if verdict.known:
+        return (
+            f"Converged because {verdict.facts}. Stopped after {evaluations} evaluations of the "
+            "likelihood, so that a small risk may be known less well than was asked for."
+        )
     return (
         f"Not converged after {evaluations} evaluations of the likelihood: {verdict.facts}, where "
         f"{verdict.asked} were asked for. The interval may be too narrow; more data, a simpler "

@@ -20,7 +20,10 @@ class Verdict:
     ----------
     diagnostics : Diagnostics
         Of the parameters.
+    known : bool
+        Whether what an interval rests on is known as well as was asked for.
     done : bool
+        Whether nothing else is waited for either.
     share : float
         Of the draws asked for, those that are there; 1 or more where they are enough.
     facts : str
@@ -30,6 +33,7 @@ class Verdict:
     """
 
     diagnostics: Diagnostics
+    known: bool
     done: bool
     share: float
     facts: str
@@ -65,9 +69,11 @@ class EveryParameter:
         found = diagnose(chains, self.ess)
         worst = self.model.names[int(np.argmax(found.rhat))]
         fewest = self.model.names[int(np.argmin(found.fewest))]
+        known = bool(found.ess >= self.ess and found.rhat.max() < RHAT_LIMIT)
         return Verdict(
             found,
-            bool(found.ess >= self.ess and found.rhat.max() < RHAT_LIMIT),
+            known,
+            known,
             found.ess / self.ess,
             f"R-hat between the independent ensembles is at most {found.rhat.max():.4f} "
             f"({worst}) and every parameter has at least {found.ess:.0f} effective draws, bulk and "
