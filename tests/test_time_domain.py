@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from one_truth import check_page, page_of, words_only
 
 from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.feedback.in_loop import contradictions
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood
@@ -146,7 +149,29 @@ def test_a_recording_in_closed_loop_has_a_limit(
     # A delay of another loop, from a device file, would move the limit by a third.
     other = close_loop(recording, "rigid", delay_s=0.2e-3, delay_sd_s=0.0, ess=600)
     assert headline(other).status == "untrusted"
-    assert "the delay was given as 200 µs, and the motion says" in headline(other).sentence
+    assert (
+        "the delay was given as 200 µs, and one mass that moves so would have"
+        in headline(other).sentence
+    )
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "words"),
+    [(-25e-6, "no device has: more than one mass"), (3e-4, "correct what gave it")],
+)
+def test_a_delay_below_zero_is_no_reason_to_doubt_what_was_given(
+    delay_s: float, words: str
+) -> None:
+    """Of a held device, told its delay, a page advised to leave that out."""
+    values = {"m": 0.2, "b": 1.0, "coulomb": 0.1, "offset": 0.0, "delay_s": delay_s}
+    motion: Any = SimpleNamespace(
+        values=np.array([values[name] for name in NAMES]), sd=np.full(len(NAMES), 1e-5)
+    )
+    model = SimpleNamespace(names=(), fixed={**values, "delay_s": 6.25e-4})
+    model.force_unit, model.position_unit = "N", "m"
+    posterior: Any = SimpleNamespace(model=model, summary=dict)
+    (found,) = contradictions(motion, posterior)
+    assert "the delay was given as 625 µs" in found and words in found
 
 
 def test_what_two_columns_share_alone_is_open() -> None:

@@ -177,6 +177,8 @@ def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
     """What was given, as known or by a prior, that the motion contradicts.
 
     A delay of the device file that is not the recording's moves the damping, and with it the limit.
+    What was given may be right as well, and the motion be of more than one mass: that is certain
+    where one mass would need what no device has, such as a delay below zero.
     """
     model, drawn = posterior.model, posterior.summary()
     known: list[str] = []
@@ -188,9 +190,16 @@ def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
             continue
         unit = unit_of(_DIMENSIONS[name], model.force_unit, model.position_unit)
         what = "comes out, with its prior, as" if free else "was given as"
+        why = (
+            ", which no device has: more than one mass moves, or force and position are not of one "
+            "sample"
+            if value < 0
+            else ": correct what gave it (--device, --delay-s, a prior), or more than one mass "
+            "moves"
+        )
         (believed if free else known).append(
-            f"the {_WORDS[name]} {what} {quantity(told, unit)}, and the motion says "
-            f"{quantity(value, unit, sd)}: leave out what gave it (--device, --delay-s, a prior)"
+            f"the {_WORDS[name]} {what} {quantity(told, unit)}, and one mass that moves so would "
+            f"have {quantity(value, unit, sd)}{why}"
         )
     # What is known wrongly pulls the others along.
     return tuple(known or believed)
