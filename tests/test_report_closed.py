@@ -201,6 +201,18 @@ def test_unexplained_says_class_place_trials_widening_and_what_next(family: str)
     assert head.status == status and said in head.sentence
 
 
+def test_no_law_of_friction_is_said_to_fail_that_was_not_asked() -> None:
+    """Through a reference forces are looked for, and not fitted: dry friction was no other law."""
+    closed = fake_closed("unexplained", "nonlinear")
+    recording = closed.analysis.etfe.recording
+    assert recording is not None
+    read = replace(recording, reference=recording.force)
+    etfe = replace(closed.analysis.etfe, recording=read)
+    vars(closed.analysis)["etfe"] = etfe
+    said = headline(closed).sentence
+    assert "which is not fitted through a reference" in said and "no law of friction" not in said
+
+
 def test_far_beyond_the_noise_no_stiffness_is_recommended() -> None:
     closed = fake_closed("unexplained", misfit=13.0)
     head = headline(closed)

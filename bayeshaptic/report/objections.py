@@ -55,9 +55,11 @@ def why_none(result: Result) -> tuple[str, ...]:
         return (reason,)
     found = _of_the_analysis(analysis, closed.diagnosis if closed else None)
     if closed and _rubs_otherwise(closed):
+        through = analysis.etfe.through_reference  # where no law is asked
+        why = "is not fitted through a reference" if through else "no law of friction explains"
         found.append(
-            "a force that goes with the velocity is left, which no law of friction explains, and "
-            "what the model takes for damping may be its part"
+            f"a force that goes with the velocity is left, which {why}, and what the model takes "
+            "for damping may be its part"
         )
     if closed and is_the_rest(closed):
         found.append(
