@@ -140,3 +140,31 @@ def test_two_masses_under_a_controller_are_refused_before_sampling(tmp_path: Pat
     check_page(closed, tmp_path)
     assert "None is stated" in page and "bayeshaptic report NEW.csv" in page
     assert not (tmp_path / "posterior.nc").exists()
+
+
+def coarse(resolution: float, seconds: float = 12.0) -> Recording:
+    """One mass under a PD controller that follows ramps, read in counts."""
+    bench = Bench("rigid", {"m": 0.5, "b": 1.0}, delay_s=5e-4, encoder_resolution=resolution)
+    rng, count = np.random.default_rng(2), round(seconds / bench.period_s)
+    corners = np.arange(0, count + 700, 700)
+    target = np.interp(np.arange(count), corners, rng.uniform(-0.02, 0.02, len(corners)))
+    last, omega = [0.0], 2 * np.pi * 2.0
+
+    def control(k: int, position: float) -> float:
+        rate, last[0] = (position - last[0]) / bench.period_s if k else 0.0, position
+        return float(0.5 * omega**2 * (target[k] - position) - 0.7 * omega * rate)
+
+    made = run_loop(bench, control, seconds, seed=1)
+    return recording_from_arrays(made.force, made.position, bench.period_s)
+
+
+@pytest.mark.parametrize("resolution", [1e-7, 5e-5])
+def test_one_mass_is_known_as_such_whatever_its_counts_are(resolution: float) -> None:
+    """In a twentieth of the sampling rate the acceleration was noise, and 4 of 20 were refused."""
+    recording = coarse(resolution)
+    found = explain_force(recording)
+    assert found is not None
+    assert found.further.relative_error < 0.2
+    assert found.further["mass"][0] == pytest.approx(0.5, rel=0.05)
+    usual = 0.05 / recording.period_s
+    assert (found.further.cutoff_hz == usual) == (resolution < 1e-6)

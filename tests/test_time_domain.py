@@ -12,10 +12,10 @@ import pytest
 from one_truth import check_page, page_of, words_only
 
 from bayeshaptic.diagnosis.close_loop import close_loop
-from bayeshaptic.diagnosis.feedback.in_loop import contradictions
+from bayeshaptic.diagnosis.feedback.in_loop import contradictions, open_questions
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood
+from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood, in_loop_fit
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, ridge
@@ -23,6 +23,7 @@ from bayeshaptic.inference.time_domain.widths import covariance
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.report import write_report
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
@@ -172,6 +173,25 @@ def test_a_delay_below_zero_is_no_reason_to_doubt_what_was_given(
     posterior: Any = SimpleNamespace(model=model, summary=dict)
     (found,) = contradictions(motion, posterior)
     assert "the delay was given as 625 µs" in found and words in found
+
+
+@pytest.mark.parametrize(("far", "clear"), [(2.0, False), (6.0, True)])
+def test_a_delay_below_zero_by_chance_is_said_to_be_unknown(far: float, clear: bool) -> None:
+    """Of loops with coarse counts pages said that force and position are not of one sample."""
+    recording = in_loop(4.0, 0.0, 2e-6)
+    motion = fit_motion(recording)
+    delay = NAMES.index("delay_s")
+    values, inside = motion.values.copy(), motion.inside.copy()
+    values[delay], inside[delay] = -far * motion.sd[delay], 0.0
+    motion = replace(motion, values=values, inside=inside)
+    model = rigid_with_friction(recording, motion)
+    fit = in_loop_fit(model, estimate_etfe(recording), motion, 1.0)
+    assert fit.impossible == (("delay_s",) if clear else ())
+    found: Any = SimpleNamespace(motion=motion)
+    posterior: Any = SimpleNamespace(model=model, prior_dominated={"delay_s": False})
+    limit: Any = SimpleNamespace(quantile=lambda _: 1.0)
+    said = open_questions(found, posterior, limit, one_mass=True)
+    assert said == (() if clear else ("the recording says too little of the delay",))
 
 
 def test_what_two_columns_share_alone_is_open() -> None:

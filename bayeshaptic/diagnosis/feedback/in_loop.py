@@ -13,6 +13,7 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
+from bayeshaptic.inference.time_domain.widths import SURELY
 from bayeshaptic.models import HalfNormal
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import pure, quantity
@@ -25,9 +26,6 @@ from bayeshaptic.types import Floats
 # Half a recording has too few strokes to say much: the halves may differ by so many of their sds.
 _APART = 4.0
 WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
-# Standard deviations (Student's t, eight degrees of freedom: 1 in 200) from which on the motion
-# contradicts what was given.
-_CONTRADICTED = 3.83
 # Share of the force (one standard deviation) that may be anything but one mass where its few tones
 # cannot tell: a base that gives, eddy currents, a gain that ripples.
 UNSEEN = 0.01
@@ -162,15 +160,23 @@ def open_questions(
             f"nothing here shows how the device vibrates above {found.motion.bandwidth_hz:.3g} Hz, "
             "where a vibration mode may set a lower limit than that of one mass"
         )
-    model = posterior.model
+    model, unsure = posterior.model, _unsure_of_the_delay(found.motion)
     for name, dominated in posterior.prior_dominated.items():
         free = name != "delay_s" or isinstance(model.prior(name), HalfNormal)
-        if dominated and free and name in _WORDS:
+        unknown = dominated or (unsure and name == "delay_s")
+        if unknown and free and name in _WORDS:
             reasons.append(f"the recording says too little of the {_WORDS[name]}")
     low, high = (limit.quantile(p) for p in (0.05, 0.95))
     if not (low > 0 and 20 * np.log10(high / low) < WIDEST_DB):
         reasons.append("the recording leaves the limit open within more than a factor of two")
     return tuple(reasons)
+
+
+def _unsure_of_the_delay(motion: MotionFit) -> bool:
+    """Whether it comes out below zero, as one does by chance that is known to a period or two."""
+    delay = NAMES.index("delay_s")
+    value, sd = motion.values[delay], motion.sd[delay]
+    return bool(value < 0 <= value + SURELY * sd)
 
 
 def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
@@ -186,7 +192,7 @@ def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
     for name, value, sd in zip(NAMES, motion.values, motion.sd, strict=True):
         free = name in model.names
         told = drawn[name]["q50"] if free else model.fixed[name]
-        if name not in _WORDS or abs(told - value) < _CONTRADICTED * sd:
+        if name not in _WORDS or abs(told - value) < SURELY * sd:
             continue
         unit = unit_of(_DIMENSIONS[name], model.force_unit, model.position_unit)
         what = "comes out, with its prior, as" if free else "was given as"

@@ -30,6 +30,7 @@ from bayeshaptic.diagnosis.feedback.choose_terms import (
 from bayeshaptic.diagnosis.feedback.smooth_motion import (
     SmoothMotion,
     at_rest,
+    below_the_counts,
     smooth_motion,
     smoothed,
 )
@@ -41,6 +42,7 @@ from bayeshaptic.types import Bools, Floats
 # Samples by which the force acts later than it is written down, root mean square: the hold, the
 # loop's delay and the sensor's filter make anything from none to two.
 _LAG = float(np.sqrt(4 / 3))
+_FEWEST = 100  # samples left after decimation
 
 
 @dataclass(frozen=True)
@@ -108,8 +110,9 @@ def inverse_dynamics(
     recording : Recording
         Of a device that moves as one mass below `cutoff_hz`.
     cutoff_hz : float, optional
-        Of the low-pass (Butterworth, order 4, forwards and backwards); a twentieth of the
-        sampling rate by default.
+        Of the low-pass (Butterworth, order 4, forwards and backwards); by default a twentieth of
+        the sampling rate, or as many halves of it as it takes to keep the encoder's counts out of
+        the acceleration.
     terms : tuple of str, optional
         Use exactly these beside mass, damping and offset; then errors allow for no other choice.
 
@@ -122,8 +125,7 @@ def inverse_dynamics(
     InputError
         Where the recording is too short for the cut-off, or a term has no such name.
     """
-    band = 0.05  # of the sampling rate: the usual cut-off
-    cutoff_hz = band / recording.period_s if cutoff_hz is None else cutoff_hz
+    cutoff_hz = below_the_counts(recording) if cutoff_hz is None else cutoff_hz
     low = _LowPass(cutoff_hz, recording.period_s)
     moving = _moving(recording, low)
     path = smooth_motion(recording, cutoff_hz)
@@ -200,14 +202,13 @@ class _LowPass:
 
 def _moving(recording: Recording, low: _LowPass) -> Bools:
     """Where the device moves, of the samples that are kept; refused where that is too seldom."""
-    fewest = 100  # samples left after decimation
-    if (recording.samples - 2 * low.edge) // low.every < fewest:
+    if (recording.samples - 2 * low.edge) // low.every < _FEWEST:
         raise InputError(
             f"{recording.name}: {recording.samples} samples are too few for inverse dynamics below "
             f"{low.cutoff_hz:g} Hz; raise cutoff_hz"
         )
     moving = ~low.picked(at_rest(recording, low.cutoff_hz))
-    if np.count_nonzero(moving) < fewest // 2:
+    if np.count_nonzero(moving) < _FEWEST // 2:
         raise InputError(
             f"{recording.name}: it stands still too long for inverse dynamics; record it in motion"
         )

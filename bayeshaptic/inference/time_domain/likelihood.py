@@ -11,7 +11,7 @@ from bayeshaptic.inference.fit import AT_BOUND, CONVERGED, Fit
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
-from bayeshaptic.inference.time_domain.widths import FREEDOM
+from bayeshaptic.inference.time_domain.widths import FREEDOM, SURELY
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.types import Complexes, Floats
@@ -74,6 +74,18 @@ class InLoopFit(Fit):
     """
 
     motion: MotionFit | None = None
+
+    @property
+    def impossible(self) -> tuple[str, ...]:
+        """Masses, and the delay, that end at a bound and that the motion puts beyond it.
+
+        A delay that is known to a period or two ends below zero as easily as above it.
+        """
+        if self.motion is None:
+            return super().impossible
+        far = self.motion.values + SURELY * self.motion.sd < self.motion.inside
+        beyond = {name for name, clear in zip(NAMES, far, strict=True) if clear}
+        return tuple(name for name in super().impossible if name in beyond)
 
     @property
     def likelihood(self) -> MotionLikelihood:  # type: ignore[override]

@@ -8,6 +8,7 @@ from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge
 from bayeshaptic.types import Floats
 
 FREEDOM = 8  # cosines, and so degrees of freedom
+SURELY = 3.83  # standard deviations (Student's t, `FREEDOM`) that chance exceeds 1 in 200 times
 _SMOOTH, _FEWEST = 0.35, 6  # lines either side of one, as a share of its number, and at least
 
 
