@@ -18,6 +18,7 @@ from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
+from bayeshaptic.report.numbers.held_still import held_still
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
     misfit_factor,
@@ -67,6 +68,8 @@ def why_none(result: Result) -> tuple[str, ...]:
             f"{_MOSTLY:.0f} times as high, so that what is left of the damping is less than an "
             "error of a tenth in that force"
         )
+    if closed and (still := held_still(closed)) is not None:
+        found.append(still)
     if closed and GAIN.test in _left(closed):
         found.append(
             "the gain of the actuator ripples along the way, which was not taken off, and where it "

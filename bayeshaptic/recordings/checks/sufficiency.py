@@ -18,7 +18,7 @@ from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.sweeps import moves_until
-from bayeshaptic.types import Bools
+from bayeshaptic.types import Bools, Floats
 
 # The coherence of two unrelated signals, averaged over twelve segments, stays below 0.2.
 LEAST_COHERENCE = 0.3
@@ -178,14 +178,29 @@ def _no_force(recording: Recording) -> str | None:
     return f"the force is zero for {100 * np.mean(idle):.0f} % of the recording; {cure}"
 
 
-def _standstill(recording: Recording) -> str | None:
+def share_at_rest(recording: Recording) -> float:
+    """Share of the recording in which the position stays within a count for a standstill's time.
+
+    Parameters
+    ----------
+    recording : Recording
+    """
+    return float(np.mean(_resting(recording)[1]))
+
+
+def _resting(recording: Recording) -> tuple[Floats, Bools]:
+    """The position in parts of a standstill's length, and which of these are at rest."""
     step = increment_unit(recording.position) or 0.0
     longest = max(round(_IDLE_S / recording.period_s), _FEWEST)
     usual = np.std(recording.position[_FEWEST:] - recording.position[:-_FEWEST])
     length = int(np.clip(_FEWEST * _USUAL_COUNTS * step / (usual + 1e-300), _FEWEST, longest))
     parts = recording.samples // length
     position = recording.position[: parts * length].reshape(parts, length)
-    resting = np.ptp(position, axis=1) <= 1.01 * step
+    return position, np.ptp(position, axis=1) <= 1.01 * step
+
+
+def _standstill(recording: Recording) -> str | None:
+    position, resting = _resting(recording)
     still = np.mean(resting)
     if still <= MOST_IDLE or moves_until(recording):
         return None  # a sweep's band ends where it moves the device no more
