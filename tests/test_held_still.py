@@ -10,6 +10,7 @@ import pytest
 
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.numbers.held_still import held_still
+from bayeshaptic.report.page.lights import _recording
 
 
 def loop(still: float, held: bool, direct: bool, effect: str) -> Any:
@@ -23,7 +24,9 @@ def loop(still: float, held: bool, direct: bool, effect: str) -> Any:
         etfe=SimpleNamespace(direct=direct),
         model=SimpleNamespace(held=held),
     )
-    return SimpleNamespace(analysis=analysis, effects=(SimpleNamespace(name=effect),))
+    family = "linear" if effect == "second_mode" else "nonlinear"
+    found = SimpleNamespace(name=effect, family=family)
+    return SimpleNamespace(analysis=analysis, effects=(found,))
 
 
 @pytest.mark.parametrize(
@@ -44,3 +47,10 @@ def test_friction_that_holds_a_held_device_is_a_reason_against_its_limit(
     found = held_still(loop(still, held, direct, effect))
     assert (found is not None) == said
     assert found is None or "60 % of the recording" in found
+
+
+def test_the_recording_has_no_green_light_beside_that() -> None:
+    closed = loop(0.6, True, True, "coulomb_friction")
+    closed.analysis.notices, closed.analysis.in_loop = (), None
+    light = _recording(SimpleNamespace(analysis=closed.analysis, closed=closed))
+    assert (light.state, light.word) == ("doubt", "held still")

@@ -254,6 +254,8 @@ def test_what_one_mass_that_is_followed_sets_aside_is_said(given: dict, words: s
     assert (lights(closed)[0].state == "bad") is not recommended
     doubted = replace(closed.analysis.in_loop, doubts=("in doubt",))
     result = replace(closed, analysis=replace(closed.analysis, in_loop=doubted))
+    # Whatever the doubt is: of a delay that was given it said "halves disagree".
+    assert lights(result)[1].word == "in doubt"
     steps = next_steps(headline(result), result)
     assert steps and not any("reference" in step.text for step in steps)
 

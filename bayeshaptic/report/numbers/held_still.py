@@ -23,9 +23,11 @@ def held_still(closed: Closed) -> str | None:
     """
     analysis = closed.analysis
     recording = analysis.recording
-    kinds = [effect_class(effect.name) for effect in closed.effects]
-    rubs = any(issubclass(kind, NonlinearEffect) and kind.sticks for kind in kinds)
-    if not (analysis.etfe.direct and analysis.model.held and rubs) or recording is None:
+    if not (analysis.etfe.direct and analysis.model.held) or recording is None:
+        return None
+    forces = (effect.name for effect in closed.effects if effect.family == "nonlinear")
+    kinds = (effect_class(name) for name in forces)
+    if not any(issubclass(kind, NonlinearEffect) and kind.sticks for kind in kinds):
         return None
     still = share_at_rest(recording)
     if still <= MOST_IDLE:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.checks.sufficiency import TOO_LITTLE
+from bayeshaptic.report.numbers.held_still import held_still
 from bayeshaptic.report.numbers.misfit import (
     misfit_factor,
     misfit_is_clear,
@@ -73,6 +74,8 @@ def _recording(result: Result) -> Light:
         return Light("Recording", BAD, topic, "notices")
     if found:
         return Light("Recording", DOUBT, ", ".join(sorted(found)), "notices")
+    if result.closed is not None and held_still(result.closed) is not None:
+        return Light("Recording", DOUBT, "held still", "measured")
     return Light("Recording", GOOD, "no objection", "measured")
 
 
@@ -82,7 +85,7 @@ def _fit(result: Result) -> Light:
         return Light("Fit", DOUBT, "none was made", "leftover")
     if analysis.in_loop is not None:
         if analysis.in_loop.doubts:
-            return Light("Fit", BAD, "halves disagree", "force")
+            return Light("Fit", BAD, "in doubt", "force")
         return Light("Fit", GOOD, "motion is followed", "force")
     if misfit_is_clear(analysis):
         return Light("Fit", BAD, f"{misfit_factor(analysis)} times the noise", "leftover")
