@@ -1,6 +1,7 @@
 """How often feedback is missed, and how often a good open-loop recording is taken for it.
 
     python -m benchmarks.door [--each 360] [--part 0 --of 1] [--keep LINES] [--replay]
+        [--trapezoids]
     python -m benchmarks.door --show LINES...
 
 Open loops and closed ones of random devices (`recordings/door.py`), judged as `check_recording`
@@ -26,8 +27,9 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.sufficiency import refuse_too_little
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import causality
+from bayeshaptic.recordings.signals.controller import share_by_a_law
 from bayeshaptic.rig import simulate
-from benchmarks.recordings.door import Case, closed_case, open_case, written_down
+from benchmarks.recordings.door import TRAPEZOIDS, Case, closed_case, open_case, written_down
 
 WEIGHTS = (10.0, 100.0)
 VERDICTS = ("feedback", "undecided", "open loop")
@@ -40,6 +42,7 @@ def main() -> None:
     parser.add_argument("--of", type=int, default=1, help="number of parts")
     parser.add_argument("--keep", type=Path, help="append a line a recording to this file")
     parser.add_argument("--replay", action="store_true", help="K_CR of what was missed")
+    parser.add_argument("--trapezoids", action="store_true", help="closed loops that follow them")
     parser.add_argument("--show", type=Path, nargs="+", help="tables of such files, no new ones")
     options = parser.parse_args()
     if options.show:
@@ -63,7 +66,10 @@ def made(options: argparse.Namespace) -> Iterable[dict[str, Any]]:
             if (done := kept.get((make is closed_case, seed))) is not None:
                 yield done
                 continue
-            case = make(seed)
+            if make is open_case:
+                case = open_case(seed)
+            else:
+                case = closed_case(seed, TRAPEZOIDS if options.trapezoids else None)
             line = {
                 "closed": case.closed,
                 "seed": seed,
@@ -82,7 +88,7 @@ def made(options: argparse.Namespace) -> Iterable[dict[str, Any]]:
 def judged(case: Case) -> str:
     """The verdict on one recording."""
     found = causality(case.recording)
-    if found.has_feedback or found.swapped:
+    if found.has_feedback or found.swapped or share_by_a_law(case.recording) > 0:
         return "feedback"
     return "undecided" if found.doubtful else "open loop"
 

@@ -14,6 +14,7 @@ from bayeshaptic.types import Floats
 
 CONTROLLERS = ("P", "PD", "PI", "PID", "PD filtered", "PID saturated")
 REFERENCES = ("steps", "ramps", "noise", "wall with dither")
+TRAPEZOIDS = "trapezoids"  # of their own: they repeat, so that little in such a loop is chance
 EXCITATIONS = ("white", "coloured", "multisine", "sweep", "binary", "steps")
 LOGGED = ("at the sample", "a sample early", "a sample late", "a late command")
 # A loop that shakes at its limit is another experiment; so is one that does not move.
@@ -77,11 +78,14 @@ def open_case(seed: int) -> Case:
     return Case(False, kind, "", logged, device, friction, 0.0, recording, bench)
 
 
-def closed_case(seed: int) -> Case:
-    """A closed-loop recording of a random device under a random controller."""
+def closed_case(seed: int, reference: str | None = None) -> Case:
+    """A closed-loop recording of a random device under a random controller.
+
+    It follows `reference`, or one of `REFERENCES` in turn.
+    """
     rng = np.random.default_rng((2, seed))
     kind = CONTROLLERS[seed % len(CONTROLLERS)]
-    reference = REFERENCES[seed // len(CONTROLLERS) % len(REFERENCES)]
+    reference = reference or REFERENCES[seed // len(CONTROLLERS) % len(REFERENCES)]
     while True:
         bench, device, friction = _bench(rng)
         seconds = float(np.exp(rng.uniform(np.log(2.0), np.log(30.0))))
@@ -175,6 +179,9 @@ def _reference(
         changes = np.flatnonzero(np.diff(corners))
         at = np.concatenate([[0], changes, [samples]])
         return np.interp(np.arange(samples), at, rng.normal(size=len(at)))
+    if kind == TRAPEZOIDS:
+        phase = np.arange(samples) * period / rng.uniform(1.2, 3.0) % 1.0
+        return np.interp(phase, [0.0, 0.2, 0.5, 0.7, 1.0], [0.0, 1.0, 1.0, 0.0, 0.0])
     if kind == "noise":
         pole = float(np.exp(-2 * np.pi * bandwidth * rng.uniform(0.5, 5.0) * period))
         noise = _low_passed(_low_passed(rng.normal(size=samples), pole), pole)
