@@ -13,10 +13,11 @@ import bayeshaptic as bh
 from bayeshaptic.diagnosis.battery import is_periodic, periodic_tests
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.loop import trace
+from bayeshaptic.diagnosis.periodic.balanced_state import BalancedState
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import balance
 from bayeshaptic.diagnosis.periodic.joint import Basis
-from bayeshaptic.diagnosis.periodic.lines import BalancedState, LineTrials
+from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.periodic.period import one_period, with_floor
 from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, places_of
 from bayeshaptic.diagnosis.state import REPORT, share

@@ -12,10 +12,10 @@ from bayeshaptic.diagnosis.periodic.period import Period
 from bayeshaptic.diagnosis.periodic.steady_motion import (
     Applied,
     Following,
+    Steady,
     apply,
     no_force,
     places_of,
-    steady_motion,
 )
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
@@ -43,6 +43,10 @@ class Balanced:
     residual : complex ndarray, shape (L,)
         Normalised, of all lines.
     converged : bool
+    covariance : ndarray, shape (J, J), or None
+        Of the strengths at unit noise, where it is the likeliest place.
+    along : ndarray, shape (P, J), or None
+        How far the coordinates of the parameters go with the strengths.
     """
 
     model: Model
@@ -54,11 +58,19 @@ class Balanced:
     motions: dict[Place, Motion] = field(repr=False)
     residual: Complexes = field(repr=False)
     converged: bool = True
+    covariance: Floats | None = field(default=None, repr=False)
+    along: Floats | None = field(default=None, repr=False)
 
     @property
     def added(self) -> Complexes:
         """What the internal forces add to the position, in the scale of the spectra, shape (L,)."""
         return np.asarray(self.strength @ self.columns)
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether motion and forces agree, and no force drives the motion."""
+        signs = zip(self.forces, self.strength, strict=True)
+        return self.converged and not any(basis.positive and size < 0 for basis, size in signs)
 
     def rms(self, lines: NDArray[np.bool_] | slice = slice(None)) -> float:
         """Weighted rms over lines; 1 is the noise."""
@@ -106,7 +118,7 @@ def balance(
         motions, applied = _settle(
             model.system(theta), period, forces, strength, applied, following
         )
-        unit = [period.transform(basis.force(motions[basis.place])) for basis in forces]
+        unit = [period.transform(basis.mean(motions[basis.place], period)) for basis in forces]
         joint = Joint(model, windows, period, forces, np.array(unit), own)
         new_theta, new_strength = joint.solve(theta, strength)
         sds = joint.sds(new_theta) * max(joint.rms(new_theta, new_strength), 1.0)
@@ -140,7 +152,7 @@ def promise(
     what is left.  Cheap: it tells which forces are worth a balance.
     """
     forces = (*part.forces, basis)
-    unit = [period.transform(b.force(part.motions[b.place])) for b in forces]
+    unit = [period.transform(b.mean(part.motions[b.place], period)) for b in forces]
     own = np.flatnonzero(fitted)
     joint = Joint(part.model, windows, period, forces, np.array(unit), own)
     left, slope = joint.linearised(part.theta, np.append(part.strength, 0.0))
@@ -159,11 +171,11 @@ def _settle(
     following: Following,
 ) -> tuple[dict[Place, Motion], Applied]:
     """Motion from forces and forces from motion, in turn, for given parameters and strengths."""
-    turns = 3
+    turns, steady = 3, Steady(system, period, applied.places)
     for _ in range(turns if forces else 1):
-        motions = steady_motion(system, period, applied)
+        motions = steady(applied)
         total = {place: np.zeros(period.samples) for place in applied.places}
         for basis, size in zip(forces, strength, strict=True):
-            total[basis.place] += size * basis.force(motions[basis.place])
+            total[basis.place] += size * basis.mean(motions[basis.place], period)
         applied = apply(period, following.toward(total), motions)
     return motions, applied

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,17 @@ class Basis:
     unit: str = ""
     positive: bool = False
 
+    def mean(self, motion: Motion, period: Period) -> Floats:
+        """The force over one period, shape (N,): the mean over what else the device does."""
+        besides = period.besides
+        share = 0.0 if self.place.second is not None else 1.0
+        each = Motion(
+            motion.position + share * besides.position,
+            motion.velocity + share * besides.velocity,
+            motion.command,
+        )
+        return np.asarray(self.force(each).mean(axis=0))
+
 
 class Joint:
     """Least squares of parameters and strengths with the forces' shapes held."""
@@ -57,11 +69,18 @@ class Joint:
         unit: Complexes,
         own: slice | NDArray[np.intp],
     ) -> None:
-        self.model, self.period, self.forces, self.unit = model, period, forces, unit
+        self.model, self.windows, self.period, self.forces = model, windows, period, forces
+        self.unit = unit
         self.own = own
         self.likelihood = Likelihood(model, windows)
         self.sd = np.sqrt(self.likelihood.noise_variance)
         self.here = coordinates(model)
+
+    def with_unit(self, unit: Complexes) -> Joint:
+        """With other unit forces."""
+        other = copy(self)
+        other.unit = unit
+        return other
 
     def columns(self, theta: Floats) -> Complexes:
         """What unit forces add to the measured position at the lines, shape (J, L)."""
@@ -89,12 +108,12 @@ class Joint:
         def residuals(phi: Floats) -> Floats:
             theta = self.here.natural(phi[:, :size])
             left = self.likelihood.deviations(theta)[:, :, 0] / self.sd
-            left = (left - (phi[:, size:] * self._unit(columns)) @ rows)[:, self.own]
+            left = (left - (phi[:, size:] * self.unit_strengths(columns)) @ rows)[:, self.own]
             return np.sqrt(2) * np.concatenate([left.real, left.imag], axis=1)
 
         return residuals
 
-    def _unit(self, columns: Complexes) -> Floats:
+    def unit_strengths(self, columns: Complexes) -> Floats:
         """Strengths that are much: as large as the response itself, shape (J,).
 
         A step of the minimiser is at most one coordinate unit.
@@ -106,7 +125,7 @@ class Joint:
     def solve(self, theta: Floats, strength: Floats) -> tuple[Floats, Floats]:
         """A few damped Gauss-Newton steps, the columns those of the current parameters."""
         columns = self.columns(theta)
-        unit = self._unit(columns)
+        unit = self.unit_strengths(columns)
         low, high = (self.here.coordinate(bound) for bound in reach(self.model, 6.0))
         wide = np.full(len(strength), np.inf)
         start = np.concatenate([self.here.coordinate(theta), strength / unit])
@@ -133,7 +152,9 @@ class Joint:
     def linearised(self, theta: Floats, strength: Floats) -> tuple[Floats, Floats]:
         """Residuals of the lines to fit, (N,), and their slope, (N, P + J)."""
         columns = self.columns(theta)
-        phi = np.concatenate([self.here.coordinate(theta), strength / self._unit(columns)])[None]
+        phi = np.concatenate(
+            [self.here.coordinate(theta), strength / self.unit_strengths(columns)]
+        )[None]
         residuals = self._residuals(columns)
         return residuals(phi)[0], jacobian(residuals, phi)[0]
 
@@ -144,4 +165,4 @@ class Joint:
         slope = self.linearised(theta, np.zeros(len(self.forces)))[1]
         # Roots of the diagonal of (slope^T slope)^+, of which rounding makes none negative.
         sd = np.linalg.norm(np.linalg.pinv(slope), axis=1)[self.model.size :]
-        return np.asarray(sd * self._unit(self.columns(theta)))
+        return np.asarray(sd * self.unit_strengths(self.columns(theta)))

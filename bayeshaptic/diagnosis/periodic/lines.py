@@ -8,7 +8,7 @@ was accepted before to half of the excited lines, and judged on a quarter in bet
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.acceptance import needless
 from bayeshaptic.diagnosis.battery import residual_tests
+from bayeshaptic.diagnosis.periodic.balanced_state import BalancedState, as_linear, sized
+from bayeshaptic.diagnosis.periodic.descent import likeliest
 from bayeshaptic.diagnosis.periodic.force_tests import force_tests
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance, promise
@@ -25,8 +27,6 @@ from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import (
     FIT,
     Accepted,
-    Change,
-    Estimate,
     State,
     Trial,
     describe_gain,
@@ -49,20 +49,6 @@ FLOOR = 0.002
 """No line is trusted to better than this share of its response while candidates are weighed."""
 _PROMISE = 2.0  # to first order, on the lines to fit: forces that offer less are not tried,
 _NEAR = 0.25  # nor those that offer so much less than the best one
-
-
-@dataclass(frozen=True)
-class BalancedState(State):
-    """What the loop knows of a periodic recording.
-
-    Attributes
-    ----------
-    part, whole : Balanced
-        Model and internal forces fitted to the lines to fit, and to all lines.
-    """
-
-    part: Balanced = field(kw_only=True)
-    whole: Balanced = field(kw_only=True)
 
 
 class LineTrials:
@@ -124,7 +110,7 @@ class LineTrials:
             with suppress(np.linalg.LinAlgError):  # a motion that runs away has no balance
                 tried = self._with_linear(state.part, one.effect, one.starts, rest)
                 best = max(best, self._gained(state.part, tried))
-                trial = self._judged(state, tried, *_linear(one.effect))
+                trial = self._judged(state, tried, *as_linear(one.effect))
                 self._keep(found, (one.effect.name, None), trial)
         for basis in self._promising(state.part, best):
             if meter.affords(basis.title):
@@ -192,7 +178,7 @@ class LineTrials:
         part = state.part
         forces, strength = (*part.forces, basis), np.append(part.strength, 0.0)
         tried = self._balance(part.model, forces, part.theta, strength)
-        if not tried.converged or (basis.positive and tried.strength[-1] < 0):
+        if not tried.is_possible:
             return None
         return self._judged(state, tried, 1, Accepted(basis.name, basis.title, "nonlinear", ""))
 
@@ -218,7 +204,9 @@ class LineTrials:
     def _balance(
         self, model: Any, forces: tuple[Basis, ...], theta: Floats, strength: Floats
     ) -> Balanced:
-        return balance(model, self.windows, self.period, forces, theta, strength, self.fitted)
+        part = balance(model, self.windows, self.period, forces, theta, strength, self.fitted)
+        start = (theta, strength) if np.all(strength) else None
+        return likeliest(part, self.windows, self.period, self.fitted, start)
 
     def _without(self, part: Balanced, effect: Accepted) -> Balanced:
         """Everything else fitted anew to the lines to fit."""
@@ -239,40 +227,15 @@ class LineTrials:
 
     def _state(self, part: Balanced, accepted: tuple[Accepted, ...]) -> BalancedState:
         """The recording's spectra less the forces' motion, and a fit to all lines."""
-        spectra = self.etfe.spectra
+        spectra, start = self.etfe.spectra, (part.theta, part.strength)
         assert isinstance(spectra, PeriodicSpectra)
         whole = balance(
             part.model, self.windows, self.period, part.forces, part.theta, part.strength
         )
+        whole = likeliest(whole, self.windows, self.period, start=start)
         own = replace(spectra, position=spectra.position - whole.added)
         # What a person sees, without it too.
         value = self.etfe.value - whole.added / spectra.force
         corrected = replace(self.etfe, spectra=own, value=value)
         fit = least_squares(whole.model, corrected, start=whole.theta)
-        sized = tuple(_sized(effect, whole) for effect in accepted)
-        return BalancedState(corrected, fit, sized, part=part, whole=whole)
-
-
-def _linear(effect: LinearEffect) -> tuple[int, Accepted]:
-    """The number of a linear effect's parameters, and the effect as it would be accepted."""
-    names = tuple(parameter.name for parameter in effect.parameters)
-    accepted = Accepted(
-        effect.name,
-        effect.title,
-        effect.family,
-        "",
-        parameters=names,
-        told_apart_by=effect.told_apart_by,
-        change=Change(effect),
-    )
-    return len(names), accepted
-
-
-def _sized(effect: Accepted, whole: Balanced) -> Accepted:
-    """A force with the strength that all lines give it."""
-    for index, basis in enumerate(whole.forces):
-        if basis.title == effect.title:
-            sd = float(whole.strength_sd[index]) * max(whole.rms(), 1.0)
-            estimate = Estimate(float(whole.strength[index]), sd, basis.unit)
-            return replace(effect, estimates={"strength": estimate})
-    return effect
+        return BalancedState(corrected, fit, sized(accepted, whole), part=part, whole=whole)

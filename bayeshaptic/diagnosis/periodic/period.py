@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.periodic.besides import NOTHING, Besides, motion_besides
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
@@ -34,6 +35,8 @@ class Period:
         Mean velocity: a constant force, or one that a law makes, drives a free device on.
     kept : slice
         The samples of the recording that are averaged.
+    besides : Besides
+        What does not repeat.
     """
 
     force: Floats = field(repr=False)
@@ -44,6 +47,7 @@ class Period:
     period_s: float
     creep: float
     kept: slice
+    besides: Besides = NOTHING
 
     @property
     def samples(self) -> int:
@@ -116,6 +120,7 @@ def one_period(etfe: Etfe, witness: Floats | None = None) -> Period:
         period_s=recording.period_s,
         creep=creep / recording.period_s,
         kept=slice(first, stop),
+        besides=motion_besides(position, samples, recording.period_s),
     )
 
 

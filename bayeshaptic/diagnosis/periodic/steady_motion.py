@@ -26,7 +26,10 @@ LOAD = Place(1, None)
 
 
 class Responses:
-    """Stretch of one pair of points by a force between another, on the harmonics of a period."""
+    """Stretch of one pair of points by a force between another, on the harmonics of a period.
+
+    Reciprocal.
+    """
 
     def __init__(self, system: LinearSystem, period: Period) -> None:
         self.mechanism = system.mechanism
@@ -37,7 +40,7 @@ class Responses:
     def __call__(self, at: Pair, by: Pair) -> Complexes:
         if (at, by) not in self._found:
             numerator = evaluate(self.mechanism.mutual(by, at), self._points)[:, 0]
-            self._found[at, by] = numerator / self._denominator
+            self._found[at, by] = self._found[by, at] = numerator / self._denominator
         return self._found[at, by]
 
 
@@ -135,11 +138,55 @@ class Following:
         Of dry friction in twenty recordings of a free device, what settled had at most 3 % to go,
         what went round still 19 % and more.
         """
-        to_go = 0.05  # of the forces
+        return self.is_within(0.05)
+
+    def is_within(self, to_go: float) -> bool:
+        """Whether the motion asks for no more than that share of the forces beyond them, rms."""
         if self.force is None or self.step is None:
             return False
         missing, there = (sum(f @ f for f in each.values()) for each in (self.step, self.force))
         return bool(missing <= to_go**2 * there)
+
+
+class Steady:
+    """The steady periodic motion at places under the command, for given forces there.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        A batch of one.
+    period : Period
+    places : tuple of Place
+    """
+
+    def __init__(self, system: LinearSystem, period: Period, places: tuple[Place, ...]) -> None:
+        responses, drive = Responses(system, period), system.mechanism.drive
+        own = responses(drive, drive)
+        frequency = period.s.imag / (2 * np.pi)
+        # What the loop does to the command before it is a force: hold, delay, filters.
+        motor = system.sampled_response(frequency, period.period_s)[0]
+        pairs = [pair_of(place) for place in places]
+        driven = np.stack([responses(pair, drive) for pair in pairs])
+        self.between = np.stack([[responses(at, by) for by in pairs] for at in pairs])  # (Q, Q, H)
+        self.period = period
+        self._by_command = driven * period.transform(period.force) * motor / own
+        self._measured = driven / own * period.transform(period.position)
+
+    def __call__(self, applied: Applied) -> dict[Place, Motion]:
+        """The motion at the places, one period each."""
+        period, between = self.period, self.between
+        free = self._by_command + np.einsum("abh,bh->ah", between, applied.rest)
+        matrix = np.eye(len(between))[:, :, None] - between * applied.proportional[None]
+        lines = np.linalg.solve(np.moveaxis(matrix, 2, 0), free.T[:, :, None])[:, :, 0].T
+        lines = np.where(period.free, self._measured, lines)
+        return {
+            place: Motion(
+                period.signal(row),
+                period.signal(period.s * row) + (period.creep if place.second is None else 0.0),
+                period.force,
+            )
+            for place, row in zip(applied.places, lines, strict=True)
+        }
 
 
 def steady_motion(system: LinearSystem, period: Period, applied: Applied) -> dict[Place, Motion]:
@@ -156,27 +203,7 @@ def steady_motion(system: LinearSystem, period: Period, applied: Applied) -> dic
     -------
     dict
     """
-    responses, drive = Responses(system, period), system.mechanism.drive
-    own = responses(drive, drive)
-    frequency = period.s.imag / (2 * np.pi)
-    # What the loop does to the command before it is a force: hold, delay, filters.
-    motor = system.sampled_response(frequency, period.period_s)[0]
-    command = period.transform(period.force) * motor / own
-    pairs = [pair_of(place) for place in applied.places]
-    driven = np.stack([responses(pair, drive) for pair in pairs])
-    between = np.stack([[responses(at, by) for by in pairs] for at in pairs])  # (Q, Q, H)
-    free = driven * command + np.einsum("abh,bh->ah", between, applied.rest)
-    matrix = np.eye(len(pairs))[:, :, None] - between * applied.proportional[None]
-    lines = np.linalg.solve(np.moveaxis(matrix, 2, 0), free.T[:, :, None])[:, :, 0].T
-    lines = np.where(period.free, driven / own * period.transform(period.position), lines)
-    return {
-        place: Motion(
-            period.signal(row),
-            period.signal(period.s * row) + (period.creep if place.second is None else 0.0),
-            period.force,
-        )
-        for place, row in zip(applied.places, lines, strict=True)
-    }
+    return Steady(system, period, applied.places)(applied)
 
 
 def places_of(system: LinearSystem) -> tuple[Place, ...]:
