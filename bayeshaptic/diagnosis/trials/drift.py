@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.drift import drift_tests
 from bayeshaptic.diagnosis.state import (
     Accepted,
     Estimate,
@@ -39,6 +40,9 @@ PARTS = 3
 # chosen on, drifts of another kind leave 0.10 to 1 of it; the right ones at most 0.06 and less than
 # noise, but for a step within a part (0.13, more than noise: refused). Rates are not counted.
 _LEFT = 0.3
+# Of the score of a change over the recording, what a steadied one has yet: at most 0.05 in 60 whose
+# gain drifts (of 50 to 50,000); 0.23 to 0.87 in 16 whose damper does and a gain convinces.
+_UNSTEADY = 0.1
 _KNOWN = 1.0  # log change from part to part: a parameter with more is one that parts do not see
 
 
@@ -147,9 +151,21 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         fit = least_squares(model, parts[worst], start=theta)
         changed = replace(state, etfe=parts[worst], fit=fit)
     changed = replace(changed, accepted=(*state.accepted, accepted))
-    # The state shows the worst part; the others count as well. A steady gain shows all of them.
-    all_along = kind is _GAIN or bool(excess[1] <= min(_LEFT * excess[0], PARTS))
+    # The state shows the worst part; the others count as well. A steady gain shows all of them, and
+    # is one that drifts only if they are alike then.
+    all_along = bool(excess[1] <= min(_LEFT * excess[0], PARTS))
+    if kind is _GAIN:
+        all_along = not good or _is_steady(state, changed)
     return Trial(accepted, changed, float(gains[0]), float(gains[1]), size, all_along)
+
+
+def _is_steady(before: State, after: State) -> bool:
+    """Whether what drifted was the gain: the recording with a steady one hardly changes."""
+    was, now = (drift_tests(state.fit, state.etfe) for state in (before, after))
+    seen = max((test.statistic for test in was), default=0.0)
+    return not any(
+        test.statistic > max(thresholds.MENDED * test.threshold, _UNSTEADY * seen) for test in now
+    )
 
 
 def _fall(limits: Floats, ends: Floats) -> float:
