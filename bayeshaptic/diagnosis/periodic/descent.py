@@ -9,14 +9,12 @@ solved for to first order.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.periodic.answering import STEP, Chain, Settled, total
-from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced
-from bayeshaptic.diagnosis.periodic.joint import Joint
+from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
+from bayeshaptic.diagnosis.periodic.joint import Basis, Joint
 from bayeshaptic.diagnosis.periodic.period import Period
 from bayeshaptic.diagnosis.periodic.steady_motion import (
     Applied,
@@ -31,6 +29,7 @@ from bayeshaptic.diagnosis.periodic.steady_motion import (
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.inference.coordinates import reach
+from bayeshaptic.models import Model
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
@@ -77,45 +76,53 @@ def settled(
 
 
 def likeliest(
-    part: Balanced,
+    model: Model,
     windows: Windows,
     period: Period,
+    forces: tuple[Basis, ...],
+    theta: Floats,
+    strength: Floats,
     fitted: NDArray[np.bool_] | None = None,
-    start: tuple[Floats, Floats] | None = None,
 ) -> Balanced:
-    """A balance taken to the best that leads on from it; as it is where forces and motion part.
+    """A model and internal forces where the lines are likeliest: see `balance`.
+
+    From strengths that are known on at once; of a force that is new, or where motion and forces do
+    not settle, from where a balance ends.  As that is where they do not settle there, either.
 
     Parameters
     ----------
-    part : Balanced
+    model : Model
     windows : Windows
     period : Period
+    forces : tuple of Basis
+    theta : ndarray, shape (P,)
+    strength : ndarray, shape (J,)
     fitted : ndarray of bool, shape (L,), optional
         Lines to fit; all by default.
-    start : pair of ndarray, shapes (P,) and (J,), optional
-        Parameters and strengths to begin with where the balance lost its way from there.
     """
-    if not part.forces:
-        return part
     own = slice(None) if fitted is None else np.flatnonzero(fitted)
-    nothing = no_force(period, tuple(dict.fromkeys(basis.place for basis in part.forces)))
-    joint = Joint(part.model, windows, period, part.forces, nothing.rest[:1], own)
-    begun = [(part.theta, part.strength)] if part.converged else []
-    tried = [_attempt(joint, nothing, *one) for one in [*begun, *([start] if start else [])]]
-    there = [one for one in tried if one is not None]
-    if not there:
-        return part
-    found, slope, unit = _descended(min(there, key=lambda one: one.power))
+    nothing = no_force(period, tuple(dict.fromkeys(basis.place for basis in forces)))
+    joint = Joint(model, windows, period, forces, nothing.rest[:1], own)
+    start = None
+    if forces and np.all(strength):
+        start = _attempt(joint, nothing, theta, strength)
+    if start is None:
+        part = balance(model, windows, period, forces, theta, strength, fitted)
+        if forces:  # rounds that went round are often near it
+            start = _attempt(joint, nothing, part.theta, part.strength)
+        if start is None:
+            return part
+    found, slope, unit = _descended(start)
     covariance, along = _strengths(slope, unit, len(unit))
-    return replace(
-        part,
-        theta=found.theta,
-        strength=found.strength,
-        strength_sd=np.sqrt(covariance.diagonal()),
-        columns=found.joint.columns(found.theta),
-        motions=_everywhere(found),
-        residual=found.joint.residual(found.theta, found.strength),
-        converged=True,
+    return Balanced(
+        model,
+        found.theta,
+        forces,
+        found.strength,
+        np.sqrt(covariance.diagonal()),
+        found.joint.columns(found.theta),
+        _everywhere(found),
+        found.joint.residual(found.theta, found.strength),
         covariance=covariance,
         along=along,
     )

@@ -204,9 +204,7 @@ class LineTrials:
     def _balance(
         self, model: Any, forces: tuple[Basis, ...], theta: Floats, strength: Floats
     ) -> Balanced:
-        part = balance(model, self.windows, self.period, forces, theta, strength, self.fitted)
-        start = (theta, strength) if np.all(strength) else None
-        return likeliest(part, self.windows, self.period, self.fitted, start)
+        return likeliest(model, self.windows, self.period, forces, theta, strength, self.fitted)
 
     def _without(self, part: Balanced, effect: Accepted) -> Balanced:
         """Everything else fitted anew to the lines to fit."""
@@ -227,12 +225,11 @@ class LineTrials:
 
     def _state(self, part: Balanced, accepted: tuple[Accepted, ...]) -> BalancedState:
         """The recording's spectra less the forces' motion, and a fit to all lines."""
-        spectra, start = self.etfe.spectra, (part.theta, part.strength)
+        spectra = self.etfe.spectra
         assert isinstance(spectra, PeriodicSpectra)
-        whole = balance(
+        whole = likeliest(
             part.model, self.windows, self.period, part.forces, part.theta, part.strength
         )
-        whole = likeliest(whole, self.windows, self.period, start=start)
         own = replace(spectra, position=spectra.position - whole.added)
         # What a person sees, without it too.
         value = self.etfe.value - whole.added / spectra.force
