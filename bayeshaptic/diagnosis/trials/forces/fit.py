@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.diagnosis.state import FIT, fit_part
-from bayeshaptic.diagnosis.trials.forces.along import Along, expected
+from bayeshaptic.diagnosis.trials.forces.along import Along
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.slopes import NUDGE, Form, Reach, linearised, nudges_of
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -122,8 +122,16 @@ def _polished(bench: ForceBench, point: Point) -> Point:
 
 
 def _near(bench: ForceBench, known: Point, forces: tuple[Acting, ...], theta: Floats) -> Point:
-    """Forces and linear parameters as they are, beside the motion expected from a point near by."""
-    return bench.as_it_is(forces, theta, expected(bench, known, forces, theta))
+    """Forces and linear parameters as they are, beside the motion expected from a point near by.
+
+    By their strengths, with their history as it was.
+    """
+    if not known.changes:  # it runs away
+        return bench.as_it_is(forces, theta)
+    factors = [new.strength / old.strength for new, old in zip(forces, known.forces, strict=True)]
+    motions = (change.motion for change in known.changes)
+    expected = sum(factor * motion for factor, motion in zip(factors, motions, strict=True))
+    return bench.as_it_is(forces, theta, np.asarray(expected))
 
 
 def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
