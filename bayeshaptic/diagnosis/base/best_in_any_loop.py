@@ -1,8 +1,8 @@
 """Which base model, of a recording in closed loop that lacks something.
 
 The base models are compared before anything is known of a force, and in a loop dry friction passes
-for a second mode, a hand or a base that gives.  So where friction does not explain what the chosen
-one leaves, the others are tried with what they lack, too.  Nothing can be held out there, and a
+for a second mode, a hand or a base that gives.  So where friction does not explain all that the
+chosen one leaves, the others are tried with what they lack, too.  Nothing can be held out there, and a
 wrong model that leaves what looks like noise is a danger: what is the likeliest must stand by
 itself, and nothing stands in its place.
 """
@@ -15,7 +15,7 @@ from bayeshaptic.diagnosis.base.begun import Begun, base_of
 from bayeshaptic.diagnosis.base.best_base import criterion
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.traced import CONSISTENT, Traced
+from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, Traced
 from bayeshaptic.diagnosis.trials.all_lines import rubs, stands, trace_by_all_lines, untraced
 from bayeshaptic.inference.choose import UNDECIDED, Choice
 from bayeshaptic.numerics.spending import Meter
@@ -51,7 +51,7 @@ def traced_in_any_loop(
     if chosen == _ONE_MASS:  # is followed in time instead, with its friction
         return begun, own
     own = trace_by_all_lines(own, meter, tick)
-    settled = own.verdict == CONSISTENT or (rubs(own) and stands(own))
+    settled = own.verdict == CONSISTENT or (rubs(own) and own.verdict == EXPLAINED)
     if begun.choice is None or settled:
         return begun, own
     found = {chosen: own}

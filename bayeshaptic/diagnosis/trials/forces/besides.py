@@ -106,6 +106,17 @@ class Hand:
 
 
 @dataclass(frozen=True)
+class HandAfar(Hand):
+    """A hand's, to a force between the masses, which hardly knows of it."""
+
+    def off(self, taken: Floats, rest: Floats) -> Floats:
+        return np.zeros_like(rest)
+
+    def answered(self, motion: Floats) -> Floats:
+        return motion
+
+
+@dataclass(frozen=True)
 class Drift:
     """A free device's: how it began to move, and a constant force.
 

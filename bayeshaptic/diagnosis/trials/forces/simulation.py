@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis.trials.forces.besides import (
     Besides,
     Drift,
     Hand,
+    HandAfar,
     Nothing,
     drifts,
     hand_edge_hz,
@@ -181,13 +182,15 @@ class Simulation:
 
     def _besides(self, theta: Floats, places: tuple[Place, ...]) -> Besides:
         """What neither command nor forces make."""
+        against_ground = bool({MOTOR, LOAD} & set(places))
         if self.model.held:
             own, usual = self.model.system(theta), self.model.system(self.usual)
-            return Hand(self.recording.period_s, self._edge_hz, own, usual)
-        if {MOTOR, LOAD} & set(places):
-            kept = self._usual_drifts.shape[1]
-            return Drift(self._drifts(theta)[:, :kept], self._usual_drifts)
-        return Nothing()  # that a spring between the masses would know of
+            kind = Hand if against_ground else HandAfar
+            return kind(self.recording.period_s, self._edge_hz, own, usual)
+        if not against_ground:
+            return Nothing()  # that a spring between the masses would know of
+        kept = self._usual_drifts.shape[1]
+        return Drift(self._drifts(theta)[:, :kept], self._usual_drifts)
 
     def _linear(self, theta: Floats, command: Floats) -> Floats:
         """What a command does to masses: positions and velocities, fine grid, (M, 2, N * s)."""
