@@ -2,8 +2,8 @@
 
 The base models are compared before anything is known of a force, and in a loop dry friction passes
 for a second mode, a hand or a base that gives.  So where friction does not explain all that the
-chosen one leaves, the others are tried with what they lack, too.  Nothing can be held out there, and a
-wrong model that leaves what looks like noise is a danger: what is the likeliest must stand by
+chosen one leaves, the others are tried with what they lack, too.  Nothing can be held out there,
+and a wrong model that leaves what looks like noise is a danger: what is the likeliest must stand by
 itself, and nothing stands in its place.
 """
 

@@ -115,9 +115,18 @@ class ForceBench:
             return theta
         return polish(self.model, self.windows(self._etfe, theta), theta)
 
-    def point(self, forces: tuple[Acting, ...], theta: Floats, rounds: int = 1) -> Point:
-        """Simulate, take off, fit; several times over, because the fit changes the motion."""
-        expected, found = None, None
+    def point(
+        self,
+        forces: tuple[Acting, ...],
+        theta: Floats,
+        rounds: int = 1,
+        expected: Floats | None = None,
+    ) -> Point:
+        """Simulate, take off, fit; several times over, because the fit changes the motion.
+
+        `expected`, (N,), is what forces may be expected to add: the search begins with it.
+        """
+        found = None
         for _ in range(rounds):
             found = self._simulated(forces, theta, expected)
             if found is None:
@@ -129,10 +138,7 @@ class ForceBench:
     def as_it_is(
         self, forces: tuple[Acting, ...], theta: Floats, expected: Floats | None = None
     ) -> Point:
-        """Simulate and take off, with the linear parameters as given.
-
-        `expected`, (N,), is what forces may be expected to add: the search begins with it.
-        """
+        """Simulate and take off, with the linear parameters as given: see `point`."""
         return self._valued(forces, theta, self._simulated(forces, theta, expected))
 
     def stays(self, point: Point) -> bool:

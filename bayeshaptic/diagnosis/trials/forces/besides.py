@@ -34,6 +34,7 @@ _ORDER, _LEAST_HZ, _MOST_HZ, _NOISE = 4, 14.0, 30.0, 0.01
 # Root mean square of what is off, as a share of all that is left, and how many simulations at most.
 _SETTLED, _MOST = 0.1, 8
 _MIXED = 5  # motions that a mixture has at most
+_WORSE = 2  # in turn, after which none is better any more
 _ALIKE = 1e-14  # squares: motions that differ by a ten-millionth are one
 
 
@@ -107,10 +108,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class HandAfar(Hand):
-    """A hand's, to a force between the masses, which hardly knows of it."""
-
-    def off(self, taken: Floats, rest: Floats) -> Floats:
-        return np.zeros_like(rest)
+    """A hand's, to a force between the masses, which hardly answers to it."""
 
     def answered(self, motion: Floats) -> Floats:
         return motion
@@ -233,7 +231,7 @@ def settled(
         The best that was found, where none agrees: a motion that sticks, or is chaotic, answers
         unlike the average.
     """
-    taken, least = first, np.inf
+    taken, least, worse = first, np.inf, 0
     best = added = forced(first)
     motions: list[Floats] = []
     errors: list[Floats] = []
@@ -243,9 +241,10 @@ def settled(
             break
         off = besides.off(taken, rest)
         wrong = float(np.std(off))
-        if wrong < least:
+        worse = worse + 1 if wrong > least else 0
+        if not worse:
             best, least = added, wrong
-        if wrong <= _SETTLED * np.std(rest):
+        if wrong <= _SETTLED * np.std(rest) or worse == _WORSE:
             break
         motions, errors = [*motions, taken][-_MIXED:], [*errors, off][-_MIXED:]
         taken, off = _mixture(motions, errors)

@@ -170,7 +170,8 @@ def _scan(
     stronger = 3.0 if abs(strengths[-1]) > abs(strengths[0]) else 1 / 3.0
 
     def point(strength: float, start: Floats) -> Point:
-        return bench.point((*before, Acting(effect, strength)), start)
+        near = points[-1].motion if points else None
+        return bench.point((*before, Acting(effect, strength)), start, expected=near)
 
     points: list[Point] = []
     too_strong = 10.0  # drop of the log likelihood at which a scan stops
