@@ -503,10 +503,11 @@ def test_a_scan_goes_on_to_fainter_forces_where_its_faintest_is_too_strong() -> 
     The larger an actuator's limit, the fainter: there one over the force is 0.01.
     """
 
-    def point(forces: tuple[Acting], start: object) -> SimpleNamespace:
+    def point(forces: tuple[Acting], start: object, expected: object) -> SimpleNamespace:
         strength = forces[-1].strength
         share = (1 / strength if forces[-1].effect else strength) / 0.01
-        return SimpleNamespace(strength=strength, gain_fit=80 * share - 40 * share**2, theta=start)
+        gain = 80 * share - 40 * share**2
+        return SimpleNamespace(strength=strength, gain_fit=gain, theta=start, motion=expected)
 
     bench = SimpleNamespace(point=point)
     found = _scan(bench, (), None, np.array([1.0, 3.0]), None, beyond=8)  # type: ignore[arg-type]

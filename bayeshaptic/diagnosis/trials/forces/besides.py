@@ -34,7 +34,7 @@ _ORDER, _LEAST_HZ, _MOST_HZ, _NOISE = 4, 14.0, 30.0, 0.01
 # Root mean square of what is off, as a share of all that is left, and how many simulations at most.
 _SETTLED, _MOST = 0.1, 8
 _MIXED = 5  # motions that a mixture has at most
-_WORSE = 2  # in turn, after which none is better any more
+_WORSE = 3  # in turn, after which none is better any more
 _ALIKE = 1e-14  # squares: motions that differ by a ten-millionth are one
 
 

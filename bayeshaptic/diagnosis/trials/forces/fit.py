@@ -1,6 +1,6 @@
 """Fitting strengths and shapes of forces together with the linear parameters.
 
-Slopes of their motion enter the likelihood as further inputs (`force_slopes.py`), and one
+Slopes of their motion enter the likelihood as further inputs (`slopes.py`), and one
 Gauss-Newton fit moves everything.
 """
 
