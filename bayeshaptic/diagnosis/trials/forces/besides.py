@@ -95,7 +95,7 @@ class Hand:
     def answered(self, motion: Floats) -> Floats:
         count = next_fast_len(len(motion), real=True)
         spectrum = np.fft.rfft(motion, count)
-        far = 10.0  # edges, where a ten-thousandth of the motion counts as slow
+        far = 4.0  # edges, where a hundred-thousandth of the motion counts as slow
         frequency_hz = np.fft.rfftfreq(count, self.period_s)[: len(spectrum)]
         frequency_hz = frequency_hz[frequency_hz < far * self.edge_hz]
         frequency_hz[0] = frequency_hz[1]  # where a hand only damps there is no response at rest
