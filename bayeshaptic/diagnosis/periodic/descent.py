@@ -136,10 +136,10 @@ def _everywhere(found: Settled) -> dict[Place, Motion]:
 
 def _strengths(slope: Floats, unit: Floats, count: int) -> tuple[Floats, Floats]:
     """Covariance of the strengths at unit noise, (J, J), and how coordinates follow, (P, J)."""
-    own, strengths = slope[:, :-count], slope[:, -count:] / unit
+    own, strengths = slope[:, :-count], slope[:, -count:]
     along = -np.linalg.pinv(own, rcond=1e-6) @ strengths
     left = strengths + own @ along
-    return np.asarray(np.linalg.pinv(left.T @ left)), along
+    return np.asarray(np.linalg.pinv(left.T @ left) * np.outer(unit, unit)), along / unit
 
 
 def _descended(start: Settled) -> tuple[Settled, Floats, Floats]:
