@@ -57,6 +57,7 @@ def accepted(*families: str) -> list[Accepted]:
         (40, 15, 8, False),  # less than its parameters cost
         (40, 17, 8, True),
         (0, -5, 1, False),
+        (5, 10, 1, False),  # less where it was fitted, to twice as many windows: chance
     ],
 )
 def test_convincing(gain_fit: float, gain_choose: float, size: int, good: bool) -> None:

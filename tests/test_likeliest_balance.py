@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_motion_besides import DRAG, dragged
+from test_unrepeated import DRAG, dragged
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.periodic.answering import Settled

@@ -107,6 +107,9 @@ twentieth on it were 63, and half of all."""
 def convincing(gain_fit: float, gain_choose: float, size: int) -> bool:
     """Whether a candidate of `size` parameters predicts what it was not fitted to.
 
+    And explains what it was fitted to: these are twice as many windows, so that an effect that is
+    worth less there has gained elsewhere by chance.
+
     Parameters
     ----------
     gain_fit, gain_choose : float
@@ -114,4 +117,4 @@ def convincing(gain_fit: float, gain_choose: float, size: int) -> bool:
     size : int
     """
     enough = max(ENOUGH, SHARE * gain_fit, A_PARAMETER * size)
-    return gain_choose > enough
+    return gain_choose > enough and gain_fit > ENOUGH

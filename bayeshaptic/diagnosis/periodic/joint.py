@@ -47,7 +47,7 @@ class Basis:
 
     def mean(self, motion: Motion, period: Period) -> Floats:
         """The force over one period, shape (N,): the mean over what else the device does."""
-        besides = period.besides
+        besides = period.unrepeated
         share = 0.0 if self.place.second is not None else 1.0
         each = Motion(
             motion.position + share * besides.position,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.periodic.besides import NOTHING, Besides, motion_besides
+from bayeshaptic.diagnosis.periodic.unrepeated import NOTHING, Unrepeated, unrepeated_motion
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
@@ -35,7 +35,7 @@ class Period:
         Mean velocity: a constant force, or one that a law makes, drives a free device on.
     kept : slice
         The samples of the recording that are averaged.
-    besides : Besides
+    unrepeated : Unrepeated
         What does not repeat.
     """
 
@@ -47,7 +47,7 @@ class Period:
     period_s: float
     creep: float
     kept: slice
-    besides: Besides = NOTHING
+    unrepeated: Unrepeated = NOTHING
 
     @property
     def samples(self) -> int:
@@ -120,7 +120,7 @@ def one_period(etfe: Etfe, witness: Floats | None = None) -> Period:
         period_s=recording.period_s,
         creep=creep / recording.period_s,
         kept=slice(first, stop),
-        besides=motion_besides(position, samples, recording.period_s),
+        unrepeated=unrepeated_motion(position, samples, recording.period_s),
     )
 
 

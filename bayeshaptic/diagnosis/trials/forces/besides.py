@@ -27,8 +27,8 @@ from bayeshaptic.types import Floats
 
 # Hands tremble at up to 12 Hz, which has to come through whole; the encoder's steps are noise of
 # velocity that grows with the edge to the power of 3/2, and may be this share of the motion's.  At
-# the true parameters of held LHIfAMs that rub, under steps, log likelihoods rise from 132 and 1,556
-# to 285 and 1,601 when the edge goes from 20 Hz (and half the order) to 30; on the coarse encoder
+# the true parameters of held LHIfAMs that rub, under steps, log likelihoods rise from 128 and 1,556
+# to 252 and 1,601 when the edge goes from 20 Hz (and half the order) to 30; on the coarse encoder
 # of PHANToMs they fall from 58 and 27 to -19 and -48, and are 43 and 38 at 16 Hz.
 _ORDER, _LEAST_HZ, _MOST_HZ, _NOISE = 4, 14.0, 30.0, 0.01
 # Root mean square of what is off, as a share of all that is left, and how many simulations at most.

@@ -21,7 +21,7 @@ _OF_THE_RATE = 0.4  # where a low-pass leaves everything
 
 
 @dataclass(frozen=True)
-class Besides:
+class Unrepeated:
     """The motion of the motor that does not repeat, in each of the kept periods.
 
     Attributes
@@ -34,10 +34,10 @@ class Besides:
     velocity: Floats = field(repr=False)
 
 
-NOTHING = Besides(np.zeros((1, 1)), np.zeros((1, 1)))
+NOTHING = Unrepeated(np.zeros((1, 1)), np.zeros((1, 1)))
 
 
-def motion_besides(position: Floats, samples: int, period_s: float) -> Besides:
+def unrepeated_motion(position: Floats, samples: int, period_s: float) -> Unrepeated:
     """What does not repeat of a position over whole periods.
 
     Parameters
@@ -56,7 +56,7 @@ def motion_besides(position: Floats, samples: int, period_s: float) -> Besides:
     if highest_hz < _OF_THE_RATE / period_s:
         low = butter(2, highest_hz, fs=1 / period_s, output="sos")
         position, velocity = sosfiltfilt(low, position), sosfiltfilt(low, velocity)
-    return Besides(_rest(position, samples), _rest(velocity, samples))
+    return Unrepeated(_rest(position, samples), _rest(velocity, samples))
 
 
 def _rest(signal: Floats, samples: int) -> Floats:

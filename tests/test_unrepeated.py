@@ -10,11 +10,11 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.periodic.besides import NOTHING, motion_besides
 from bayeshaptic.diagnosis.periodic.descent import likeliest
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
 from bayeshaptic.diagnosis.periodic.period import one_period
+from bayeshaptic.diagnosis.periodic.unrepeated import NOTHING, unrepeated_motion
 from bayeshaptic.recordings.response.etfe import compress
 
 PERIOD_S, SAMPLES, PERIODS = 1e-3, 1000, 8
@@ -51,7 +51,7 @@ def balanced(pushed: float, seen: bool) -> Balanced:
     fit = bh.least_squares(bh.rigid(delay_s=0.0), etfe)
     windows, period = compress(etfe), one_period(etfe)
     if not seen:
-        period = replace(period, besides=NOTHING)
+        period = replace(period, unrepeated=NOTHING)
     without = balance(fit.model, windows, period, (), fit.theta)
     law = force_candidates(fit.model, without.motions)["drag"][0]
     return likeliest(fit.model, windows, period, (law,), without.theta, np.zeros(1))
@@ -71,8 +71,8 @@ def test_noise_of_the_sensor_is_no_motion() -> None:
     rng = np.random.default_rng(1)
     repeats = np.tile(np.sin(np.linspace(0, 20 * np.pi, SAMPLES, endpoint=False)), PERIODS)
     noise = 1e-3 * rng.standard_normal(len(repeats))
-    assert motion_besides(repeats + noise, SAMPLES, PERIOD_S) is NOTHING
-    assert motion_besides(repeats[:SAMPLES], SAMPLES, PERIOD_S) is NOTHING
+    assert unrepeated_motion(repeats + noise, SAMPLES, PERIOD_S) is NOTHING
+    assert unrepeated_motion(repeats[:SAMPLES], SAMPLES, PERIOD_S) is NOTHING
 
 
 def test_a_device_that_wanders_does_not_jump_between_its_periods() -> None:
@@ -80,7 +80,7 @@ def test_a_device_that_wanders_does_not_jump_between_its_periods() -> None:
     rng = np.random.default_rng(2)
     time = np.arange(PERIODS * SAMPLES) * PERIOD_S
     wander = 0.1 * np.sin(2 * np.pi * 0.37 * time) + 0.02 * time
-    found = motion_besides(wander + 1e-5 * rng.standard_normal(len(time)), SAMPLES, PERIOD_S)
+    found = unrepeated_motion(wander + 1e-5 * rng.standard_normal(len(time)), SAMPLES, PERIOD_S)
     speed = np.gradient(wander, PERIOD_S).reshape(-1, SAMPLES)
     inner = np.s_[:, 100:-100]
     np.testing.assert_allclose(found.velocity.mean(axis=0), 0.0, atol=1e-9)
