@@ -42,6 +42,9 @@ from .inference.fit import (
 from .inference.least_squares import (
     least_squares as least_squares,
 )
+from .inference.load import (
+    load_posterior as load_posterior,
+)
 from .inference.next_experiment import (
     Experiment as Experiment,
 )
@@ -59,9 +62,6 @@ from .inference.posterior import (
 )
 from .inference.sampler import (
     sample as sample,
-)
-from .inference.saved.load import (
-    load_posterior as load_posterior,
 )
 from .jobs.batch import (
     run_batch as run_batch,

@@ -6,7 +6,7 @@ import arviz as az
 import numpy as np
 import pytest
 
-from bayeshaptic.inference.rank_statistics import bulk_size, split_rhat, tail_size
+from bayeshaptic.numerics.rank_statistics import bulk_size, split_rhat, tail_size
 from bayeshaptic.types import Floats
 
 

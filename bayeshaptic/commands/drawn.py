@@ -8,8 +8,8 @@ import numpy as np
 
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.load import load_posterior
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.inference.saved.load import load_posterior
 from bayeshaptic.models.prior import draw
 from bayeshaptic.types import Floats
 

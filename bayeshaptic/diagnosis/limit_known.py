@@ -9,9 +9,9 @@ import numpy as np
 
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
 from bayeshaptic.inference.posterior import prior_dominated
-from bayeshaptic.inference.rank_statistics import split_rhat
 from bayeshaptic.inference.stopping import Verdict
 from bayeshaptic.models import Model
+from bayeshaptic.numerics.rank_statistics import split_rhat
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.draws import most_draws
 from bayeshaptic.stability.tail import ENOUGH_BELOW, quantile_with_error

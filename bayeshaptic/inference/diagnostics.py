@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.inference.rank_statistics import bulk_size, split_rhat, tail_size
+from bayeshaptic.numerics.rank_statistics import bulk_size, split_rhat, tail_size
 from bayeshaptic.types import Floats
 
 RHAT_LIMIT = 1.01
