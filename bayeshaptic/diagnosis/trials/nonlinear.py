@@ -6,7 +6,7 @@ parameters fitted anew: a profile.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,20 +63,21 @@ def nonlinear_trials(
     motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     firsts, others = _called_for(state, variables(raised), motion)
 
-    def searched(laws: Iterable[Variants], known: dict[str, Point]) -> list[Point]:
-        beside = [(law, known.get(law[0].strength[0])) for law in laws]
-        there = [(_beside(law, point), point) for law, point in beside]
-        return [
-            search(bench, law, motion, tick, point)
-            for law, point in there
-            if law and meter.affords(law[0].title)
-        ]
+    def looked_for(
+        laws: Iterable[Variants], known: dict[str, Point], before: Sequence[Point] = ()
+    ) -> list[Point]:
+        """By a scan, or where forces are there by what a little of each law would do."""
+        points, inner = [], []
+        for law in laws:
+            point = known.get(law[0].strength[0])
+            if bench.before and point is None and not isinstance(law[0], CommandEffect):
+                inner.append(law)
+            elif (there := _beside(law, point)) and meter.affords(law[0].title):
+                points.append(search(bench, there, motion, tick, point))
+        found = fitted(bench, points, meter, before)
+        return found + beside_others(bench, inner, meter, tick) if inner else found
 
-    of_commands = [law for law in firsts if isinstance(law[0], CommandEffect)]
-    found = fitted(bench, searched(of_commands if bench.before else firsts, {}), meter)
-    if bench.before:
-        inner = [law for law in firsts if law not in of_commands]
-        found += beside_others(bench, inner, meter, tick)
+    found = looked_for(firsts, {})
     known = {point.effect.strength[0]: point for point in found}
     for point in [one for one in known.values() if worth_following(one, known.values())]:
         laws = [_beside(law, point) for law in others if law[0].contains(point.effect)]
@@ -84,7 +85,7 @@ def nonlinear_trials(
     rest = [law for law in others if not any(law[0].contains(p.effect) for p in known.values())]
     # Where a limit is gradual says nothing of where it would be hard.
     alike = {name: p for name, p in known.items() if not isinstance(p.effect, CommandEffect)}
-    found = fitted(bench, searched(rest, alike), meter, found)
+    found = looked_for(rest, alike, found)
     return [_trial(bench, point) for point in found]
 
 

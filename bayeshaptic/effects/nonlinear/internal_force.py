@@ -125,7 +125,10 @@ def forced_motion(
     from bayeshaptic.effects.nonlinear.stepping_kernel import step_through
 
     linear = steps(mechanism, forces, step_s)
-    motion = np.array([[force.position, force.velocity] for force in forces])
+    motion = tuple(
+        (np.ascontiguousarray(force.position), np.ascontiguousarray(force.velocity))
+        for force in forces
+    )
     laws = tuple(callback(force.law.force) for force in forces)
     sticks = np.array([force.law.sticks for force in forces])
     constants, begins = numbers_of([force.law for force in forces])

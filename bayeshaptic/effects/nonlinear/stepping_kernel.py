@@ -90,8 +90,21 @@ def _advance(table: Floats, push: Floats, force: float, w: Floats, spare: Floats
 
 
 @kernel(inline=True)
+def _advance_six(table: Floats, push: Floats, force: float, w: Floats, spare: Floats) -> None:
+    """`_advance` of five or six states: all sums in one pass, and none over what is filled up."""
+    a, b, c, d, e, f = w[0], w[1], w[2], w[3], w[4], w[5]
+    to_a, to_b, to_c, to_d = table[0], table[1], table[2], table[3]
+    to_e, to_f = table[4], table[5]
+    for j in range(len(w)):
+        low = (to_a[j] * a + to_b[j] * b) + (to_c[j] * c + to_d[j] * d)
+        spare[j] = low + (to_e[j] * e + to_f[j] * f)
+    for j in range(len(w)):
+        w[j] = spare[j] + push[j] * force
+
+
+@kernel(inline=True)
 def _advance_eight(table: Floats, push: Floats, force: float, w: Floats, spare: Floats) -> None:
-    """`_advance` of five to eight states: all sums in one pass."""
+    """The same of seven or eight."""
     a, b, c, d, e, f, g, h = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7]
     to_a, to_b, to_c, to_d = table[0], table[1], table[2], table[3]
     to_e, to_f, to_g, to_h = table[4], table[5], table[6], table[7]
@@ -109,7 +122,7 @@ def step_through(
     drive: Floats,
     gains: Floats,
     reading: Floats,
-    motion: Floats,
+    motion: tuple[tuple[Floats, Floats], ...],
     step_s: float,
     substeps: int,
     laws: tuple[Callable[..., float], ...],
@@ -132,7 +145,7 @@ def step_through(
         What it adds, second, to the numbers of `rows` at a place, first.
     reading : ndarray, shape (S,)
         The motor's position in the states.
-    motion : ndarray, shape (F, 2, N * substeps)
+    motion : tuple of two ndarrays each, shape (N * substeps,)
         Position and velocity at each force's place without forces.
     step_s : float
     substeps : int
@@ -151,11 +164,12 @@ def step_through(
         Of each force.
     """
     count, states = len(laws), len(matrix)
-    steps = motion.shape[2]
+    steps = len(motion[0][0])
     motor = np.empty((count, steps // substeps))
     table, push = _tables(matrix, rows, drive)
     w, spare = np.zeros(push.shape), np.empty(push.shape[1])
-    force, eight = np.zeros(count), len(table) == 2 * _LANES
+    force = np.zeros(count)
+    six, eight = _LANES < states <= 6, len(table) == 2 * _LANES
     for sample in range(motor.shape[1]):
         for f in range(count):
             read = 0.0
@@ -165,9 +179,10 @@ def step_through(
         for k in range(sample * substeps, (sample + 1) * substeps):
             after = min(k + 1, steps - 1)
             for f in range(count):
-                x = 0.5 * (motion[f, 0, k] + motion[f, 0, after])
-                v = 0.5 * (motion[f, 1, k] + motion[f, 1, after])
-                last = motion[f, 1, after]
+                position, velocity = motion[f]
+                x = 0.5 * (position[k] + position[after])
+                last = velocity[after]
+                v = 0.5 * (velocity[k] + last)
                 seen = states + 3 * f
                 for g in range(count):
                     x += w[g, seen]
@@ -186,7 +201,9 @@ def step_through(
                 if sticks[f]:
                     force[f] = rubbing(2 * v - last, last, gain, force[f])
             for f in range(count):
-                if eight:
+                if six:
+                    _advance_six(table, push[f], force[f], w[f], spare)
+                elif eight:
                     _advance_eight(table, push[f], force[f], w[f], spare)
                 else:
                     _advance(table, push[f], force[f], w[f], spare)

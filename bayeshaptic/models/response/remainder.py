@@ -38,6 +38,7 @@ from bayeshaptic.types import Bools, Complexes, Floats, Ints
 _ALIASES = 8  # on either side
 _MOST_ALONE = 3  # the nearest alias that a series begins with; those before are summed themselves
 _TERMS = 16  # of the Chebyshev series
+_FAR_TERMS = 8  # of those beyond the nearest ones: 2 pi further from all poles, and far smaller
 _REACH = 5.2  # |p_max| T + theta up to which it converges to 1e-8 of itself
 
 
@@ -188,9 +189,15 @@ def aliases(
     Without the aliases nearer than `nearest` that is so for poles that are faster by
     2 pi / T for each of them.
     """
-    x, inverse = _chebyshev_nodes()
-    sums = alias_sums(remainder, (x + 1) * top / 2, delay_s, period_s, nearest)
-    return Aliases(inverse @ sums, top)
+
+    def series(terms: int, first: int, last: int) -> Complexes:
+        x, inverse = _chebyshev_nodes(terms)
+        angles = (x + 1) * top / 2
+        return inverse @ _shared_alias_sums(remainder, angles, delay_s, period_s, first, last)
+
+    coefficients = series(_TERMS, nearest, nearest)
+    coefficients[:_FAR_TERMS] += series(_FAR_TERMS, nearest + 1, _ALIASES)
+    return Aliases(coefficients, top)
 
 
 def smooth_aliases(fastest: Floats, top: float) -> Bools:
@@ -237,10 +244,10 @@ def _numbers(nearest: int, furthest: int) -> Ints:
 
 
 @cache
-def _chebyshev_nodes() -> tuple[Floats, Floats]:
+def _chebyshev_nodes(terms: int) -> tuple[Floats, Floats]:
     """Nodes in [-1, 1], and the matrix from values there to coefficients."""
-    x = chebyshev.chebpts1(_TERMS)
-    matrix = np.asarray(np.linalg.inv(chebyshev.chebvander(x, _TERMS - 1)), float)
+    x = chebyshev.chebpts1(terms)
+    matrix = np.asarray(np.linalg.inv(chebyshev.chebvander(x, terms - 1)), float)
     return x, matrix
 
 

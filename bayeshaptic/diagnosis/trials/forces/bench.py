@@ -115,6 +115,11 @@ class ForceBench:
             return theta
         return polish(self.model, self.windows(self._etfe, theta), theta)
 
+    @property
+    def known_motion(self) -> Floats | None:
+        """What the forces of the state add to the motion, shape (N,); None where it has none."""
+        return self.simulation.there if self.before else None
+
     def point(
         self,
         forces: tuple[Acting, ...],

@@ -49,7 +49,7 @@ def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
     for effect in effects:
         faint = _FAINT * float(effect.first_strengths(bench.model, theta, usual[effect.place])[0])
         tried.append((effect, faint, (*bench.before, Acting(effect, faint))))
-    return _scored(bench, bench.as_it_is(bench.before, theta), tried)
+    return _scored(bench, bench.as_it_is(bench.before, theta, bench.known_motion), tried)
 
 
 def departures(bench: ForceBench, known: Point, effects: Sequence[NonlinearEffect]) -> list[Hint]:

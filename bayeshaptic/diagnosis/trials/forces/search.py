@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -61,14 +62,15 @@ def search(
     for effect in variants:
         if known:
             before, near = known.forces[:-1], _NEAR * known.strength
-            beside = _scan(bench, before, effect, near, known.theta)
+            scan = partial(_scan, bench, before, effect, near, expected=known.motion)
+            beside = scan(known.theta)
             if not any(np.isfinite(point.gain_fit) for point in beside):
-                beside = _scan(bench, before, effect, near, _damped(bench, known.theta))
+                beside = scan(_damped(bench, known.theta))
             points += beside
             continue
         firsts = effect.first_strengths(bench.model, theta, motion[effect.place])
         for strengths in (firsts, -firsts) if effect.signed else (firsts,):
-            points += _scan(bench, bench.before, effect, strengths, theta, beyond=8)
+            points += _scan(bench, bench.before, effect, strengths, theta, bench.known_motion, 8)
     return max(points, key=lambda point: point.gain_fit)
 
 
@@ -87,7 +89,7 @@ def beside_others(
 
     def start(hint: Hint, part: float) -> Point:
         force = Acting(hint.effect, part * hint.strength)
-        return bench.point((*bench.before, force), theta)
+        return bench.point((*bench.before, force), theta, expected=bench.known_motion)
 
     every = hints(bench, [effect for law in laws for effect in law])
     return _followed(bench, every, start, laws, meter, tick)
@@ -112,7 +114,7 @@ def containing(
 
     def start(hint: Hint, part: float) -> Point:
         law = hint.effect.departing(min(part * hint.strength, 1.0))
-        return bench.point((*before, Acting(law, own.strength)), known.theta)
+        return bench.point((*before, Acting(law, own.strength)), known.theta, expected=known.motion)
 
     every = departures(bench, known, [effect for law in laws for effect in law])
     return _followed(bench, every, start, laws, meter, tick)
@@ -158,6 +160,7 @@ def _scan(
     effect: NonlinearEffect,
     strengths: Floats,
     theta: Floats,
+    expected: Floats | None = None,
     beyond: int = 0,
 ) -> list[Point]:
     """From faint to strong beside the forces before it, until it is clearly too strong.
@@ -169,16 +172,15 @@ def _scan(
     # The less an actuator's limit, the stronger it acts.
     stronger = 3.0 if abs(strengths[-1]) > abs(strengths[0]) else 1 / 3.0
 
-    def point(strength: float, start: Floats) -> Point:
-        near = points[-1].motion if points else None
+    def point(strength: float, start: Floats, near: Floats | None) -> Point:
         return bench.point((*before, Acting(effect, strength)), start, expected=near)
 
     points: list[Point] = []
     too_strong = 10.0  # drop of the log likelihood at which a scan stops
     further = strengths[-1] * stronger ** np.arange(1, beyond + 1)
     for number, strength in enumerate([*strengths, *further]):
-        start = points[-1].theta if points else theta
-        points.append(point(float(strength), start))
+        start, near = (points[-1].theta, points[-1].motion) if points else (theta, expected)
+        points.append(point(float(strength), start, near))
         gained = points[-1].gain_fit - points[-2].gain_fit if len(points) > 1 else np.inf
         if gained < -too_strong or (number >= len(strengths) - 1 and not gained > 0):
             break
@@ -186,7 +188,11 @@ def _scan(
 
 
 def _fainter(
-    at: Callable[[float, Floats], Point], first: Point, theta: Floats, factor: float, most: int
+    at: Callable[[float, Floats, Floats | None], Point],
+    first: Point,
+    theta: Floats,
+    factor: float,
+    most: int,
 ) -> list[Point]:
     """Where the faintest of a scan is too strong already: ever fainter, until less is no better.
 
@@ -194,10 +200,9 @@ def _fainter(
     strength to make it act less.
     """
     points = [first]
-    no_trace = 1.0  # of the log likelihood
+    no_trace = 1.0  # of the log likelihood: a force that gains 10 at its best gains more a step
     while first.gain_fit < 0 and len(points) <= most:
-        points.append(at(factor * points[-1].strength, theta))
-        gained = points[-1].gain_fit - points[-2].gain_fit
-        if not gained > 0 or abs(points[-1].gain_fit) < no_trace:
+        points.append(at(factor * points[-1].strength, theta, points[-1].motion))
+        if not points[-1].gain_fit - points[-2].gain_fit > no_trace:
             break
     return points[1:]

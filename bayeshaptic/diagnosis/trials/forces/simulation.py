@@ -86,7 +86,7 @@ class Simulation:
 
     def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
         """Position and velocity at places, on the fine grid, beside the forces that are there."""
-        linear = self._linear(theta, self.command)
+        linear = self._linear(theta, self.command, places)
         taken = self._besides(theta, places).of(self._left(linear) - self.there)
         return self._moving(theta, places, linear, taken)
 
@@ -159,7 +159,7 @@ class Simulation:
         order = sorted(range(len(acting)), key=lambda i: acting[i].effect.sticks)
         places = tuple(dict.fromkeys(one.effect.place for one in acting))
         laws = [one.effect.law(one.strength, self.model, theta) for one in acting]
-        linear = self._linear(theta, self.command - self.lost(forces))
+        linear = self._linear(theta, self.command - self.lost(forces), places)
         left, mechanism = self._left(linear), self.model.system(theta).mechanism
         period, away = self.recording.period_s, 1e3 * np.ptp(self.recording.position)
 
@@ -182,22 +182,24 @@ class Simulation:
 
     def _besides(self, theta: Floats, places: tuple[Place, ...]) -> Besides:
         """What neither command nor forces make."""
-        against_ground = bool({MOTOR, LOAD} & set(places))
         if self.model.held:
             own, usual = self.model.system(theta), self.model.system(self.usual)
-            kind = Hand if against_ground else HandAfar
+            kind = Hand if _against_ground(places) else HandAfar
             return kind(self.recording.period_s, self._edge_hz, own, usual)
-        if not against_ground:
+        if not _against_ground(places):
             return Nothing()  # that a spring between the masses would know of
         kept = self._usual_drifts.shape[1]
         return Drift(self._drifts(theta)[:, :kept], self._usual_drifts)
 
-    def _linear(self, theta: Floats, command: Floats) -> Floats:
-        """What a command does to masses: positions and velocities, fine grid, (M, 2, N * s)."""
+    def _linear(self, theta: Floats, command: Floats, places: tuple[Place, ...]) -> Floats:
+        """What a command does to the masses at places: positions and velocities, (M, 2, N * s).
+
+        Of the motor always, on the fine grid.
+        """
         system = self.model.system(theta)
-        masses = tuple(range(min(len(system.mechanism.masses), 2)))
-        if "kc" not in self.model.names:
-            masses = masses[:1]  # the second of a rigid device is that of a vibration mode
+        # The second mass of a rigid device is that of a vibration mode.
+        both = {LOAD, CONNECTION} & set(places) and "kc" in self.model.names
+        masses = (0, 1) if both else (0,)
         return linear_motions(system, command, self.recording.period_s, masses, SUBSTEPS)
 
     def _left(self, linear: Floats) -> Floats:
@@ -209,14 +211,19 @@ class Simulation:
     ) -> dict[Place, Motion]:
         """Motion at places, with that which nothing known makes, `taken`."""
         (x, v), *others = linear
-        # The measured position has what a hand does, and where the device stands.
-        along = _between(np.gradient(taken, self.recording.period_s))
-        found = {MOTOR: Motion(self._measured, v + along, self.command)}
+        found = {}
+        if _against_ground(places):
+            # The measured position has what a hand does, and where the device stands.
+            along = _between(np.gradient(taken, self.recording.period_s))
+        if MOTOR in places:
+            found[MOTOR] = Motion(self._measured, v + along, self.command)
         for x2, v2 in others:
-            hangs = self._hanging_back(taken, theta) if CONNECTION in places else 0.0
-            found[CONNECTION] = Motion(x - x2 + hangs, v - v2, self.command)
-            found[LOAD] = Motion(x2, v2 + along, self.command)  # what is slow moves both masses
-        return {place: motion for place, motion in found.items() if place in places}
+            if LOAD in places:  # what is slow moves both masses
+                found[LOAD] = Motion(x2, v2 + along, self.command)
+            if CONNECTION in places:
+                hangs = self._hanging_back(taken, theta)
+                found[CONNECTION] = Motion(x - x2 + hangs, v - v2, self.command)
+        return found
 
     def _hanging_back(self, taken: Floats, theta: Floats) -> Floats | float:
         """How far the motor hangs back where a hand moves the device."""
@@ -224,6 +231,11 @@ class Simulation:
             return 0.0
         values = dict(zip(self.model.names, theta.tolist(), strict=True))
         return _between(stretched(taken, self.recording.period_s, values))
+
+
+def _against_ground(places: tuple[Place, ...]) -> bool:
+    """Whether a force acts between a mass and the ground at any of them."""
+    return MOTOR in places or LOAD in places
 
 
 def _between(samples: Floats) -> Floats:
