@@ -76,6 +76,8 @@ less than either does from the truth, this share of the score besides.
 
 Without the first 30 of 34 effects are named, or stand as a tie; with it all 34.  Without the second
 nothing changes."""
+LAW_SD = 0.03
+"""How well a law of a force is known at best, relative; nor is its strength known better."""
 LAW_REST = 3.0
 """What one law of a force may leave more than another by chance, in thresholds.
 

@@ -6,14 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced
 from bayeshaptic.diagnosis.state import Accepted, Change, Estimate, State
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
-
-_LAW_SD = 0.03  # relative; no law is known better, as in `bayeshaptic.diagnosis.trials.nonlinear`
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ def _limit_log_sd(whole: Balanced) -> float:
     if whole.covariance is None or whole.along is None:
         return 0.0
     covariance = max(whole.rms(), 1.0) ** 2 * whole.covariance
-    covariance = covariance + np.diag((_LAW_SD * whole.strength) ** 2)
+    covariance = covariance + np.diag((thresholds.LAW_SD * whole.strength) ** 2)
     step = 1e-2 * np.sqrt(np.diag(covariance))
     here = coordinates(whole.model)
     far = (whole.along * step).T

@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.in_doubt import in_doubt
 from bayeshaptic.diagnosis.trials.forces.search import (
     Variants,
     beside_others,
@@ -22,20 +21,18 @@ from bayeshaptic.diagnosis.trials.forces.search import (
     search,
     worth_following,
 )
-from bayeshaptic.diagnosis.trials.forces.slopes import spread
 from bayeshaptic.diagnosis.trials.taken_off import with_forces
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion, NonlinearEffect
-from bayeshaptic.inference.fit import Fit, search_box, summarise
+from bayeshaptic.inference.fit import Fit, summarise
 from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import Model
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.estimators.random_excitation import points as points_of
 from bayeshaptic.recordings.response.etfe import Etfe, compress
-from bayeshaptic.stability.critical import critical_stiffness
 
 
 def nonlinear_trials(
@@ -200,7 +197,7 @@ def _trial(bench: ForceBench, point: Point) -> Trial:
 
 def _accepted(bench: ForceBench, point: Point) -> tuple[Accepted, ...]:
     """What is accepted with a point: forces before it are what they are beside the new one."""
-    (*earlier, own), (*sds, own_sd), limit_log_sd = point.changes, *_spread(bench, point)
+    (*earlier, own), (*sds, own_sd), limit_log_sd = point.changes, *in_doubt(bench, point)
     effect = point.effect
     new = Accepted(
         effect.name,
@@ -228,25 +225,6 @@ def _accepted(bench: ForceBench, point: Point) -> tuple[Accepted, ...]:
             )
         found.append(one)
     return (*found, new)
-
-
-def _spread(bench: ForceBench, point: Point) -> tuple[list[float], float]:
-    """Standard deviations of the strengths, and of log K_CR because of strengths and shapes."""
-    covariance, along = spread(bench, point)
-    tuned = [len(one.effect.tuned) for one in point.forces]
-    strengths = np.cumsum([0, *(1 + count for count in tuned[:-1])])
-    # Neither a law nor its shape is known better than this.
-    law_sd = 0.03  # relative; how well a law and its shape are known at best
-    covariance[strengths, strengths] += law_sd**2
-    here, low, high = search_box(bench.model)
-    step = 1e-3
-    sides = here.coordinate(point.theta[None]) + step * np.concatenate([along.T, -along.T])
-    limits = critical_stiffness(bench.model, here.natural(np.clip(sides, low, high))).samples
-    more, less = np.log(np.maximum(limits, 1e-9)).reshape(2, -1)
-    slope = (more - less) / (2 * step)
-    relative = np.minimum(np.sqrt(np.diag(covariance)[strengths]), 0.5)
-    sds = relative * [abs(one.strength) for one in point.forces]
-    return sds.tolist(), min(float(np.sqrt(slope @ covariance @ slope)), 1.0)
 
 
 def _estimates(model: Model, force: Acting, sd: float) -> dict[str, Estimate]:

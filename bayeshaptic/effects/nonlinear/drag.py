@@ -70,7 +70,10 @@ class Drag(_PowerOfVelocity):
 
     name = "drag"
     title = "drag that grows with the square of the velocity"
-    tests = (Shape("v|v|", "a force like v|v|, as drag", VELOCITY, _power(2)),)
+    tests = (
+        Shape("v|v|", "a force like v|v|, as drag", VELOCITY, _power(2)),
+        Shape("v2|v2|", "drag at the load", LOAD_VELOCITY, _power(2)),
+    )
     strength = ("drag_coefficient", "drag")
     power = 2
     also = (5,)
@@ -84,6 +87,7 @@ class CubicDamping(_PowerOfVelocity):
     title = "damping that grows with the cube of the velocity"
     tests = (
         Shape("v^3", "a force like v\N{SUPERSCRIPT THREE}", VELOCITY, _power(3), "cubic_damping"),
+        Shape("v2^3", "cubic damping at the load", LOAD_VELOCITY, _power(3), "cubic_damping"),
     )
     strength = ("cubic_damping", "cubic_damping")
     power = 3

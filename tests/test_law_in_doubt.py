@@ -1,0 +1,78 @@
+"""What the error of a law leaves open of the limit, beside fits with more and less of the force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.fit import fit_force
+from bayeshaptic.diagnosis.trials.forces.in_doubt import in_doubt
+from bayeshaptic.effects.nonlinear.friction import CoulombFriction
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.protocol import Acting
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig.effects.nonlinear import Drag
+from bayeshaptic.stability import critical_stiffness
+
+LHIFAM = Bench.from_device("lhifam")
+
+
+def state_of(bench: Bench) -> State:
+    """A free device fitted to ten seconds of white noise."""
+    made = simulate(bench, WhiteNoise(4.0, 300.0, 0.3, 10.0), seed=3)
+    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    etfe = estimate_etfe(recording)
+    return State(etfe, least_squares(build_model("free", "lhifam"), etfe))
+
+
+def beside(bench: ForceBench, point: Point, factor: float) -> Point:
+    """The linear parameters fitted beside so much of the force, in the motion that it makes."""
+    forces = (Acting(point.effect, factor * point.strength),)
+    found = bench.point(forces, point.theta, expected=point.motion)
+    for _ in range(20):
+        further = bench.point(forces, found.theta, expected=found.motion)
+        if np.allclose(further.theta, found.theta, rtol=1e-4):
+            break
+        found = further
+    return found
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.6])
+def test_a_law_moves_the_limit_as_far_as_more_of_the_force_does(friction: float) -> None:
+    """The force itself is known far better here, so that the spread is its law's.
+
+    To a factor of one and a half: a fit with less of a force than there is leaves more than noise.
+    """
+    state = state_of(LHIFAM.with_effect("coulomb_friction", force=friction))
+    assert state.etfe.recording is not None
+    bench = ForceBench(state, state.etfe.recording)
+    start = bench.point((Acting(CoulombFriction(MOTOR), friction),), state.fit.theta)
+    point = fit_force(bench, start)
+    moved = [
+        abs(log_limit(beside(bench, point, factor)) - log_limit(point))
+        for factor in (1 - thresholds.LAW_SD, 1 + thresholds.LAW_SD)
+    ]
+    assert max(moved) / 1.5 < in_doubt(bench, point)[1] < 1.5 * max(moved)
+
+
+def log_limit(point: Point) -> float:
+    model = build_model("free", "lhifam")
+    return float(np.log(critical_stiffness(model, point.theta).value))
+
+
+def test_drag_at_the_load_is_seen_over_its_velocity() -> None:
+    """The load of a free device moves as its motor does when it is slow, and otherwise alone."""
+    state = state_of(LHIFAM.with_effect(Drag(200.0, "m2")))
+    tests = {test.name: test for test in nonlinear_tests(state.fit, state.etfe)}
+    assert tests["v2|v2|"].flagged
+    names = ("v|v|", "sign(v2)", "v2^3")
+    assert all(tests["v2|v2|"].statistic > tests[name].statistic for name in names)
+    assert tests["v2|v2|"].force is not None and tests["v2|v2|"].force.strength > 0
