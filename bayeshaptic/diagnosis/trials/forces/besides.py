@@ -123,13 +123,18 @@ class Drift:
     own, usual : ndarray, shape (N, 2 or 3)
         `drifts` of the mechanism without forces, and of that with what they do on the average;
         as many as are `remembered`.
+    mean : float
+        Of the command: a force that is constant, and no other, as long as nothing else is known.
     """
 
     own: Floats
     usual: Floats
+    mean: float
 
     def begin(self, left: Floats) -> Floats:
-        return np.zeros_like(left)  # at rest
+        # At rest.  What sticks and slides does not forget what the mean of its command is: of three
+        # loops at their true parameters motions were found 3, 17 and 114 counts off without.
+        return np.asarray(left[0] + self.mean * self.own[:, 1])
 
     def of(self, left: Floats) -> Floats:
         return np.asarray(self.own @ _parts(self.own, left))

@@ -188,8 +188,8 @@ class Simulation:
             return kind(self.recording.period_s, self._edge_hz, own, usual)
         if not _against_ground(places):
             return Nothing()  # that a spring between the masses would know of
-        kept = self._usual_drifts.shape[1]
-        return Drift(self._drifts(theta)[:, :kept], self._usual_drifts)
+        kept, mean = self._usual_drifts.shape[1], float(self.recording.force.mean())
+        return Drift(self._drifts(theta)[:, :kept], self._usual_drifts, mean)
 
     def _linear(self, theta: Floats, command: Floats, places: tuple[Place, ...]) -> Floats:
         """What a command does to the masses at places: positions and velocities, (M, 2, N * s).
