@@ -13,10 +13,12 @@ from bayeshaptic.diagnosis.periodic.steady_motion import Applied, Responses, pai
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.spending import spend
 from bayeshaptic.types import Complexes, Floats
 
 STEP = 1e-5
 """Of a coordinate, and of the rms of a motion."""
+_COST = 30.0  # of an answer to a change, a number of the motion, in values of a rational model
 _EXACT, _TERMS = 1e-3, 30  # of the change of a motion, solved for in a Krylov space
 
 
@@ -109,6 +111,7 @@ class Chain:
             return flat - forces(moved).ravel()
 
         size = shape[0] * shape[1]
+        spend(_COST * size)
         first = forces(change).ravel()
         found, _ = gmres(
             LinearOperator((size, size), rest), first, rtol=1e-3, restart=30, maxiter=1

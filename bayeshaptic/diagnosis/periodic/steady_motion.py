@@ -20,9 +20,11 @@ from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.models.response.mechanism import Pair
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.numerics.spending import spend
 from bayeshaptic.types import Complexes, Floats
 
 LOAD = Place(1, None)
+_COST = 15.0  # of a steady motion, a sample of a period, in values of a rational model
 
 
 class Responses:
@@ -160,6 +162,7 @@ class Steady:
     """
 
     def __init__(self, system: LinearSystem, period: Period, places: tuple[Place, ...]) -> None:
+        spend(_COST * period.samples)
         responses, drive = Responses(system, period), system.mechanism.drive
         own = responses(drive, drive)
         frequency = period.s.imag / (2 * np.pi)
