@@ -22,7 +22,7 @@ from benchmarks.through_reference import make
 def test_the_mean_of_the_command_acts_as_the_rest_of_it_does(seed: int) -> None:
     """A step of an eighth of a period puts a slide's end wrong by up to some counts.
 
-    From the command without its mean the motion was off by 17 and 114.
+    From the command without its mean the motion was off by 114 and 17 counts.
     """
     case = make(seed)
     etfe = estimate_in_any_loop(replace(case.recording, reference=None))

@@ -24,7 +24,9 @@ from bayeshaptic.numerics.spending import spend
 from bayeshaptic.types import Complexes, Floats
 
 LOAD = Place(1, None)
-_COST = 15.0  # of a steady motion, a sample of a period, in values of a rational model
+# What it costs to set one up and evaluate it some times, a sample of a period, in values of a
+# rational model.
+_COST = 25.0
 
 
 class Responses:

@@ -71,7 +71,8 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
             # Slopes over no more than what is still to go, each by itself.
             near = np.clip(factor * np.abs(step.logs) / NUDGE, _NEAREST, furthest)
             reach = replace(reach, near=near)
-        elif furthest > _CLOSE and best.gain_fit > 0:  # once more, with slopes close by
+        elif furthest > _CLOSE and best.gain_fit > 0:
+            # Once more, with slopes close by; not of what is worth nothing here: that is refused.
             furthest = _CLOSE
             reach = replace(reach, near=np.full(len(first), _CLOSE))
         else:
