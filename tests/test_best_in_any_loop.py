@@ -36,9 +36,16 @@ def ends(name: str, verdict: str, score: float, effect: str = "", limit: float =
 
 
 def outcome(
-    monkeypatch: pytest.MonkeyPatch, chosen: str, *loops: Any, modelled: bool = True
+    monkeypatch: pytest.MonkeyPatch,
+    chosen: str,
+    *loops: Any,
+    modelled: bool = True,
+    rubbing: float = 0.0,
 ) -> tuple[str, Any, list[str]]:
-    """Name of the base model in the end, its loop, and the base models that were tried."""
+    """Name of the base model in the end, its loop, and the base models that were tried.
+
+    `rubbing` is what a first look gains with friction in a hand.
+    """
     by_name, tried = {loop.state.fit.model.name: loop for loop in loops}, []
 
     def traced(base: Any, meter: Any, tick: Any) -> Any:
@@ -53,6 +60,8 @@ def outcome(
     monkeypatch.setattr(best_in_any_loop, "_limit", lambda one: one.limit)
     monkeypatch.setattr(best_in_any_loop, "replace", _replaced)
     monkeypatch.setattr(best_in_any_loop, "base_of", lambda begun, name: (None, fit(name)))
+    monkeypatch.setattr(best_in_any_loop, "first_look", lambda *_: (rubbing, rubbing / 4))
+    monkeypatch.setattr(best_in_any_loop, "State", lambda etfe, fit: SimpleNamespace(fit=fit))
     candidates = {name: ScoredFit(fit(name), 0.0) for name in SIZES}
     choice = Choice(fit(chosen), "", candidates) if modelled else None
     begun: Any = SimpleNamespace(etfe=None, fit=fit(chosen), choice=choice)
@@ -98,6 +107,19 @@ def test_a_base_that_gives_does_not_stand_where_friction_in_a_hand_is_likelier(m
 )
 def test_no_other_base_model_is_tried_where_none_is_in_question(monkeypatch, own, modelled) -> None:
     assert outcome(monkeypatch, "free", own, modelled=modelled)[::2] == ("free", ["free"])
+
+
+def test_friction_that_a_second_mode_stands_in_for_unseen(monkeypatch) -> None:
+    """1.11 times the limit was recommended, of a chain that left noise."""
+    loops = (
+        ends("chain-2", CONSISTENT, 0.0),
+        ends("free", UNEXPLAINED, 300.0),
+        ends("grasped", EXPLAINED, -1768.0, FRICTION),
+    )
+    assert outcome(monkeypatch, "chain-2", *loops, rubbing=10.0)[::2] == ("chain-2", ["chain-2"])
+    name, found, tried = outcome(monkeypatch, "chain-2", *loops, rubbing=40.0)
+    assert (name, found.verdict) == ("grasped", EXPLAINED)
+    assert tried == ["chain-2", "free", "grasped"]
 
 
 def test_one_mass_is_followed_in_time(monkeypatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -80,6 +81,28 @@ def test_the_worst_of_the_forces_that_are_seen_counts() -> None:
     assert found.limit_log == pytest.approx(max(far.values()), rel=0.01)
     worst = max(far, key=lambda name: far[name])
     assert fit.model.names[int(np.argmax(np.abs(found.parameters / fit.theta)))] == worst
+
+
+def test_a_damper_that_is_next_to_nothing_has_a_slope_to_one_side(monkeypatch) -> None:
+    """On the other there is no device: a limit of nothing, whose logarithm is any number."""
+    fit = fake_closed("explained", "nonlinear").analysis.fit
+    place = fit.model.names.index("b2")
+    fit = replace(fit, theta=np.where(np.arange(fit.model.size) == place, 0.0, fit.theta))
+    asked = []
+
+    def limits(model, theta):
+        asked.append(theta)
+        return SimpleNamespace(
+            samples=np.where(np.all(theta >= 0, axis=1), 1.0 + theta[:, place], 0)
+        )
+
+    monkeypatch.setattr("bayeshaptic.diagnosis.widening.forces_left.critical_stiffness", limits)
+    strength = 1e-3
+    found = forces_left(fit, (seen(strength, along(fit, b2=1.0)),))
+    assert np.all(asked[0] >= 0)
+    # Of log(1 + b2), b2 as long as its coordinate is where that is linear.
+    scale = float(coordinates(fit.model).scale[place])
+    assert found.limit_log == pytest.approx(strength * scale, rel=1e-2)
 
 
 def test_where_no_test_says_what_a_force_moves_none_is_left() -> None:

@@ -19,6 +19,7 @@ from bayeshaptic.diagnosis.samples.mend import SampleLook, measurement_tests
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
+from bayeshaptic.types import Floats
 
 
 def is_periodic(etfe: Etfe) -> bool:
@@ -26,7 +27,9 @@ def is_periodic(etfe: Etfe) -> bool:
     return isinstance(etfe.spectra, PeriodicSpectra) and etfe.unbroken is not None
 
 
-def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tuple[Test, ...]:
+def residual_tests(
+    fit: Fit, etfe: Etfe, look: SampleLook | None = None, acted: Floats | float = 0.0
+) -> tuple[Test, ...]:
     """The tests that a measurement of its kind gets.
 
     In closed loop a command that answers to the noise makes anything look like drift, and a device
@@ -38,11 +41,13 @@ def residual_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tupl
     etfe : Etfe
     look : SampleLook, optional
         What the samples showed, where they were looked at before.
+    acted : ndarray, shape (N,), or 0
+        What forces that were taken off add to the position.
     """
     if is_periodic(etfe):
         return periodic_tests(fit, etfe)
     if etfe.direct:
-        return causal_tests(fit, etfe)
+        return causal_tests(fit, etfe, acted)
     if etfe.through_reference:
         return (*frequency_tests(fit), *nonlinear_tests(fit, etfe))
     return (*model_tests(fit, etfe), *measurement_tests(fit, etfe, look))

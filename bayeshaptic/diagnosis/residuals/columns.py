@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 from scipy.special import ndtri, stdtr
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
+from bayeshaptic.diagnosis.residuals.unforced import drifts, parts, slow_motion
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import (
     ALONG,
@@ -232,15 +232,10 @@ def drift_velocity(system: LinearSystem, besides: Floats, period_s: float) -> Fl
 
 def _drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Floats, Floats]:
     """Position and velocity of what `drift_velocity` tells."""
-    steady = np.ones(len(besides))
-    x, v = linear_motion(system, steady, period_s)
-    columns = np.stack([steady, x, v])
-    size = np.linalg.norm(columns, axis=1)
-    # Normal equations of three columns in one scale; motions alike to a ten-millionth are one.
-    alike = 1e-14
-    normal = columns @ columns.T / np.outer(size, size)
-    weights = np.linalg.lstsq(normal, columns @ besides / size, rcond=alike)[0] / size
-    return weights @ columns, np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
+    columns = drifts(system, len(besides), period_s)
+    weights = parts(columns, besides)
+    _, x, v = columns.T
+    return columns @ weights, np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
 
 
 def moved_besides(fit: Fit, recording: Recording) -> float:
@@ -267,9 +262,8 @@ def moved_besides(fit: Fit, recording: Recording) -> float:
 
 
 def _slow_velocity(position: Floats, period_s: float) -> Floats:
-    rate = 1 / period_s
-    low = butter(4, min(_SLOW_HZ, _OF_THE_RATE * rate), fs=rate, output="sos")
-    return np.gradient(sosfiltfilt(low, position), period_s)
+    edge_hz = min(_SLOW_HZ, _OF_THE_RATE / period_s)
+    return np.gradient(slow_motion(position, period_s, edge_hz), period_s)
 
 
 def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped-def]

@@ -149,7 +149,10 @@ def _is_known_to_hold(trial: Trial) -> bool:
 
 
 def _left(state: State) -> tuple[Test, ...]:
-    return acceptance.remaining(residual_tests(state.fit, state.etfe), state.accepted)
+    changes = [one.change for one in state.accepted if one.change is not None]
+    acted = sum(change.motion for change in changes)
+    tests = residual_tests(state.fit, state.etfe, acted=acted)
+    return acceptance.remaining(tests, state.accepted)
 
 
 def _trials(state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick | None) -> list[Trial]:

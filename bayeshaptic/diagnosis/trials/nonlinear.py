@@ -86,6 +86,31 @@ def nonlinear_trials(
     return [_trial(bench, point) for point in found]
 
 
+def first_look(
+    kind: type[NonlinearEffect],
+    state: State,
+    meter: Meter,
+    tick: Callable[[str], None] | None = None,
+) -> tuple[float, float]:
+    """What a scan of a law's strengths gains to fit and to choose by, before any is fitted.
+
+    Parameters
+    ----------
+    kind : type of NonlinearEffect
+    state : State
+    meter : Meter
+        Says whether that is affordable; nothing is gained where it is not.
+    tick : callable, optional
+        Called with its title.
+    """
+    if state.etfe.unbroken is None or not meter.affords(kind.title):
+        return 0.0, 0.0
+    bench = ForceBench(state, state.etfe.unbroken)
+    motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    best = search(bench, list(kind.candidates(state.model, motion)), motion, tick)
+    return best.gain_fit, best.gain_choose
+
+
 def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
     """With another law in the place of an earlier force, where that predicts more.
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.diagnosis.residuals.residual import Test
-from bayeshaptic.inference.coordinates import coordinates
-from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.fit import Fit, search_box
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
 
@@ -59,11 +58,16 @@ def forces_left(fit: Fit, tests: Iterable[Test]) -> ForcesLeft:
 
 
 def _slopes(fit: Fit) -> tuple[Floats, Floats]:
-    """Of the limit's logarithm, and of each natural value, over its coordinate, shape (P,)."""
-    here = coordinates(fit.model)
-    phi = here.coordinate(fit.theta[None]) + _STEP * np.eye(fit.model.size)
-    less = here.natural(phi - 2 * _STEP * np.eye(fit.model.size))
-    more = here.natural(phi)
+    """Of the limit's logarithm, and of each natural value, over its coordinate, shape (P,).
+
+    Of a damper that is next to nothing to one side alone: on the other there is no device.
+    """
+    here, low, high = search_box(fit.model)
+    phi = here.coordinate(fit.theta[None])[0]
+    ends = np.array([np.minimum(phi + _STEP, high), np.maximum(phi - _STEP, low)])
+    apart = np.eye(fit.model.size, dtype=bool)
+    more, less = (here.natural(np.where(apart, end, phi)) for end in ends)
     sides = critical_stiffness(fit.model, np.concatenate([more, less])).samples
     upper, lower = np.log(np.maximum(sides, 1e-9)).reshape(2, -1)
-    return (upper - lower) / (2 * _STEP), np.diag(more - less) / (2 * _STEP)
+    width = ends[0] - ends[1]
+    return (upper - lower) / width, np.diag(more - less) / width

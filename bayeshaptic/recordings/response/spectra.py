@@ -97,12 +97,7 @@ class RandomSpectra:
         return blocks
 
     def _block(self, window: slice) -> Block:
-        start, width = self.edges[:-1][window, None], np.diff(self.edges)[window, None]
-        offset = np.arange(width.max())
-        inside = offset < width
-        line = start + np.minimum(offset, width - 1)
-        x = 2 * (line - start) / (width - 1) - 1
-        frequency = self.frequency_hz[line]
+        line, inside, x, frequency = self._lines(window)
         whitened = inside.astype(float)
         if self.noise_slope is not None:
             middle = self.nodes_hz[window, 1:2]
@@ -120,6 +115,15 @@ class RandomSpectra:
             weights=interpolation(x),
         )
 
+    def _lines(self, window: slice) -> tuple[NDArray[Any], ...]:
+        """Of windows side by side, (W, w) each: lines, the last repeated as padding; which are none
+        of it; where in the window they are, from -1 to 1; and their frequencies."""
+        start, width = self.edges[:-1][window, None], np.diff(self.edges)[window, None]
+        offset = np.arange(width.max())
+        line = start + np.minimum(offset, width - 1)
+        x = 2 * (line - start) / (width - 1) - 1
+        return line, offset < width, x, self.frequency_hz[line]
+
     def _leakage(self, window: slice, x: NDArray[Any], frequency: NDArray[Any]) -> NDArray[Any]:
         """What leakage may be, (W, w, 5), or 6 with zeros where nothing rings."""
         terms = leakage_terms(x, frequency, frequency.mean(axis=1, keepdims=True))
@@ -135,15 +139,24 @@ class RandomSpectra:
         lines = np.diff(self.edges) - float(LEAKAGE_TERMS)
         return lines if self.ringing_hz is None else lines - 2.0 * ~np.isnan(self.ringing_hz)
 
-    def columns(self, window: int) -> tuple[slice, NDArray[Any]]:
-        """The lines of a window, and what response and leakage may make of it, (w, 8 or 9)."""
-        lines = slice(int(self.edges[window]), int(self.edges[window + 1]))
-        frequency = self.frequency_hz[lines]
-        x = np.linspace(-1, 1, len(frequency))
-        ratio = self.reference(frequency)[:, None] / self.reference(self.nodes_hz[window])
-        answer = self.force[lines, None] * interpolation(x) * ratio
-        leakage = self._leakage(slice(window, window + 1), x[None], frequency[None])[0]
-        return lines, np.concatenate([leakage[:, np.any(leakage, axis=0)], answer], axis=1)
+    def free(
+        self, window: slice, response: bool
+    ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Windows side by side: lines, which are no padding, and what leakage may make of them.
+
+        Shapes (W, w), (W, w) and (W, w, 5 or 6).  With `response` also what a window's own response
+        may make, (W, w, 8 or 9).
+        """
+        line, inside, x, frequency = self._lines(window)
+        columns = self._leakage(window, x, frequency)
+        if response:
+            nodes = self.nodes_hz[window]
+            at_nodes = np.asarray(self.reference(nodes.ravel())).reshape(nodes.shape)
+            at_lines = np.asarray(self.reference(frequency.ravel())).reshape(frequency.shape)
+            ratio = at_lines[..., None] / at_nodes[:, None]
+            answer = self.force[line][..., None] * interpolation(x) * ratio
+            columns = np.concatenate([columns, answer], axis=-1)
+        return line, inside, columns * inside[..., None]
 
     def windows(
         self, reference: Reference | None = None, inputs: NDArray[Any] | None = None

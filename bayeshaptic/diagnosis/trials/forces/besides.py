@@ -18,24 +18,15 @@ from typing import Protocol
 import numpy as np
 from numpy.linalg import lstsq
 from scipy.fft import next_fast_len
-from scipy.signal import butter, sosfiltfilt
 
-from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.diagnosis.residuals.unforced import HAND_ORDER, parts, slow_motion
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
-# Hands tremble at up to 12 Hz, which has to come through whole; the encoder's steps are noise of
-# velocity that grows with the edge to the power of 3/2, and may be this share of the motion's.  At
-# the true parameters of held LHIfAMs that rub, under steps, log likelihoods rise from 128 and 1,556
-# to 252 and 1,601 when the edge goes from 20 Hz (and half the order) to 30; on the coarse encoder
-# of PHANToMs they fall from 58 and 27 to -19 and -48, and are 43 and 38 at 16 Hz.
-_ORDER, _LEAST_HZ, _MOST_HZ, _NOISE = 4, 14.0, 30.0, 0.01
 # Root mean square of what is off, as a share of all that is left, and how many simulations at most.
 _SETTLED, _MOST = 0.1, 8
 _MIXED = 5  # motions that a mixture has at most
 _WORSE = 3  # in turn, after which none is better any more
-_ALIKE = 1e-14  # squares: motions that differ by a ten-millionth are one
 
 
 class Besides(Protocol):
@@ -84,7 +75,7 @@ class Hand:
         return self.of(left)  # what is slow is measured, with all that forces do
 
     def of(self, left: Floats) -> Floats:
-        return _slow(left, self.period_s, self.edge_hz)
+        return slow_motion(left, self.period_s, self.edge_hz)
 
     def off(self, taken: Floats, rest: Floats) -> Floats:
         return self.of(taken + rest) - taken
@@ -99,7 +90,7 @@ class Hand:
         frequency_hz = np.fft.rfftfreq(count, self.period_s)[: len(spectrum)]
         frequency_hz = frequency_hz[frequency_hz < far * self.edge_hz]
         frequency_hz[0] = frequency_hz[1]  # where a hand only damps there is no response at rest
-        slow = 1 / (1 + (frequency_hz / self.edge_hz) ** (2 * _ORDER))
+        slow = 1 / (1 + (frequency_hz / self.edge_hz) ** (2 * HAND_ORDER))
         s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
         ratio = self.usual.continuous_response(s)[0] / self.response.continuous_response(s)[0]
         spectrum[: len(s)] /= 1 + slow * (ratio - 1)
@@ -137,16 +128,16 @@ class Drift:
         return np.asarray(left[0] + self.mean * self.own[:, 1])
 
     def of(self, left: Floats) -> Floats:
-        return np.asarray(self.own @ _parts(self.own, left))
+        return np.asarray(self.own @ parts(self.own, left))
 
     def off(self, taken: Floats, rest: Floats) -> Floats:
-        return np.asarray(self.usual @ _parts(self.usual, rest))
+        return np.asarray(self.usual @ parts(self.usual, rest))
 
     def step(self, off: Floats) -> Floats:
-        return np.asarray(self.own @ _parts(self.usual, off))
+        return np.asarray(self.own @ parts(self.usual, off))
 
     def answered(self, motion: Floats) -> Floats:
-        return np.asarray(motion + (self.own - self.usual) @ _parts(self.usual, motion))
+        return np.asarray(motion + (self.own - self.usual) @ parts(self.usual, motion))
 
 
 @dataclass(frozen=True)
@@ -169,36 +160,6 @@ class Nothing:
         return motion
 
 
-def hand_edge_hz(position: Floats, period_s: float) -> float:
-    """Up to where the encoder tells better what a hand does than nothing, in Hz.
-
-    Parameters
-    ----------
-    position : ndarray, shape (N,)
-        Measured.
-    period_s : float
-    """
-    most = min(_MOST_HZ, 0.4 / period_s)
-    count = increment_unit(position)
-    if count is None:
-        return most
-    velocity = float(np.std(np.gradient(_slow(position, period_s, most), period_s)))
-    # Rounding is white: its velocity up to an edge f has (2 pi)^2 2 T f^3 / 3 of its variance.
-    unit = count / np.sqrt(12) * 2 * np.pi * np.sqrt(2 * period_s / 3)
-    return float(np.clip((_NOISE * velocity / unit) ** (2 / 3), min(_LEAST_HZ, most), most))
-
-
-def _slow(motion: Floats, period_s: float, edge_hz: float) -> Floats:
-    low = butter(_ORDER, edge_hz, fs=1 / period_s, output="sos")
-    return np.asarray(sosfiltfilt(low, motion))
-
-
-def drifts(system: LinearSystem, samples: int, period_s: float) -> Floats:
-    """Standing still, and what a constant force and a push do, shape (N, 3)."""
-    steady = np.ones(samples)
-    return np.stack([steady, *linear_motion(system, steady, period_s)], axis=1)
-
-
 def remembered(columns: Floats) -> Floats:
     """`drifts` without the push where that is forgotten within a hundredth of the recording.
 
@@ -206,7 +167,7 @@ def remembered(columns: Floats) -> Floats:
     are it goes far.
     """
     others, push = columns[:, :2], columns[:, 2]
-    own = push - others @ _parts(others, push)
+    own = push - others @ parts(others, push)
     forgotten = 0.1  # root of the time
     return columns if np.std(own) > forgotten * np.sqrt(np.mean(push**2)) else others
 
@@ -271,10 +232,3 @@ def one_step(
     """What each force adds, to first order in how that differs from `near`, shapes (F, N)."""
     further = forced(besides.of(left - near.sum(axis=0))) - near
     return near + np.array([besides.answered(one) for one in further])
-
-
-def _parts(columns: Floats, motion: Floats) -> Floats:
-    """How much of each column a motion has, by least squares."""
-    size = np.linalg.norm(columns, axis=0)
-    alike = columns.T @ columns / np.outer(size, size)
-    return np.asarray(lstsq(alike, columns.T @ motion / size, rcond=_ALIKE)[0] / size)

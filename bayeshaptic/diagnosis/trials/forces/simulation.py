@@ -13,14 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.diagnosis.residuals.unforced import drifts, hand_edge_hz
 from bayeshaptic.diagnosis.trials.forces.besides import (
     Besides,
     Drift,
     Hand,
     HandAfar,
     Nothing,
-    drifts,
-    hand_edge_hz,
     one_step,
     remembered,
     settled,

@@ -10,12 +10,10 @@ levels of its neighbours.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from bayeshaptic.recordings.response.spectra import RandomSpectra
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Complexes, Floats
 
 # Windows that reach from one frequency to so many times that; in narrower ones a slope of twelve
 # changes the noise by less than a factor of two and a half either way.
@@ -25,41 +23,33 @@ _POWERS = np.arange(-4.0, 17.0)
 _BELIEF_SD = 2.0
 
 
-def noise_slopes(spectra: RandomSpectra) -> Floats:
-    """The power with which the noise falls in each window; zero in narrow ones, shape (W,)."""
+def noise_slopes(spectra: RandomSpectra, left: Complexes | None = None) -> Floats:
+    """The power with which the noise falls in each window; zero in narrow ones, shape (W,).
+
+    Parameters
+    ----------
+    spectra : RandomSpectra
+    left : complex ndarray, shape (L,), optional
+        What a model leaves of the position; without, each window's own response is free.
+    """
     first, last = spectra.edges[:-1], spectra.edges[1:] - 1
     wide = int(np.sum(spectra.frequency_hz[last] > _WIDE * spectra.frequency_hz[first]))
     slopes = np.zeros(len(first))
     if wide == 0:
         return slopes
     neighbours = 4
-    low = _lowest(spectra, min(wide + neighbours, len(first)))
-    found = np.zeros(len(low.edges) - 1)
-    log_f = np.log(low.nodes_hz[:, 1])
+    count = min(wide + neighbours, len(first))
+    likelihood, level = _with_each_power(spectra, count, left)
+    log_f = np.log(spectra.nodes_hz[:count, 1])
+    found = np.zeros(count)
     rounds = 3
     for _ in range(rounds):
-        windows = replace(low, noise_slope=found).windows()
-        level = np.log(windows.scatter / windows.lines)
-        found[:wide] = -_local_slopes(log_f, level)[:wide]
+        here = [np.interp(power, _POWERS, own) for power, own in zip(found, level, strict=True)]
+        found[:wide] = -_local_slopes(log_f, np.array(here))[:wide]
         found = np.clip(found, _POWERS[0], _POWERS[-1])
-    for window in range(wide):
-        belief = -0.5 * ((_POWERS - found[window]) / _BELIEF_SD) ** 2
-        slopes[window] = _POWERS[np.argmax(_restricted_likelihood(low, window) + belief)]
+    belief = -0.5 * ((_POWERS - found[:wide, None]) / _BELIEF_SD) ** 2
+    slopes[:wide] = _POWERS[np.argmax(likelihood[:wide] + belief, axis=1)]
     return slopes
-
-
-def _lowest(spectra: RandomSpectra, count: int) -> RandomSpectra:
-    """The first windows alone."""
-    end = spectra.edges[count]
-    return replace(
-        spectra,
-        frequency_hz=spectra.frequency_hz[:end],
-        force=spectra.force[:end],
-        position=spectra.position[:end],
-        edges=spectra.edges[: count + 1],
-        floor=spectra.floor[:count],
-        ringing_hz=None if spectra.ringing_hz is None else spectra.ringing_hz[:count],
-    )
 
 
 def _local_slopes(x: Floats, y: Floats) -> Floats:
@@ -71,18 +61,46 @@ def _local_slopes(x: Floats, y: Floats) -> Floats:
     return np.asarray(np.sum(weight * apart * y, axis=1) / np.sum(weight * apart**2, axis=1))
 
 
-def _restricted_likelihood(spectra: RandomSpectra, window: int) -> Floats:
-    """Log likelihood of each of `_POWERS`, response and leakage integrated out."""
-    lines, columns = spectra.columns(window)
-    position, frequency = spectra.position[lines], spectra.frequency_hz[lines]
-    columns = columns / np.linalg.norm(columns, axis=0)
-    log_weight = _POWERS[:, None] * np.log(frequency / frequency.mean())
-    weight = np.exp(0.5 * log_weight)
-    q, r = np.linalg.qr(weight[..., None] * columns)
-    weighted = weight * position
-    explained = np.einsum("pli,pl->pi", q.conj(), weighted)
-    left = np.sum(np.abs(weighted) ** 2, axis=1) - np.sum(np.abs(explained) ** 2, axis=1)
-    left = np.maximum(left, len(position) * spectra.floor[window] + np.finfo(float).tiny)
-    size = np.sum(np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))), axis=1)
-    freedom = len(position) - columns.shape[1]
-    return np.asarray(log_weight.sum(axis=1) - 2 * size - freedom * np.log(left))
+def _with_each_power(
+    spectra: RandomSpectra, count: int, left: Complexes | None
+) -> tuple[Floats, Floats]:
+    """Of the first windows with each of `_POWERS`, shapes (count, P).
+
+    Log likelihood with leakage (and, where nothing is known to be left, a window's own response)
+    integrated out, and log noise of a line.
+    """
+    line, inside, free = spectra.free(slice(0, count), response=left is None)
+    measured = (spectra.position if left is None else left)[line] * inside
+    there = np.linalg.norm(free, axis=1, keepdims=True)
+    free = free / np.where(there > 0, there, 1.0)
+    lines, freedom = inside.sum(axis=1), inside.sum(axis=1) - np.sum(there[:, 0] > 0, axis=1)
+    frequency = spectra.frequency_hz[line]
+    mean = np.sum(frequency * inside, axis=1) / lines
+    log_f = np.where(inside, np.log(frequency / mean[:, None]), 0.0)
+    rows = np.concatenate([free, measured[..., None]], axis=-1)
+    weight = np.exp(0.5 * _POWERS[:, None] * log_f[:, None])
+    size, power = _regressed(weight[..., None] * rows[:, None])
+    floor = lines * spectra.floor[:count] + np.finfo(float).tiny
+    level = np.log(np.maximum(power, floor[:, None]) / freedom[:, None])
+    log_weight = _POWERS * log_f.sum(axis=1)[:, None]
+    return log_weight - 2 * size - freedom[:, None] * level, level
+
+
+def _regressed(columns: Complexes) -> tuple[Floats, Floats]:
+    """Log volume of all columns but the last, and the power of the last outside them.
+
+    By Gram and Schmidt's process, in the order that rounding does no harm; shapes (W, P, w, c) to
+    (W, P) each.
+    """
+    columns = columns.copy()
+    size = np.zeros(columns.shape[:2])
+    for i in range(columns.shape[-1] - 1):
+        norm = np.linalg.norm(columns[..., i], axis=-1)
+        there = norm > 0
+        norm = np.where(there, norm, 1.0)
+        unit = columns[..., i] / norm[..., None]
+        others = columns[..., i + 1 :]
+        along = np.einsum("wpl,wplc->wpc", unit.conj(), others)
+        others -= unit[..., None] * along[..., None, :]
+        size += np.log(norm)
+    return size, np.sum(np.abs(columns[..., -1]) ** 2, axis=-1)

@@ -93,14 +93,14 @@ def estimate_direct(recording: Recording) -> tuple[DirectSpectra, Points]:
     """
     nyquist = 0.5 / recording.period_s
     plain = _spectra(recording, (0.5 / recording.duration_s, nyquist), ENOUGH_LINES)
+    plain = replace(plain, floor=_rounding(recording.position) ** 2 * np.ones(len(plain.floor)))
+    plain = replace(plain, reference=_local_reference(plain)[0])
+    # Where a hand's own motion falls steeply within a window, lines that weigh alike do not add up.
+    plain = replace(plain, noise_slope=noise_slopes(plain))
     same = {field.name: getattr(plain, field.name) for field in fields(RandomSpectra)}
-    same["floor"] = _rounding(recording.position) ** 2 * np.ones(len(plain.floor))
     count = increment_unit(recording.position) or 0.0
     spectra = DirectSpectra(**same, rounding=count**2 / 12)
-    ours = replace(spectra, reference=_local_reference(spectra)[0])
-    # Where a hand's own motion falls steeply within a window, lines that weigh alike do not add up.
-    ours = replace(ours, noise_slope=noise_slopes(ours))
-    return ours, points(ours.windows())
+    return spectra, points(spectra.windows())
 
 
 def points(windows: Windows) -> Points:

@@ -1,0 +1,124 @@
+"""Tests of causal changes in a loop: the encoder's rounding is none, and a wrong model is one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayeshaptic.diagnosis.residuals import causal, residual
+from bayeshaptic.diagnosis.residuals.causal import causal_tests
+from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.effects.nonlinear.friction import CoulombFriction
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
+from bayeshaptic.effects.nonlinear.protocol import Acting
+from bayeshaptic.inference.fit import Fit, summarise
+from bayeshaptic.inference.least_squares import least_squares, polish
+from bayeshaptic.models import build_model
+from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
+from bayeshaptic.recordings.response.etfe import Etfe, compress
+from bayeshaptic.recordings.response.spectra import RandomSpectra
+from benchmarks.through_reference import Case, make
+
+# Held PHANToMs of 2 to 20 s, some of which move less than a few counts a sample.
+COARSE = (408, 416, 418, 434, 446)
+
+
+def right(case: Case) -> tuple[Fit, Etfe]:
+    """The right model, fitted from the true parameters."""
+    held = "held" in case.what
+    device = "phantom" if "phantom" in case.what else "lhifam"
+    model = build_model("grasped" if held else "free", device, delay_s=case.bench.delay_s)
+    etfe = estimate_in_any_loop(replace(case.recording, reference=None))
+    truth = {**case.bench.values, "delay_s": case.bench.delay_s}
+    theta = np.array([truth[name] for name in model.names])
+    for _ in range(2):
+        windows = compress(etfe, lambda f, at=theta: model.response(at, f))
+        theta = polish(model, windows, theta)
+    return summarise(model, compress(etfe, lambda f: model.response(theta, f)), theta), etfe
+
+
+def change(tests: tuple[residual.Test, ...]) -> residual.Test:
+    (found,) = (test for test in tests if test.name == "causal change")
+    return found
+
+
+@pytest.mark.parametrize("seed", COARSE)
+def test_rounding_is_no_causal_change(seed: int) -> None:
+    """Of scores beside the measured position alone every one of these is flagged."""
+    fit, etfe = right(make(seed))
+    assert change(causal._tests(fit, etfe)).flagged
+    assert not change(causal_tests(fit, etfe)).flagged
+
+
+@pytest.mark.parametrize("seed", COARSE)
+def test_a_hand_that_a_model_lacks_is_a_causal_change_there(seed: int) -> None:
+    etfe = estimate_in_any_loop(replace(make(seed).recording, reference=None))
+    fit = least_squares(build_model("free", "phantom"), etfe)
+    assert change(causal_tests(fit, etfe)).excess > 3
+
+
+def test_the_rounding_of_a_motion_with_forces_in_it_is_that_of_all_of_it() -> None:
+    case = make(4063)  # a held LHIfAM that rubs
+    fit, etfe = right(case)
+    assert etfe.unbroken is not None
+    bench = ForceBench(State(etfe, fit), etfe.unbroken)
+    friction = (Acting(CoulombFriction(MOTOR), case.friction * case.bench.force_rms),)
+    point = bench.as_it_is(friction, bench.point(friction, fit.theta, rounds=3).theta)
+    assert point.motion is not None
+    beside = summarise(fit.model, point.windows, point.theta)
+    assert change(causal_tests(beside, point.etfe)).flagged, "of a motion that nobody measured"
+    assert not change(causal_tests(beside, point.etfe, point.motion)).flagged
+
+
+def test_noise_that_falls_steeply_where_the_controller_answers_to_it() -> None:
+    """A held LHIfAM that rubs: one window, around 0.9 Hz, has a score of eight by itself."""
+    case = make(4049)
+    fit, etfe = right(case)
+    assert etfe.unbroken is not None
+    bench = ForceBench(State(etfe, fit), etfe.unbroken)
+    friction = (Acting(CoulombFriction(MOTOR), case.friction * case.bench.force_rms),)
+    point = bench.point(friction, fit.theta, rounds=3)
+    assert point.motion is not None
+    beside = summarise(fit.model, point.windows, point.theta)
+    assert change(causal._tests(beside, point.etfe)).flagged
+    assert not change(causal_tests(beside, point.etfe, point.motion)).flagged
+
+
+def test_how_steeply_noise_falls_is_what_the_right_model_leaves() -> None:
+    """Of a motion whose controller answers to nearly all of it, a window's own response is that."""
+    rng = np.random.default_rng(3)
+    lines, window = 960, 24
+    frequency = 0.1 * (1 + np.arange(lines))
+    white = (rng.standard_normal((2, lines)) + 1j * rng.standard_normal((2, lines))) / np.sqrt(2)
+    falls = 6.0
+    noise = frequency ** (-falls / 2) * white[0]
+    device, controller = -1 / frequency**2, 30.0 + 0.0j
+    followed = 1e-3 * frequency[0] ** (-falls / 2) * white[1]
+    position = (device * followed + noise) / (1 + device * controller)
+    force = followed - controller * position
+    spectra = RandomSpectra(
+        frequency,
+        force,
+        position,
+        np.arange(0, lines + 1, window),
+        np.zeros(lines // window),
+        lambda f: -1 / np.asarray(f) ** 2,
+    )
+    wide = 2  # windows, of which each says its slope within some two
+    known = noise_slopes(spectra, position - device * force)[:wide]
+    assert np.abs(known.mean() - falls) < 1.5
+    assert np.abs(noise_slopes(spectra)[:wide].mean() - falls) > 3
+
+
+def test_a_position_that_nothing_rounds_is_looked_at_as_it_is() -> None:
+    recording = make(408).recording
+    rng = np.random.default_rng(1)
+    position = recording.position + 1e-9 * rng.standard_normal(recording.samples)
+    etfe = estimate_in_any_loop(replace(recording, position=position, reference=None))
+    fit = least_squares(build_model("free", "phantom"), etfe)
+    _, closer = causal._closer(fit, etfe, 0.0)
+    assert np.array_equal(closer.spectra.position, etfe.spectra.position)  # type: ignore[attr-defined]
