@@ -40,13 +40,16 @@ def outcome(
     chosen: str,
     *loops: Any,
     modelled: bool = True,
-    rubbing: float = 0.0,
+    rubbing: float | None = None,
+    taken: list[str] | None = None,
 ) -> tuple[str, Any, list[str]]:
     """Name of the base model in the end, its loop, and the base models that were tried.
 
-    `rubbing` is what a first look gains with friction in a hand.
+    `rubbing` is the BIC of dry friction on others, where it convinces; `taken` gets those where
+    that is taken.
     """
     by_name, tried = {loop.state.fit.model.name: loop for loop in loops}, []
+    took: list[str] = [] if taken is None else taken
 
     def traced(base: Any, meter: Any, tick: Any) -> Any:
         tried.append(base)
@@ -60,7 +63,12 @@ def outcome(
     monkeypatch.setattr(best_in_any_loop, "_limit", lambda one: one.limit)
     monkeypatch.setattr(best_in_any_loop, "replace", _replaced)
     monkeypatch.setattr(best_in_any_loop, "base_of", lambda begun, name: (None, fit(name)))
-    monkeypatch.setattr(best_in_any_loop, "first_look", lambda *_: (rubbing, rubbing / 4))
+    trial = SimpleNamespace(state=SimpleNamespace(fit=None)) if rubbing is not None else None
+    monkeypatch.setattr(best_in_any_loop, "trial_of", lambda *_: trial)
+    monkeypatch.setattr(best_in_any_loop, "information_criterion", lambda *_: rubbing)
+    monkeypatch.setattr(
+        best_in_any_loop, "with_trial", lambda other, _: (took.append(other), by_name[other])[1]
+    )
     monkeypatch.setattr(best_in_any_loop, "State", lambda etfe, fit: SimpleNamespace(fit=fit))
     candidates = {name: ScoredFit(fit(name), 0.0) for name in SIZES}
     choice = Choice(fit(chosen), "", candidates) if modelled else None
@@ -116,10 +124,33 @@ def test_friction_that_a_second_mode_stands_in_for_unseen(monkeypatch) -> None:
         ends("free", UNEXPLAINED, 300.0),
         ends("grasped", EXPLAINED, -1768.0, FRICTION),
     )
-    assert outcome(monkeypatch, "chain-2", *loops, rubbing=10.0)[::2] == ("chain-2", ["chain-2"])
-    name, found, tried = outcome(monkeypatch, "chain-2", *loops, rubbing=40.0)
+    assert outcome(monkeypatch, "chain-2", *loops)[::2] == ("chain-2", ["chain-2"])
+    name, found, tried = outcome(monkeypatch, "chain-2", *loops, rubbing=-30.0)
     assert (name, found.verdict) == ("grasped", EXPLAINED)
     assert tried == ["chain-2", "free", "grasped"]
+
+
+@pytest.mark.parametrize(("rubbing", "name"), [(-50.0, "free"), (-60.0, "grasped")])
+def test_friction_that_stands_in_for_a_hand(monkeypatch, rubbing, name) -> None:
+    """1.12 times the limit was recommended of a free device with friction, which was held."""
+    loops = (
+        ends("free", EXPLAINED, -50.0, FRICTION),
+        ends("grasped", EXPLAINED, rubbing, FRICTION),
+    )
+    assert outcome(monkeypatch, "free", *loops, rubbing=rubbing)[0] == name
+
+
+def test_friction_that_was_found_stands_where_the_budget_ends_before_it_is_tried_again(
+    monkeypatch,
+) -> None:
+    asked: list[str] = []
+    loops = (ends("free", UNEXPLAINED, 0.0), ends("grasped", UNEXPLAINED, 10.0))
+    outcome(monkeypatch, "free", *loops, rubbing=-50.0, taken=asked)
+    assert asked == ["grasped"]
+    asked.clear()
+    loops = (loops[0], ends("grasped", EXPLAINED, -50.0, FRICTION))
+    outcome(monkeypatch, "free", *loops, rubbing=-50.0, taken=asked)
+    assert asked == []
 
 
 def test_one_mass_is_followed_in_time(monkeypatch) -> None:

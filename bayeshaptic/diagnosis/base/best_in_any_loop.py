@@ -9,18 +9,27 @@ itself, and nothing stands in its place.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
-from bayeshaptic.diagnosis import thresholds
+import numpy as np
+
 from bayeshaptic.diagnosis.base.begun import Begun, base_of
 from bayeshaptic.diagnosis.base.best_base import criterion
 from bayeshaptic.diagnosis.battery import residual_tests
-from bayeshaptic.diagnosis.state import State
+from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, Traced
-from bayeshaptic.diagnosis.trials.all_lines import rubs, stands, trace_by_all_lines, untraced
-from bayeshaptic.diagnosis.trials.nonlinear import first_look
+from bayeshaptic.diagnosis.trials.all_lines import (
+    rubs,
+    stands,
+    trace_by_all_lines,
+    untraced,
+    with_trial,
+)
+from bayeshaptic.diagnosis.trials.nonlinear import trial_of
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.inference.choose import UNDECIDED, Choice
+from bayeshaptic.inference.criterion import information_criterion
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Tick
@@ -53,17 +62,19 @@ def traced_in_any_loop(
     own = untraced(State(begun.etfe, begun.fit), residual_tests(begun.fit, begun.etfe))
     if chosen == _ONE_MASS:  # is followed in time instead, with its friction
         return begun, own
+    # Before the long ways on a base model that may be the wrong one.
+    rubbing = _rubbing(begun, meter, tick) if begun.choice is not None else {}
     own = trace_by_all_lines(own, meter, tick)
-    settled = rubs(own) and own.verdict == EXPLAINED
-    if begun.choice is None or settled:
-        return begun, own
-    if own.verdict == CONSISTENT and not _rubs_on_another(begun, meter, tick):
+    settled = own.verdict == CONSISTENT or (rubs(own) and own.verdict == EXPLAINED)
+    if begun.choice is None or (settled and not _is_likelier(rubbing, own)):
         return begun, own
     found = {chosen: own}
     for name in _rivals(begun.choice):
         etfe, fit = base_of(begun, name)
         other = untraced(State(etfe, fit), residual_tests(fit, etfe))
         found[name] = trace_by_all_lines(other, meter, tick)
+        if name in rubbing and not found[name].state.accepted:  # there was nothing left for it
+            found[name] = with_trial(other, rubbing[name])
     best = _likeliest(found)
     if best == chosen:
         return begun, own
@@ -76,19 +87,30 @@ def traced_in_any_loop(
     return replace(begun, etfe=etfe, fit=fit, choice=choice), found[best]
 
 
-def _rubs_on_another(begun: Begun, meter: Meter, tick: Tick | None) -> bool:
-    """Whether dry friction convinces on another base model, where the chosen one leaves noise.
-
-    A second mode stands in for friction, or for that and a hand, and no test sees it: of such a
-    loop 1.11 times the limit was recommended, and friction in a hand was likelier by a BIC of
-    1,768.  A first look gains 2 at most in loops without any, 40 and more in three that rubbed.
-    """
+def _rubbing(begun: Begun, meter: Meter, tick: Tick | None) -> dict[str, Trial]:
+    """Dry friction on the other base models in question, where it convinces."""
     assert begun.choice is not None
+    found = {}
     for name in _rivals(begun.choice):
-        gains = first_look(CoulombFriction, State(*base_of(begun, name)), meter, tick)
-        if thresholds.convincing(*gains, 1):
-            return True
-    return False
+        trial = trial_of(CoulombFriction, State(*base_of(begun, name)), meter, tick)
+        if trial is not None:
+            found[name] = trial
+    return found
+
+
+def _is_likelier(rubbing: Mapping[str, Trial], own: Traced) -> bool:
+    """Whether another base model with dry friction is likelier than what leaves noise.
+
+    A second mode stands in for friction, or friction for a hand, and no test sees it: of two such
+    loops 1.11 and 1.12 times the limit were recommended, and friction in a hand was likelier by a
+    BIC of 1,768 and 6,101.  Where the chosen one has none that it convinces is enough: a scan of
+    its strengths gains 2 at most in loops without any.
+    """
+    least = min(
+        (information_criterion(trial.state.fit, 1.0, 1) for trial in rubbing.values()),
+        default=np.inf,
+    )
+    return bool(rubbing) and (not rubs(own) or least < criterion(own, 1.0) - UNDECIDED)
 
 
 def _rivals(choice: Choice) -> tuple[str, ...]:

@@ -117,7 +117,30 @@ def _round(before: Traced, meter: Meter, tick: Tick | None) -> Traced | None:
     )
     if chosen is None or not _is_known_to_hold(chosen):
         return None
-    state, tests = acceptance.with_ties(chosen, open_), left[id(chosen)]
+    return _accepting(before, chosen, trials, open_, left[id(chosen)])
+
+
+def with_trial(before: Traced, trial: Trial) -> Traced:
+    """With an effect that was tried elsewhere, and convinced.
+
+    Parameters
+    ----------
+    before : Traced
+        Of the state that it was tried on.
+    trial : Trial
+    """
+    return _accepting(before, trial, [trial], [trial], _left(trial.state))
+
+
+def _accepting(
+    before: Traced,
+    chosen: Trial,
+    trials: list[Trial],
+    open_: list[Trial],
+    tests: tuple[Test, ...],
+) -> Traced:
+    """With the chosen one of what was tried, which leaves `tests`; others are `open_`, too."""
+    state = acceptance.with_ties(chosen, open_)
     *earlier, own = state.accepted
     evidence = f"raises the log likelihood of all windows by {chosen.gain_fit:.0f}"
     state = replace(state, accepted=(*earlier, replace(own, evidence=evidence)))

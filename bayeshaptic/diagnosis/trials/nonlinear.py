@@ -86,29 +86,32 @@ def nonlinear_trials(
     return [_trial(bench, point) for point in found]
 
 
-def first_look(
+def trial_of(
     kind: type[NonlinearEffect],
     state: State,
     meter: Meter,
     tick: Callable[[str], None] | None = None,
-) -> tuple[float, float]:
-    """What a scan of a law's strengths gains to fit and to choose by, before any is fitted.
+) -> Trial | None:
+    """One law of a force beside a state; None where it does not convince, in a scan or fitted.
 
     Parameters
     ----------
     kind : type of NonlinearEffect
     state : State
     meter : Meter
-        Says whether that is affordable; nothing is gained where it is not.
+        Says whether that is affordable.
     tick : callable, optional
         Called with its title.
     """
     if state.etfe.unbroken is None or not meter.affords(kind.title):
-        return 0.0, 0.0
+        return None
     bench = ForceBench(state, state.etfe.unbroken)
     motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     best = search(bench, list(kind.candidates(state.model, motion)), motion, tick)
-    return best.gain_fit, best.gain_choose
+    if not thresholds.convincing(best.gain_fit, best.gain_choose, 1):
+        return None
+    trials = [_trial(bench, point) for point in fitted(bench, [best], meter)]
+    return next((trial for trial in trials if trial.convincing), None)
 
 
 def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
