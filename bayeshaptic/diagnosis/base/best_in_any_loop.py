@@ -1,10 +1,10 @@
 """Which base model, of a recording in closed loop that lacks something.
 
 The base models are compared before anything is known of a force, and in a loop dry friction passes
-for a second mode, a hand or a base that gives.  So where friction does not explain all that the
-chosen one leaves, the others are tried with what they lack, too.  Nothing can be held out there,
-and a wrong model that leaves what looks like noise is a danger: what is the likeliest must stand by
-itself, and nothing stands in its place.
+for a second mode, a hand or a base that gives.  So friction is asked for on the others, and where
+it is likelier there, or does not explain all that the chosen one leaves, they are tried with what
+they lack, too.  Nothing can be held out there, and a wrong model that leaves what looks like noise
+is a danger: what is the likeliest must stand by itself, and nothing stands in its place.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _ONE_MASS = "rigid"
 def traced_in_any_loop(
     begun: Begun, meter: Meter, tick: Tick | None = None
 ) -> tuple[Begun, Traced]:
-    """The loop closed on the chosen base model, and on others where friction does not explain it.
+    """The loop closed on the chosen base model, and on others that may be likelier with friction.
 
     Parameters
     ----------
@@ -103,8 +103,8 @@ def _is_likelier(rubbing: Mapping[str, Trial], own: Traced) -> bool:
 
     A second mode stands in for friction, or friction for a hand, and no test sees it: of two such
     loops 1.11 and 1.12 times the limit were recommended, and friction in a hand was likelier by a
-    BIC of 1,768 and 6,101.  Where the chosen one has none that it convinces is enough: a scan of
-    its strengths gains 2 at most in loops without any.
+    BIC of 1,768 and 6,101.  Where none was found on the chosen one, that friction convinces on
+    another is enough: a scan of its strengths gains 2 at most in loops without any.
     """
     least = min(
         (information_criterion(trial.state.fit, 1.0, 1) for trial in rubbing.values()),

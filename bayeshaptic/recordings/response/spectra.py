@@ -116,8 +116,11 @@ class RandomSpectra:
         )
 
     def _lines(self, window: slice) -> tuple[NDArray[Any], ...]:
-        """Of windows side by side, (W, w) each: lines, the last repeated as padding; which are none
-        of it; where in the window they are, from -1 to 1; and their frequencies."""
+        """Of windows side by side, (W, w) each: which lines, and that they are no padding.
+
+        And where in their window they are, from -1 to 1, and their frequencies; padding repeats the
+        last line.
+        """
         start, width = self.edges[:-1][window, None], np.diff(self.edges)[window, None]
         offset = np.arange(width.max())
         line = start + np.minimum(offset, width - 1)
