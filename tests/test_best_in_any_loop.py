@@ -42,11 +42,12 @@ def outcome(
     modelled: bool = True,
     rubbing: float | None = None,
     taken: list[str] | None = None,
+    bare: dict[str, float] | None = None,
 ) -> tuple[str, Any, list[str]]:
     """Name of the base model in the end, its loop, and the base models that were tried.
 
     `rubbing` is the BIC of dry friction on others, where it convinces; `taken` gets those where
-    that is taken.
+    that is taken, and `bare` are scores of base models that are not zero.
     """
     by_name, tried = {loop.state.fit.model.name: loop for loop in loops}, []
     took: list[str] = [] if taken is None else taken
@@ -70,7 +71,8 @@ def outcome(
         best_in_any_loop, "with_trial", lambda other, _: (took.append(other), by_name[other])[1]
     )
     monkeypatch.setattr(best_in_any_loop, "State", lambda etfe, fit: SimpleNamespace(fit=fit))
-    candidates = {name: ScoredFit(fit(name), 0.0) for name in SIZES}
+    scores = bare or {}
+    candidates = {name: ScoredFit(fit(name), scores.get(name, 0.0)) for name in SIZES}
     choice = Choice(fit(chosen), "", candidates) if modelled else None
     begun: Any = SimpleNamespace(etfe=None, fit=fit(chosen), choice=choice)
     begun, found = traced_in_any_loop(begun, Meter())
@@ -138,6 +140,18 @@ def test_friction_that_stands_in_for_a_hand(monkeypatch, rubbing, name) -> None:
         ends("grasped", EXPLAINED, rubbing, FRICTION),
     )
     assert outcome(monkeypatch, "free", *loops, rubbing=rubbing)[0] == name
+
+
+def test_one_mass_that_rubs_is_followed_in_time(monkeypatch) -> None:
+    """A hand and Stribeck's friction took its place: as likely as one mass before friction."""
+    loops = (
+        ends("free", CONSISTENT, -73648.0),
+        ends("grasped", EXPLAINED, -74635.0, FRICTION),
+        ends("rigid", UNEXPLAINED, 0.0),
+    )
+    assert outcome(monkeypatch, "free", *loops, rubbing=-74247.0)[0] == "grasped"
+    found = outcome(monkeypatch, "free", *loops, rubbing=-74247.0, bare={"grasped": 20.0})
+    assert found[:2] == ("rigid", "rigid")
 
 
 def test_friction_that_was_found_stands_where_the_budget_ends_before_it_is_tried_again(

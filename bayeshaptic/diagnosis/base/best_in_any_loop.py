@@ -76,6 +76,11 @@ def traced_in_any_loop(
         if name in rubbing and not found[name].state.accepted:  # there was nothing left for it
             found[name] = with_trial(other, rubbing[name])
     best = _likeliest(found)
+    if rubs(found[best]) and _may_be_one_mass(begun.choice, best):
+        etfe, fit = base_of(begun, _ONE_MASS)
+        choice = replace(begun.choice, fit=fit)
+        one = untraced(State(etfe, fit), residual_tests(fit, etfe))
+        return replace(begun, etfe=etfe, fit=fit, choice=choice), one
     if best == chosen:
         return begun, own
     etfe, fit = base_of(begun, best)
@@ -111,6 +116,16 @@ def _is_likelier(rubbing: Mapping[str, Trial], own: Traced) -> bool:
         default=np.inf,
     )
     return bool(rubbing) and (not rubs(own) or least < criterion(own, 1.0) - UNDECIDED)
+
+
+def _may_be_one_mass(choice: Choice, name: str) -> bool:
+    """Whether one mass does as well as a base model before anything is known of its friction.
+
+    Then that is followed in time: of one mass that rubs the hand of a grasped one with Stribeck's
+    friction took the place, by chance.
+    """
+    one = choice.candidates.get(_ONE_MASS)
+    return one is not None and one.score < choice.candidates[name].score
 
 
 def _rivals(choice: Choice) -> tuple[str, ...]:
