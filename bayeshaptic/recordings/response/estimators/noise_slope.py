@@ -79,28 +79,11 @@ def _with_each_power(
     log_f = np.where(inside, np.log(frequency / mean[:, None]), 0.0)
     rows = np.concatenate([free, measured[..., None]], axis=-1)
     weight = np.exp(0.5 * _POWERS[:, None] * log_f[:, None])
-    size, power = _regressed(weight[..., None] * rows[:, None])
+    triangle = np.linalg.qr(weight[..., None] * rows[:, None], mode="r")
+    diagonal = np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))
+    power, inner = diagonal[..., -1] ** 2, diagonal[..., :-1]
+    size = np.sum(np.log(np.where(there > 0, inner, 1.0)), axis=-1)
     floor = lines * spectra.floor[:count] + np.finfo(float).tiny
     level = np.log(np.maximum(power, floor[:, None]) / freedom[:, None])
     log_weight = _POWERS * log_f.sum(axis=1)[:, None]
     return log_weight - 2 * size - freedom[:, None] * level, level
-
-
-def _regressed(columns: Complexes) -> tuple[Floats, Floats]:
-    """Log volume of all columns but the last, and the power of the last outside them.
-
-    By Gram and Schmidt's process, in the order that rounding does no harm; shapes (W, P, w, c) to
-    (W, P) each.
-    """
-    columns = columns.copy()
-    size = np.zeros(columns.shape[:2])
-    for i in range(columns.shape[-1] - 1):
-        norm = np.linalg.norm(columns[..., i], axis=-1)
-        there = norm > 0
-        norm = np.where(there, norm, 1.0)
-        unit = columns[..., i] / norm[..., None]
-        others = columns[..., i + 1 :]
-        along = np.einsum("wpl,wplc->wpc", unit.conj(), others)
-        others -= unit[..., None] * along[..., None, :]
-        size += np.log(norm)
-    return size, np.sum(np.abs(columns[..., -1]) ** 2, axis=-1)
