@@ -58,8 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; 0, or 1 where a recording of a study failed."""
-    from bayeshaptic.own_process import lighten_imports
+    from bayeshaptic.own_process import collect_garbage_rarely, lighten_imports
 
+    collect_garbage_rarely(1_000_000)
     lighten_imports()  # before what loads SciPy
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.jobs.batch import report_source

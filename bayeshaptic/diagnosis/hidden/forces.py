@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.polynomial.hermite_e import hermegauss
+from scipy.special import roots_hermitenorm
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.hidden.suspects import ForceSaid, Suspect
@@ -163,7 +163,7 @@ def _power_of(shape: Shape) -> float:
 def slope_of(shape: Shape) -> float:
     """E[f(z) z] of a standard normal z; of damping along the way E[f(z)], of its mean."""
     nodes = 200
-    z, weight = hermegauss(nodes)
+    z, weight = roots_hermitenorm(nodes)
     times = 1.0 if shape.over == ALONG else z
     return float(np.sum(weight * shape.force(z) * times) / weight.sum())
 

@@ -18,6 +18,7 @@ from bayeshaptic.diagnosis.trials.forces.search import (
     beside_others,
     containing,
     fitted,
+    promising,
     search,
     worth_following,
 )
@@ -64,13 +65,18 @@ def nonlinear_trials(
         laws: Iterable[Variants], known: dict[str, Point], before: Sequence[Point] = ()
     ) -> list[Point]:
         """By a scan, or where forces are there by what a little of each law would do."""
-        points, inner = [], []
+        points, inner, unknown = [], [], []
         for law in laws:
             point = known.get(law[0].strength[0])
             if bench.before and point is None and not isinstance(law[0], CommandEffect):
                 inner.append(law)
+            elif point is None:
+                unknown.append(law)
             elif (there := _beside(law, point)) and meter.affords(law[0].title):
                 points.append(search(bench, there, motion, tick, point))
+        for law in promising(bench, unknown):
+            if meter.affords(law[0].title):
+                points.append(search(bench, law, motion, tick))
         found = fitted(bench, points, meter, before)
         return found + beside_others(bench, inner, meter, tick) if inner else found
 
@@ -107,7 +113,10 @@ def trial_of(
         return None
     bench = ForceBench(state, state.etfe.unbroken)
     motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
-    best = search(bench, list(kind.candidates(state.model, motion)), motion, tick)
+    laws = promising(bench, [list(kind.candidates(state.model, motion))])
+    if not laws:
+        return None
+    best = search(bench, laws[0], motion, tick)
     if not thresholds.convincing(best.gain_fit, best.gain_choose, 1):
         return None
     trials = [_trial(bench, point) for point in fitted(bench, [best], meter)]
@@ -145,7 +154,8 @@ def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = 
     bench = ForceBench(bare, etfe.recording)
     motion = bench.simulation.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
     present = last.change.acting.effect
-    own = search(bench, list(present.candidates(bare.model, motion)), motion, tick)
+    every = list(present.candidates(bare.model, motion))
+    own = search(bench, next(iter(promising(bench, [every])), every), motion, tick)
     laws, _ = _called_for(bare, set(present.over), motion)
     others = [law for law in laws if law[0].name != present.name]
     found = [*fitted(bench, [own], meter), *beside_others(bench, others, meter, tick)]
@@ -208,9 +218,9 @@ def is_there(kind: type[NonlinearEffect], state: State) -> bool:
     return kind.name in (names | actuators if names & actuators else names)
 
 
-def _beside(variants: Variants, known: Point | None) -> Variants:
+def _beside(variants: Variants, known: Point) -> Variants:
     """Where a force is known by another law, the variants at its place."""
-    return [e for e in variants if known is None or e.place == known.effect.place]
+    return [effect for effect in variants if effect.place == known.effect.place]
 
 
 def _trial(bench: ForceBench, point: Point) -> Trial:
