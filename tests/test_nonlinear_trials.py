@@ -330,6 +330,43 @@ def test_where_nothing_rubs_no_friction_convinces() -> None:
     assert not [trial.name for trial in trials if trial.convincing]
 
 
+def test_only_what_stands_out_to_first_order_is_scanned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of friction on the motor three laws at two places; what acts on the command has no score."""
+    state, trials = rubbed(0.5)
+    names = "coulomb_friction", "drag", "cubic_damping", "soft_saturation"
+    only(monkeypatch, *names)
+    scanned: list[tuple[str, Any]] = []
+    own = search._scan
+
+    def scan(bench: ForceBench, before: Any, effect: Any, *rest: Any, **more: Any) -> list[Point]:
+        scanned.append((effect.name, getattr(effect, "place", None)))
+        return own(bench, before, effect, *rest, **more)
+
+    monkeypatch.setattr(search, "_scan", scan)
+    found = nonlinear_trials(state, {"sign(v)", "|v| v", "v^3", "u^3"}, Meter())
+    inner = [(name, place) for name, place in scanned if name != "soft_saturation"]
+    assert inner == [("coulomb_friction", MOTOR)]
+    (best,) = [trial for trial in found if trial.name == "coulomb_friction"]
+    assert best.score == pytest.approx(max(trial.score for trial in trials), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("score", "gain", "fitted"), [(4.0, 9, False), (4.0, 11, True), (7, 9, True)]
+)
+def test_what_hardly_stands_out_is_fitted_where_some_of_it_is_better_than_none(
+    monkeypatch: pytest.MonkeyPatch, score: float, gain: float, fitted: bool
+) -> None:
+    monkeypatch.setattr(search, "fit_force", lambda bench, point: point)
+    law: Any = SimpleNamespace(title="a law")
+    hint: Any = SimpleNamespace(effect=law, strength=1.0, score=score)
+    there: Any = SimpleNamespace(gain_fit=gain)
+    nothing: Any = SimpleNamespace(gain_fit=10.0)
+    bench: Any = SimpleNamespace(stays=lambda point: True)
+    ways = [hint], lambda hint, part: there, nothing, [[law]]
+    found = search._followed(bench, *ways, Meter(), None)
+    assert found == ([there] if fitted else [])
+
+
 def test_a_test_that_calls_for_nothing_tries_nothing() -> None:
     state, _ = rubbed(0.5)
     assert nonlinear_trials(state, set(), Meter()) == []
