@@ -70,9 +70,9 @@ def nonlinear_trials(
             point = known.get(law[0].strength[0])
             if bench.before and point is None and not isinstance(law[0], CommandEffect):
                 inner.append(law)
-            elif point is None:
+            elif point is None and meter.affords(law[0].title):
                 unknown.append(law)
-            elif (there := _beside(law, point)) and meter.affords(law[0].title):
+            elif point and (there := _beside(law, point)) and meter.affords(law[0].title):
                 points.append(search(bench, there, motion, tick, point))
         for law in promising(bench, unknown):
             if meter.affords(law[0].title):

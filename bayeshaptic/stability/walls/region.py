@@ -26,7 +26,7 @@ from bayeshaptic.stability.walls.curve import (
 from bayeshaptic.stability.walls.damping import Backward, Damping
 from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.stability.walls.width import Boundary, ZWidth, width_of
-from bayeshaptic.types import Floats, Ints
+from bayeshaptic.types import Floats
 
 DRAWS = 4000
 LEVELS = 33  # dampings in a table
@@ -89,13 +89,13 @@ class KbRegion(Shown):
         ----------
         damping : array_like, shape (J,)
         """
-        levels, back = _ascending(damping)
+        levels, back = np.unique(np.asarray(damping, float), return_inverse=True)
         unstable = unstable_at_start(self.curve, self.start, levels)
         events = along_stiffness(self.curve, levels, self.start)
         above = events.place > self.start[events.row]
         limit = np.full(unstable.shape, np.inf)
         np.minimum.at(limit, (events.row[above], events.level[above]), events.place[above])
-        return np.where(unstable == 0, limit, 0.0)[:, back]
+        return np.where(unstable == 0, limit, 0.0)[:, back.ravel()]
 
     def largest_damping(self) -> Floats:
         """The damping up to which each loop is stable with a stiffness near zero, shape (n,)."""
@@ -299,8 +299,3 @@ def _critical(inverse: InverseCurve) -> Floats:
     critical = np.full(len(none), np.inf)
     np.minimum.at(critical, events.row[above], events.place[above])
     return np.where(inverse.response.stable_at_rest(), critical, 0.0)
-
-
-def _ascending(damping: ArrayLike) -> tuple[Floats, Ints]:
-    levels, back = np.unique(np.atleast_1d(np.asarray(damping, float)), return_inverse=True)
-    return levels, back.ravel()
