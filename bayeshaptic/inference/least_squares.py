@@ -74,7 +74,8 @@ def least_squares(
     start : ndarray, shape (P,) or (S, P), optional
         Begin here and nowhere else.
     shorter : Fit, optional
-        For a chain: what its starting points grow from, where just that was fitted before.
+        For a chain: what its starting points grow from, where that was fitted before; with whatever
+        priors, which only bound a search.
     most_sets : int
         Sets of starting points for a model that misfits.
 
@@ -151,7 +152,7 @@ def _starts(model: Model, etfe: Etfe, seed: int, known: Fit | None) -> Floats:
     shorter = shorter_chain(model)
     if shorter is None:
         return starting_points(model, etfe, np.random.default_rng(seed))
-    if known is None or known.model != informed(shorter, etfe):
+    if known is None or known.model.names != shorter.names:
         known = least_squares(shorter, etfe, seed=seed)
     return with_one_more_mode(shorter, known.theta, model, etfe)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -53,20 +53,26 @@ def fitted(
     return [one for one in found if bench.stays(one)]
 
 
-def promising(bench: ForceBench, laws: Iterable[Variants]) -> list[Variants]:
-    """Of each law what stands out to first order, within reach of its best; none where nothing.
+def to_scan(
+    bench: ForceBench, laws: Sequence[Variants], known: Mapping[str, Point], meter: Meter
+) -> list[Variants]:
+    """Laws of known forces, and of others what stands out to first order, within reach of its best.
 
     What acts on the command stays as it is, and so does what runs away: no score is known of these.
+    Beside forces that a state has nothing is left out: first order is all that is asked there.
     """
-    laws = [list(law) for law in laws]
-    scored = [e for law in laws for e in law if not isinstance(e, CommandEffect)]
+    if bench.before:
+        return list(laws)
+    own = [law for law in laws if law[0].strength[0] in known]
+    new = [law for law in laws if law[0].strength[0] not in known and meter.affords(law[0].title)]
+    scored = [effect for law in new for effect in law if not isinstance(effect, CommandEffect)]
     scores = {id(hint.effect): hint.score for hint in hints(bench, scored)} if scored else {}
 
-    def stands_out(law: Variants) -> Variants:
+    def standing_out(law: Variants) -> Variants:
         least = max(_STANDS_OUT, _IN_REACH * max(scores.get(id(e), 0.0) for e in law))
         return [effect for effect in law if scores.get(id(effect), np.inf) >= least]
 
-    return [kept for law in laws if (kept := stands_out(law))]
+    return own + [kept for law in new if (kept := standing_out(law))]
 
 
 def search(
