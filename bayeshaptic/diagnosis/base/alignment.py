@@ -93,6 +93,9 @@ def rows_of_one_sample(
         return None
     model, early = _with_any_delay(fit.model), 0
     best = fit if model == fit.model else _from(fit, model, found.etfe)
+    # What leaves noise in moved rows alone wants less delay than none in these.
+    if to_noise and "delay_s" not in best.impossible:
+        return None
     while True:
         moved = _below(best, model, with_rows_moved(recording, early + 1), found)
         if moved is None:
