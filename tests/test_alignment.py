@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayeshaptic.diagnosis.base import alignment
 from bayeshaptic.diagnosis.base.alignment import MOVED, rows_of_one_sample, with_rows_moved
 from bayeshaptic.diagnosis.base.opened import opened
 from bayeshaptic.diagnosis.close_loop import close_loop
@@ -80,6 +81,18 @@ def test_a_mode_too_many_does_not_hide_it(delay_s: float | None) -> None:
     assert headline(closed).status == ("untrusted" if delay_s is None else "caution")
     low, high = closed.analysis.limit.quantile(0.005), closed.analysis.limit.quantile(0.995)
     assert low < bench.true_critical_stiffness() < high
+
+
+def test_a_simpler_model_that_wants_a_delay_is_not_followed_into_moved_rows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = opened(recorded(Bench.from_device("phantom"), 0), "rigid", Options())
+    fit = least_squares(build_model("rigid"), found.etfe)
+    assert fit.misfits and "delay_s" not in fit.impossible
+    asked: list[str] = []
+    monkeypatch.setattr(alignment, "_below", lambda *known: asked.append("moved rows"))
+    assert rows_of_one_sample(found, fit, to_noise=True) is None and not asked
+    assert rows_of_one_sample(found, fit) is None and asked
 
 
 def test_a_mode_above_half_the_sampling_rate_does_not_hide_it() -> None:
