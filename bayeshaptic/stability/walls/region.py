@@ -57,10 +57,10 @@ class KbRegion(Shown):
     unit: str
 
     def _lines(self) -> tuple[str, ...]:
-        largest = float(np.median(self.largest_damping()))
+        stiffest, largest = (float(np.median(v)) for v in (self.critical, self.largest_damping()))
         return (
             f"Stable walls with velocity by {self.kind.label}: {len(self.start):,} loops",
-            f"without damping up to {quantity(float(np.median(self.critical)), self.unit)} (median)",
+            f"without damping up to {quantity(stiffest, self.unit)} (median)",
             f"damping up to {quantity(largest, self.damping_unit)} (median)",
         )
 
