@@ -36,7 +36,7 @@ def collect_garbage_rarely(objects: int = 50_000) -> None:
     ----------
     objects : int
         With a million a single report ends with 40 MB that nobody needs, and saves a sixtieth more;
-        a batch would grow by 50 MB a report.
+        many in one process would grow by 50 MB each, until there are so many objects: 760 MB.
     """
     gc.set_threshold(objects, 20, 20)
     atexit.register(gc.freeze)

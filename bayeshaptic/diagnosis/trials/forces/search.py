@@ -24,7 +24,7 @@ from bayeshaptic.types import Floats
 Variants = list[NonlinearEffect]  # of one effect
 
 _STANDS_OUT = 3.0  # standard deviations: worth 9/4 on the windows to fit, where 10 are asked for
-_CLEARLY = 6.0  # where first order promises 18
+_CLEARLY = 6.0  # standard deviations, where first order promises 18: see `_followed`
 _IN_REACH = 0.5  # of the largest score: the rest is worth less than a quarter of the best
 _HOPELESS = 0.3  # share of the best gain so far below which a force is not followed up
 _PARTS = 1.0, 0.3, 0.1  # of a strength to first order, which may be far too much
