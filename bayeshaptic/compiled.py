@@ -61,19 +61,21 @@ def kernel(
 
 @cache
 def callback(function: Callable[..., float]) -> Any:
-    """A function of numbers and one array, compiled so that a kernel takes it as an argument.
+    """A function of numbers, and of an array at last, that a kernel takes as an argument.
 
     The kernel is compiled once, whatever function it is given.
 
     Parameters
     ----------
     function : callable
-        Of a module; returns a number.  The last of its arguments is an array.
+        Of a module; returns a number.  The last of its arguments is an array: a kernel gives it
+        where that begins (`.ctypes`), one number in the place of an array's seven.
     """
-    from numba import cfunc, float64
+    from numba import cfunc, float64, types
 
     _listen()
-    signature = float64(*[float64] * (function.__code__.co_argcount - 1), float64[::1])
+    numbers = [float64] * (function.__code__.co_argcount - 1)
+    signature = float64(*numbers, types.CPointer(float64))
     try:
         return cfunc(signature, cache=True, error_model="numpy")(function)
     except RuntimeError:

@@ -242,3 +242,9 @@ def test_two_forces_act_in_the_motion_that_both_make() -> None:
     assert error(apart) > 3 * error(found), (error(apart), error(found))
     plain = plainly(system.mechanism, [drag, friction])
     np.testing.assert_allclose(added(drag, friction), plain, rtol=0, atol=1e-9 * np.ptp(plain))
+
+
+def test_an_odd_number_of_steps_a_period_is_refused() -> None:
+    model = build_model("rigid", "lhifam")
+    with pytest.raises(ValueError, match="even number"):
+        forced_motion(model.system(model.values).mechanism, [], STEP_S, 3)

@@ -113,13 +113,20 @@ def forced_motion(
     step_s : float
         Step of the fine grid.
     substeps : int
-        Steps a sampling period.
+        Steps a sampling period: an even number, they are taken two at a time.
 
     Returns
     -------
     ndarray, shape (F, N)
         What each force adds to the motor's position at the samples.
+
+    Raises
+    ------
+    ValueError
+        An odd number of steps a period.
     """
+    if substeps % 2:
+        raise ValueError(f"{substeps} steps a sampling period: take an even number")
     from numba import NumbaExperimentalFeatureWarning
 
     from bayeshaptic.effects.nonlinear.stepping_kernel import step_through

@@ -14,8 +14,8 @@ from bayeshaptic.compiled import kernel
 from bayeshaptic.types import Floats
 
 _LANES = 4  # states at a time
-# Numbers that an unrolled loop over vectors takes at once. A rest is taken one by one: of more than
-# four states that is most of a step (5.6 ms for 3.6 with them filled up).
+# Numbers that an unrolled loop over vectors takes at once. A rest is taken one by one, and would be
+# most of a step.
 _AT_ONCE = 16
 
 
@@ -42,40 +42,49 @@ def rubbing(start: float, last: float, gain: float, bound: float) -> float:
 
 
 @kernel(inline=True)
-def _tables(matrix: Floats, rows: Floats, drive: Floats) -> tuple[Floats, Floats]:
-    """A step of the states together with what is seen of them, which is known a step ahead then.
+def _product(a: Floats, b: Floats) -> Floats:
+    """a b, of small matrices."""
+    out = np.zeros((a.shape[0], b.shape[1]))
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            for k in range(a.shape[1]):
+                out[i, j] += a[i, k] * b[k, j]
+    return out
 
-    So the next forces wait for one product with these, and not for sums over the states.
+
+@kernel(inline=True)
+def _tables(matrix: Floats, rows: Floats, drive: Floats) -> tuple[Floats, Floats, Floats]:
+    """Two steps of the states together with what is seen of them, which is known ahead then.
+
+    So the next forces wait for one product with these, and not for sums over the states; and
+    products, which are most of a step, are half as many.
 
     Returns
     -------
     table : ndarray, shape (S', W)
-        What the states become, and `rows` of that, for each state before; filled up with zeros: S'
-        to fours, and W to fours or sixteens.
-    push : ndarray, shape (F, W)
-        What a unit of each force adds.
+        What the states become, and what is seen of that in the next step and the one after (`rows`
+        of each force), for each state before; filled up with zeros: S' to fours, W to sixteens.
+    early, late : ndarray, shape (F, W)
+        What a unit of each force adds, in the first of both steps and in the second.
     """
     count, _, states = rows.shape
-    width = states + 3 * count
-    room = _AT_ONCE if states > _LANES else _LANES
-    becomes = np.zeros((width + -width % room, states))
+    width = states + 6 * count
+    becomes = np.zeros((width + -width % _AT_ONCE, states))
     becomes[:states] = np.eye(states)
     for f in range(count):
-        becomes[states + 3 * f : states + 3 * f + 3] = rows[f]
+        seen = states + 3 * f
+        becomes[seen : seen + 3] = rows[f]
+        becomes[seen + 3 * count : seen + 3 * count + 3] = _product(rows[f], matrix)
     table = np.zeros((states + -states % _LANES, len(becomes)))
-    push = np.zeros((count, len(becomes)))
-    for j in range(width):
-        for i in range(states):
-            for f in range(count):
-                push[f, j] += becomes[j, i] * drive[f, i]
-            for between in range(states):
-                table[i, j] += becomes[j, between] * matrix[between, i]
-    return table, push
+    table[:states] = _product(becomes, _product(matrix, matrix)).T
+    late = _product(drive, becomes.T)
+    early = _product(drive, _product(becomes, matrix).T)
+    return table, early, late
 
 
 @kernel(inline=True)
-def _advance(table: Floats, push: Floats, force: float, w: Floats, spare: Floats) -> None:
-    """One step of the states of one force and of what is seen of them, `w`."""
+def _ahead(table: Floats, w: Floats, spare: Floats) -> None:
+    """What the states, and what is seen of them, become without forces: `spare`."""
     for group in range(0, len(table), _LANES):
         a, b, c, d = w[group], w[group + 1], w[group + 2], w[group + 3]
         to_a, to_b, to_c, to_d = table[group], table[group + 1], table[group + 2], table[group + 3]
@@ -85,25 +94,21 @@ def _advance(table: Floats, push: Floats, force: float, w: Floats, spare: Floats
         else:
             for j in range(len(w)):
                 spare[j] += (to_a[j] * a + to_b[j] * b) + (to_c[j] * c + to_d[j] * d)
-    for j in range(len(w)):
-        w[j] = spare[j] + push[j] * force
 
 
 @kernel(inline=True)
-def _advance_six(table: Floats, push: Floats, force: float, w: Floats, spare: Floats) -> None:
-    """`_advance` of five or six states: all sums in one pass, and none over what is filled up."""
+def _ahead_six(table: Floats, w: Floats, spare: Floats) -> None:
+    """`_ahead` of five or six states: all sums in one pass, and none over what is filled up."""
     a, b, c, d, e, f = w[0], w[1], w[2], w[3], w[4], w[5]
     to_a, to_b, to_c, to_d = table[0], table[1], table[2], table[3]
     to_e, to_f = table[4], table[5]
     for j in range(len(w)):
         low = (to_a[j] * a + to_b[j] * b) + (to_c[j] * c + to_d[j] * d)
         spare[j] = low + (to_e[j] * e + to_f[j] * f)
-    for j in range(len(w)):
-        w[j] = spare[j] + push[j] * force
 
 
 @kernel(inline=True)
-def _advance_eight(table: Floats, push: Floats, force: float, w: Floats, spare: Floats) -> None:
+def _ahead_eight(table: Floats, w: Floats, spare: Floats) -> None:
     """The same of seven or eight."""
     a, b, c, d, e, f, g, h = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7]
     to_a, to_b, to_c, to_d = table[0], table[1], table[2], table[3]
@@ -111,8 +116,6 @@ def _advance_eight(table: Floats, push: Floats, force: float, w: Floats, spare: 
     for j in range(len(w)):
         low = (to_a[j] * a + to_b[j] * b) + (to_c[j] * c + to_d[j] * d)
         spare[j] = low + ((to_e[j] * e + to_f[j] * f) + (to_g[j] * g + to_h[j] * h))
-    for j in range(len(w)):
-        w[j] = spare[j] + push[j] * force
 
 
 @kernel
@@ -149,6 +152,7 @@ def step_through(
         Position and velocity at each force's place without forces.
     step_s : float
     substeps : int
+        An even number.
     laws : tuple of callable
         The force of a step, as `Law.force`: compiled callbacks.
     sticks : ndarray of bool, shape (F,)
@@ -166,9 +170,9 @@ def step_through(
     count, states = len(laws), len(matrix)
     steps = len(motion[0][0])
     motor = np.empty((count, steps // substeps))
-    table, push = _tables(matrix, rows, drive)
-    w, spare = np.zeros(push.shape), np.empty(push.shape[1])
-    force = np.zeros(count)
+    table, early, late = _tables(matrix, rows, drive)
+    w, spare = np.zeros(late.shape), np.empty(late.shape[1])
+    force, first, numbers = np.zeros(count), np.zeros(count), constants.ctypes
     six, eight = _LANES < states <= 6, len(table) == 2 * _LANES
     for sample in range(motor.shape[1]):
         for f in range(count):
@@ -176,35 +180,45 @@ def step_through(
             for i in range(states):
                 read += reading[i] * w[f, i]
             motor[f, sample] = read
-        for k in range(sample * substeps, (sample + 1) * substeps):
-            after = min(k + 1, steps - 1)
-            for f in range(count):
-                position, velocity = motion[f]
-                x = 0.5 * (position[k] + position[after])
-                last = velocity[after]
-                v = 0.5 * (velocity[k] + last)
-                seen = states + 3 * f
-                for g in range(count):
-                    x += w[g, seen]
-                    v += w[g, seen + 1]
-                    last += w[g, seen + 2]
-                for g in range(f):
-                    x += gains[f, g, 0] * force[g]
-                    v += gains[f, g, 1] * force[g]
-                    last += gains[f, g, 2] * force[g]
-                gain, before = gains[f, f, 2], force[f]
-                if f == 0:  # a view costs a tenth of the step
-                    force[f] = laws[f](x, v, last, gain, before, step_s, constants)
-                else:
-                    own = constants[begins[f] :]
-                    force[f] = laws[f](x, v, last, gain, before, step_s, own)
-                if sticks[f]:
-                    force[f] = rubbing(2 * v - last, last, gain, force[f])
+        for pair in range(sample * substeps, (sample + 1) * substeps, 2):
+            for k in range(pair, pair + 2):
+                after = min(k + 1, steps - 1)
+                begin = states if k == pair else states + 3 * count
+                for f in range(count):
+                    position, velocity = motion[f]
+                    x = 0.5 * (position[k] + position[after])
+                    last = velocity[after]
+                    v = 0.5 * (velocity[k] + last)
+                    at, seen = states + 3 * f, begin + 3 * f
+                    for g in range(count):
+                        x += w[g, seen]
+                        v += w[g, seen + 1]
+                        last += w[g, seen + 2]
+                        if k > pair:
+                            x += late[g, at] * first[g]
+                            v += late[g, at + 1] * first[g]
+                            last += late[g, at + 2] * first[g]
+                    for g in range(f):
+                        x += gains[f, g, 0] * force[g]
+                        v += gains[f, g, 1] * force[g]
+                        last += gains[f, g, 2] * force[g]
+                    gain, before = gains[f, f, 2], force[f]
+                    if f == 0:  # a view costs a tenth of the step
+                        force[f] = laws[f](x, v, last, gain, before, step_s, numbers)
+                    else:
+                        own = constants[begins[f] :].ctypes
+                        force[f] = laws[f](x, v, last, gain, before, step_s, own)
+                    if sticks[f]:
+                        force[f] = rubbing(2 * v - last, last, gain, force[f])
+                if k == pair:
+                    first[:] = force
             for f in range(count):
                 if six:
-                    _advance_six(table, push[f], force[f], w[f], spare)
+                    _ahead_six(table, w[f], spare)
                 elif eight:
-                    _advance_eight(table, push[f], force[f], w[f], spare)
+                    _ahead_eight(table, w[f], spare)
                 else:
-                    _advance(table, push[f], force[f], w[f], spare)
+                    _ahead(table, w[f], spare)
+                for j in range(len(spare)):
+                    w[f, j] = (spare[j] + early[f, j] * first[f]) + late[f, j] * force[f]
     return motor

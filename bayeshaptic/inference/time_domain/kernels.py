@@ -138,7 +138,7 @@ def follow(
             middle, last = _middle(v, force, damping, dry, gain)
             dry, pushed = 0.0, 0.0
             for f in range(len(laws)):
-                own = constants[begins[f] :]
+                own = constants[begins[f] :].ctypes
                 way = x + 0.5 * span * middle
                 found = laws[f](way, middle, last, gain, before[f], span, own)
                 if sticks[f]:

@@ -157,7 +157,7 @@ def _settle(places, dry, constants, forces, n, z, end):  # type: ignore[no-untyp
 def _smooth(place, constants, force, slot, z, end):  # type: ignore[no-untyped-def]
     """The force of a smooth law at the end of a step."""
     q, v = _at(end, place, 0), _at(end, place, 2)
-    return force(q, v, z[slot], q - _at(z, place, 0), constants)
+    return force(q, v, z[slot], q - _at(z, place, 0), constants.ctypes)
 
 
 @kernel(inline=True, exact=True)
