@@ -238,6 +238,7 @@ def _shared_alias_sums(
     return np.einsum("kb,klb->lb", turned, values.reshape(len(k), len(theta), values.shape[-1]))
 
 
+@cache
 def _numbers(nearest: int, furthest: int) -> Ints:
     """Of the aliases on both sides."""
     return np.r_[-furthest : 1 - nearest, nearest : furthest + 1]
