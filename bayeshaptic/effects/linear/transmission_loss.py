@@ -50,8 +50,8 @@ def relaxing_spectrum(
     """
     strength = loss_factor * stiffness / (np.arctan(_SPECTRUM) - np.arctan(1 / _SPECTRUM))
     if np.any(s.real):
-        ratio = (1 + s * _SPECTRUM / rate) / (1 + s / (_SPECTRUM * rate))
-        return np.asarray(strength * (np.log(ratio) - np.log(_SPECTRUM)))
+        wide = (1 + s * _SPECTRUM / rate) / (1 + s / (_SPECTRUM * rate))
+        return np.asarray(strength * (np.log(wide) - np.log(_SPECTRUM)))
     # On the imaginary axis, where nearly all points are, in real numbers: a third of the time.
     fast = s.imag * (_SPECTRUM / rate)
     square = fast**2
