@@ -188,12 +188,18 @@ def share_at_rest(recording: Recording) -> float:
     return float(np.mean(_resting(recording)[1]))
 
 
-def _resting(recording: Recording) -> tuple[Floats, Bools]:
-    """The position in parts of a standstill's length, and which of these are at rest."""
+def standstill(recording: Recording) -> tuple[float, int]:
+    """A count of the position (0 where it has none), and for how many samples it rests at least."""
     step = increment_unit(recording.position) or 0.0
     longest = max(round(_IDLE_S / recording.period_s), _FEWEST)
     usual = np.std(recording.position[_FEWEST:] - recording.position[:-_FEWEST])
     length = int(np.clip(_FEWEST * _USUAL_COUNTS * step / (usual + 1e-300), _FEWEST, longest))
+    return step, length
+
+
+def _resting(recording: Recording) -> tuple[Floats, Bools]:
+    """The position in parts of a standstill's length, and which of these are at rest."""
+    step, length = standstill(recording)
     parts = recording.samples // length
     position = recording.position[: parts * length].reshape(parts, length)
     return position, np.ptp(position, axis=1) <= 1.01 * step

@@ -9,8 +9,9 @@ another's.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -145,6 +146,16 @@ class ForceBench:
     ) -> Point:
         """Simulate and take off, with the linear parameters as given: see `point`."""
         return self._valued(forces, theta, self._simulated(forces, theta, expected))
+
+    @cached_property
+    def resting(self) -> ForceBench | None:
+        """With friction at rest told from how smoothly a hand moves; None where nothing rests."""
+        simulation = self.simulation.resting
+        if simulation is None:
+            return None
+        other = copy(self)
+        other.simulation = simulation
+        return other
 
     def stays(self, point: Point) -> bool:
         """Whether the mass does not run away with the forces, after the last fit."""

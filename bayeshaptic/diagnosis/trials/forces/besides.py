@@ -20,6 +20,7 @@ from numpy.linalg import lstsq
 from scipy.fft import next_fast_len
 
 from bayeshaptic.diagnosis.residuals.unforced import HAND_ORDER, parts, slow_motion
+from bayeshaptic.diagnosis.trials.forces.at_rest import AtRest
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.types import Floats
 
@@ -64,18 +65,22 @@ class Hand:
         Of what is slow: `hand_edge_hz`.
     response, usual : LinearSystem
         The mechanism without forces, and that with what they do on the average; batches of one.
+    rests : AtRest, optional
+        Where dry friction holds it.
     """
 
     period_s: float
     edge_hz: float
     response: LinearSystem
     usual: LinearSystem
+    rests: AtRest | None = None
 
     def begin(self, left: Floats) -> Floats:
         return self.of(left)  # what is slow is measured, with all that forces do
 
     def of(self, left: Floats) -> Floats:
-        return slow_motion(left, self.period_s, self.edge_hz)
+        hand = left if self.rests is None else self.rests.smoothest(left)
+        return slow_motion(hand, self.period_s, self.edge_hz)
 
     def off(self, taken: Floats, rest: Floats) -> Floats:
         return self.of(taken + rest) - taken

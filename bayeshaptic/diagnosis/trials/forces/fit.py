@@ -14,6 +14,7 @@ from bayeshaptic.diagnosis.state import FIT, fit_part
 from bayeshaptic.diagnosis.trials.forces.along import Along
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.slopes import NUDGE, Form, Reach, linearised, nudges_of
+from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.numerics.gauss_newton import minimise
@@ -44,6 +45,9 @@ class _Step:
 def fit_force(bench: ForceBench, found: Point) -> Point:
     """The best forces of the laws near `found`, or `found` where nothing is better.
 
+    Where friction holds a motor in a hand, also by way of those that leave the hand the smoothest
+    motion: the likelier of both.
+
     Parameters
     ----------
     bench : ForceBench
@@ -54,6 +58,16 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     -------
     Point
     """
+    best = _fit(bench, found)
+    sticks = any(one.effect.sticks and one.effect.place == MOTOR for one in best.forces)
+    if not (sticks and best.gain_fit > 0 and bench.resting):
+        return best
+    again = _fit(bench, _fit(bench.resting, best))
+    return max(best, again, key=lambda point: point.gain_fit)
+
+
+def _fit(bench: ForceBench, found: Point) -> Point:
+    """The best by Gauss and Newton's steps from `found`."""
     form, found = Form.of(found), _near(bench, found, found.forces, found.theta)
     first, before, best = form.logs(found), found, found
     reach, furthest = Reach(nudges_of(bench), np.ones(len(first))), 1.0

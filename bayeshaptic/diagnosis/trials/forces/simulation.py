@@ -7,13 +7,14 @@ encoder would miss half of the friction.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.residuals.unforced import drifts, hand_edge_hz
+from bayeshaptic.diagnosis.trials.forces.at_rest import AtRest, at_rest
 from bayeshaptic.diagnosis.trials.forces.besides import (
     Besides,
     Drift,
@@ -56,12 +57,15 @@ class Simulation:
         The linear parameters that fit it where no force is taken off.
     there : ndarray, shape (N,)
         What forces that are known to act in it add to the motion.
+    rests : AtRest, optional
+        Where friction holds the motor, and its force is told from how smoothly a hand moves.
     """
 
     model: Model
     recording: Recording
     usual: Floats
     there: Floats
+    rests: AtRest | None = None
 
     @cached_property
     def command(self) -> Floats:
@@ -75,6 +79,17 @@ class Simulation:
     @cached_property
     def _edge_hz(self) -> float:
         return hand_edge_hz(self.recording.position, self.recording.period_s)
+
+    @cached_property
+    def resting(self) -> Simulation | None:
+        """With the force of friction at rest told from how smoothly a hand moves.
+
+        None without a hand, or without rests.
+        """
+        if not self.model.held:
+            return None
+        rests = at_rest(self.recording, self.model.system(self.usual), self._edge_hz)
+        return None if rests is None else replace(self, rests=rests)
 
     @cached_property
     def _usual_drifts(self) -> Floats:
@@ -184,7 +199,7 @@ class Simulation:
         if self.model.held:
             own, usual = self.model.system(theta), self.model.system(self.usual)
             kind = Hand if _against_ground(places) else HandAfar
-            return kind(self.recording.period_s, self._edge_hz, own, usual)
+            return kind(self.recording.period_s, self._edge_hz, own, usual, self.rests)
         if not _against_ground(places):
             return Nothing()  # that a spring between the masses would know of
         kept, mean = self._usual_drifts.shape[1], float(self.recording.force.mean())
