@@ -42,7 +42,7 @@ class AtRest:
     moved : ndarray, shape (N, K)
         What forces at rest, straight lines between knots, add to the motion: of each knot.
     told : ndarray, shape (K, N)
-        From `_jerks` of a motion to the forces in it that make it least.
+        From `_fast_velocity` of a motion to the forces in it that make it least.
     """
 
     period_s: float
@@ -52,7 +52,9 @@ class AtRest:
 
     def smoothest(self, motion: Floats) -> Floats:
         """A hand's motion (N,) with what a force at rest may have done taken off."""
-        return motion - self.moved @ (self.told @ _jerks(motion, self.period_s, self.edge_hz))
+        return motion - self.moved @ (
+            self.told @ _fast_velocity(motion, self.period_s, self.edge_hz)
+        )
 
 
 def at_rest(recording: Recording, system: LinearSystem, edge_hz: float) -> AtRest | None:
@@ -75,10 +77,10 @@ def at_rest(recording: Recording, system: LinearSystem, edge_hz: float) -> AtRes
     bare = replace(system, delay_s=np.zeros(1), filters=())
     pulses = (pulse for own in knots for pulse in _pulses(own, recording.samples))
     moved = np.stack([linear_motion(bare, pulse, period_s)[0] for pulse in pulses], axis=1)
-    jerks = _jerks(moved, period_s, edge_hz)
-    alike = jerks.T @ jerks
+    fast = _fast_velocity(moved, period_s, edge_hz)
+    alike = fast.T @ fast
     alike[np.diag_indices_from(alike)] *= 1 + _RIDGE
-    told = np.asarray(np.linalg.solve(alike, jerks.T), float)
+    told = np.asarray(np.linalg.solve(alike, fast.T), float)
     return AtRest(period_s, edge_hz, moved, told)
 
 
@@ -110,8 +112,8 @@ def _pulses(knots: Floats, samples: int) -> Iterator[Floats]:
         yield np.interp(every, knots, unit, left=0.0, right=0.0)
 
 
-def _jerks(motion: Floats, period_s: float, edge_hz: float) -> Floats:
-    """The velocity of a motion, shape (N, ...), between where hands wander and what is slow."""
+def _fast_velocity(motion: Floats, period_s: float, edge_hz: float) -> Floats:
+    """The velocity of a motion, shape (N, ...), between where hands wander and the edge."""
     band = butter(
         HAND_ORDER, [_WANDERS_HZ, edge_hz], btype="bandpass", fs=1 / period_s, output="sos"
     )
