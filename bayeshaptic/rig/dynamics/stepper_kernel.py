@@ -37,32 +37,19 @@ def run(tables, forces, memory, acting, hand, states):  # type: ignore[no-untype
                 while left:
                     left -= 1
                     level = pending[left]
-                    constant, ramp = tables.constant[part, level], tables.ramp[part, level]
-                    _predict(tables.matrix[part, level], z, end)
+                    _predict(tables.matrix, part, level, z, end)
                     if smooth:
+                        ramp = tables.ramp[part, level]
                         _bend(places, dry, constants, forces, ramp, n, z, end, applied)
                     done = True
                     for j in range(len(dry)):
                         if dry[j] and done:
-                            grip = tables.grip[part, level, j]
-                            done = _rub(
-                                places[j],
-                                constants[j],
-                                constant[j],
-                                ramp[j],
-                                grip,
-                                level == finest,
-                                n + 3 + j,
-                                z,
-                                mode[j],
-                                end,
-                                modes[j:],
-                            )
+                            done = _rub(tables, part, level, j, n, z, mode, end, modes)
                     if done:
                         for j in range(len(dry)):
                             if dry[j] and modes[j]:
-                                v = _at(end, places[j], 2)
-                                end[n + 3 + j] = -modes[j] * _sliding(v, constants[j])
+                                v = _at(end, places, j, 2)
+                                end[n + 3 + j] = -modes[j] * _sliding(v, constants, j)
                         if smooth:
                             _settle(places, dry, constants, forces, n, z, end)
                         z[:] = end
@@ -75,13 +62,15 @@ def run(tables, forces, memory, acting, hand, states):  # type: ignore[no-untype
                 piece += 1
 
 
+# Arrays whole, with where to look in them: a view of a part, which counts who uses it, costs a
+# tenth of a step.
 @kernel(inline=True, exact=True)
-def _predict(matrix, z, end):  # type: ignore[no-untyped-def]
+def _predict(matrix, part, level, z, end):  # type: ignore[no-untyped-def]
     """The end of a step with the forces of its beginning."""
     for i in range(len(end)):
         total = 0.0
         for j in range(len(z)):
-            total += matrix[i, j] * z[j]
+            total += matrix[part, level, i, j] * z[j]
         end[i] = total
 
 
@@ -93,55 +82,56 @@ def _bend(places, dry, constants, forces, ramp, n, z, end, applied):  # type: ig
     for _ in range(_CORRECTIONS):
         for j in range(len(dry)):
             if not dry[j]:
-                force = _smooth(places[j], constants[j], forces[j], n + 3 + j, z, end)
+                force = _smooth(places, constants, j, forces[j], n + 3 + j, z, end)
                 for i in range(n):
                     end[i] += ramp[j, i] * (force - applied[j])
                 applied[j] = force
 
 
 @kernel(inline=True, exact=True)
-def _rub(  # type: ignore[no-untyped-def]
-    place, constants, constant, ramp, grip, finest, slot, z, mode, end, modes
-):
+def _rub(tables, part, level, j, n, z, mode, end, modes):  # type: ignore[no-untyped-def]
     """Add dry friction to the end of a step; False where it begins, ends or turns in it.
 
-    What it does from then on goes to the first of `modes`.
+    What it does from then on goes to `modes`.
     """
-    before, static, n = z[slot], constants[1], len(end)
-    v = _at(end, place, 2)
-    if mode and v * mode > 0:
-        if static != constants[0]:
-            force = -mode * _sliding(v, constants)
-            for i in range(n):
-                end[i] += ramp[i] * (force - before)
-        modes[0] = mode
+    place, constants, slot = tables.place, tables.constants, n + 3 + j
+    constant, ramp, grip = tables.constant, tables.ramp, tables.grip[part, level, j]
+    finest = level == tables.matrix.shape[1] - 1
+    before, static, way = z[slot], constants[j, 1], mode[j]
+    v = _at(end, place, j, 2)
+    if way and v * way > 0:
+        if static != constants[j, 0]:
+            force = -way * _sliding(v, constants, j)
+            for i in range(len(end)):
+                end[i] += ramp[part, level, j, i] * (force - before)
+        modes[j] = way
         return True
-    if mode and not finest:
+    if way and not finest:
         return False
     # What the velocity would gain in the step without this friction decides if it can hold.
-    start = _at(z, place, 2) if mode else 0.0
+    start = _at(z, place, j, 2) if way else 0.0
     gain = v - before * grip - start
     sticks = abs(gain) <= static * grip
     if not sticks and not finest:
         return False
     if sticks:
         force = -(gain + start) / grip
-    elif mode:
+    elif way:
         force = before * (2 * start / (start - v) - 1)
     else:
         force = -math.copysign(static, gain)
-    for i in range(n):
-        end[i] += constant[i] * (force - before)
+    for i in range(len(end)):
+        end[i] += constant[part, level, j, i] * (force - before)
     if not sticks:
-        modes[0] = int(math.copysign(1.0, gain))
+        modes[j] = int(math.copysign(1.0, gain))
         return True
-    modes[0] = 0
+    modes[j] = 0
     end[slot] = force
-    if place[3] < 0:
+    if place[j, 3] < 0:
         # A mass that stuck stands still: nothing is left of what rounding and the step moved.
-        end[place[2]] = 0.0
-        if mode == 0:
-            end[place[0]] = z[place[0]]
+        end[place[j, 2]] = 0.0
+        if way == 0:
+            end[place[j, 0]] = z[place[j, 0]]
     return True
 
 
@@ -150,30 +140,30 @@ def _settle(places, dry, constants, forces, n, z, end):  # type: ignore[no-untyp
     """The smooth forces that the next step begins with."""
     for j in range(len(dry)):
         if not dry[j]:
-            end[n + 3 + j] = _smooth(places[j], constants[j], forces[j], n + 3 + j, z, end)
+            end[n + 3 + j] = _smooth(places, constants, j, forces[j], n + 3 + j, z, end)
 
 
 @kernel(inline=True, exact=True)
-def _smooth(place, constants, force, slot, z, end):  # type: ignore[no-untyped-def]
+def _smooth(place, constants, j, force, slot, z, end):  # type: ignore[no-untyped-def]
     """The force of a smooth law at the end of a step."""
-    q, v = _at(end, place, 0), _at(end, place, 2)
-    return force(q, v, z[slot], q - _at(z, place, 0), constants.ctypes)
+    q, v = _at(end, place, j, 0), _at(end, place, j, 2)
+    return force(q, v, z[slot], q - _at(z, place, j, 0), constants[j].ctypes)
 
 
 @kernel(inline=True, exact=True)
-def _sliding(v, constants):  # type: ignore[no-untyped-def]
+def _sliding(v, constants, j):  # type: ignore[no-untyped-def]
     """Size of the sliding force of dry friction."""
-    level, static = constants[0], constants[1]
+    level, static = constants[j, 0], constants[j, 1]
     if static == level:
         return level
-    return level + (static - level) * math.exp(-((v / constants[2]) ** 2))
+    return level + (static - level) * math.exp(-((v / constants[j, 2]) ** 2))
 
 
 @kernel(inline=True, exact=True)
-def _at(z, place, first):  # type: ignore[no-untyped-def]
+def _at(z, place, j, first):  # type: ignore[no-untyped-def]
     """A relative position (first = 0) or velocity (2)."""
-    taken = z[place[first + 1]] if place[first + 1] >= 0 else 0.0
-    return z[place[first]] - taken
+    taken = z[place[j, first + 1]] if place[j, first + 1] >= 0 else 0.0
+    return z[place[j, first]] - taken
 
 
 @kernel(inline=True, exact=True)
