@@ -26,6 +26,7 @@ from bayeshaptic.report.numbers.misfit import (
     residual_is_noticed,
 )
 from bayeshaptic.report.numbers.result import may_be_held
+from bayeshaptic.report.numbers.stand_ins import stand_ins
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.numbers.unstated import unstated
 
@@ -68,8 +69,8 @@ def why_none(result: Result) -> tuple[str, ...]:
             f"{_MOSTLY:.0f} times as high, so that what is left of the damping is less than an "
             "error of a tenth in that force"
         )
-    if closed and (still := held_still(closed)) is not None:
-        found.append(still)
+    if closed:
+        found += [why for why in (held_still(closed), stand_ins(closed)) if why]
     if closed and GAIN.test in _left(closed):
         found.append(
             "the gain of the actuator ripples along the way, which was not taken off, and where it "

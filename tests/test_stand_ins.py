@@ -1,0 +1,33 @@
+"""No stiffness where two forces over the velocity were found on a held device."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from bayeshaptic.report.numbers.stand_ins import stand_ins
+
+
+@pytest.mark.parametrize(
+    ("held", "names", "said"),
+    [
+        (True, ("stribeck_friction", "cubic_damping"), True),
+        (True, ("coulomb_friction", "drag"), True),
+        (False, ("coulomb_friction", "drag"), False),  # every interval of such pairs holds
+        (True, ("coulomb_friction",), False),
+        (True, ("coulomb_friction", "hardening_spring"), False),
+        (True, ("coulomb_friction", "actuator_saturation"), False),
+        (True, ("coulomb_friction", "second_mode"), False),
+    ],
+)
+def test_a_pair_over_the_velocity_of_a_held_device_is_a_reason_against_its_limit(
+    held: bool, names: tuple[str, ...], said: bool
+) -> None:
+    linear = {"second_mode"}
+    found = tuple(
+        SimpleNamespace(name=name, family="linear" if name in linear else "nonlinear")
+        for name in names
+    )
+    why = stand_ins(SimpleNamespace(model=SimpleNamespace(held=held), effects=found))  # type: ignore[arg-type]
+    assert (why is not None) == said
