@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -29,5 +30,7 @@ def test_a_pair_over_the_velocity_of_a_held_device_is_a_reason_against_its_limit
         SimpleNamespace(name=name, family="linear" if name in linear else "nonlinear")
         for name in names
     )
-    why = stand_ins(SimpleNamespace(model=SimpleNamespace(held=held), effects=found))  # type: ignore[arg-type]
+    analysis: Any = SimpleNamespace(model=SimpleNamespace(held=held))
+    closed: Any = SimpleNamespace(analysis=analysis, effects=found)
+    why = stand_ins(closed)
     assert (why is not None) == said

@@ -20,7 +20,7 @@ def stand_ins(closed: Closed) -> str | None:
     limits 2.4 to 5.7 dB too high (benchmarks/README.md).  Of eighteen devices with such pairs that
     nobody holds every interval holds.
     """
-    if not closed.model.held:
+    if not closed.analysis.model.held:
         return None
     kinds = [effect_class(one.name) for one in closed.effects if one.family == "nonlinear"]
     over = [
