@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from bayeshaptic.report.numbers.stand_ins import stand_ins
+from bayeshaptic.report.page import lights
 
 
 @pytest.mark.parametrize(
@@ -34,3 +35,18 @@ def test_a_pair_over_the_velocity_of_a_held_device_is_a_reason_against_its_limit
     closed: Any = SimpleNamespace(analysis=analysis, effects=found)
     why = stand_ins(closed)
     assert (why is not None) == said
+
+
+def test_the_loop_has_no_green_light_beside_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("coulomb_friction", "drag")
+    closed: Any = SimpleNamespace(
+        analysis=SimpleNamespace(model=SimpleNamespace(held=True), sampled=True),
+        effects=tuple(SimpleNamespace(name=name, family="nonlinear") for name in names),
+        force=None,
+        verdict="explained",
+    )
+    monkeypatch.setattr(lights, "misfit_is_clear", lambda _: False)
+    result: Any = SimpleNamespace(closed=closed)
+    assert lights._loop(result).state == "doubt"
+    closed.effects = closed.effects[:1]
+    assert lights._loop(result).state == "good"

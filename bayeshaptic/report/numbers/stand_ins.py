@@ -23,16 +23,15 @@ def stand_ins(closed: Closed) -> str | None:
     if not closed.analysis.model.held:
         return None
     kinds = [effect_class(one.name) for one in closed.effects if one.family == "nonlinear"]
-    over = [
-        kind
-        for kind in kinds
-        if issubclass(kind, NonlinearEffect)
-        and not issubclass(kind, CommandEffect)
-        and {VELOCITY, LOAD_VELOCITY} & set(kind.over)
-    ]
-    if len(over) < 2:
+    if sum(map(_over_the_velocity, kinds)) < 2:
         return None
     return (
         "two forces that go with the velocity were found on a device that somebody holds: others "
         "of the kind fit about as well, with another damping, and the limit may come out too high"
     )
+
+
+def _over_the_velocity(kind: type) -> bool:
+    if not issubclass(kind, NonlinearEffect) or issubclass(kind, CommandEffect):
+        return False
+    return not {VELOCITY, LOAD_VELOCITY}.isdisjoint(kind.over)

@@ -15,6 +15,7 @@ from bayeshaptic.report.numbers.misfit import (
     residual_is_noticed,
 )
 from bayeshaptic.report.numbers.result import is_unexplained
+from bayeshaptic.report.numbers.stand_ins import stand_ins
 from bayeshaptic.report.objections import why_none
 
 if TYPE_CHECKING:
@@ -107,6 +108,8 @@ def _loop(result: Result) -> Light:
     state, word = _SEEN[closed.verdict]
     if state == GOOD and misfit_is_clear(closed.analysis):
         return Light("Loop", BAD, "misfit remains", section)
+    if state == GOOD and stand_ins(closed) is not None:
+        return Light("Loop", DOUBT, "other forces fit as well", section)
     return Light("Loop", state, word, section)
 
 
