@@ -18,7 +18,7 @@ def stand_ins(closed: Closed) -> str | None:
     Of four held devices with dry friction and a drag, in open loop, none had these found: cubic
     damping, and dry friction or one that falls, fitted about as well, with dampers that made the
     limits 2.4 to 5.7 dB too high (benchmarks/README.md).  Of eighteen devices with such pairs that
-    nobody holds every interval holds.
+    nobody holds every interval holds; of eight held ones with one friction none is refused.
     """
     if not closed.analysis.model.held:
         return None
