@@ -24,9 +24,7 @@ def loop(still: float, held: bool, direct: bool, effect: str) -> Any:
         etfe=SimpleNamespace(direct=direct),
         model=SimpleNamespace(held=held),
     )
-    family = "linear" if effect == "second_mode" else "nonlinear"
-    found = SimpleNamespace(name=effect, family=family)
-    return SimpleNamespace(analysis=analysis, effects=(found,))
+    return SimpleNamespace(analysis=analysis, effect_names=(effect,))
 
 
 @pytest.mark.parametrize(
@@ -34,6 +32,7 @@ def loop(still: float, held: bool, direct: bool, effect: str) -> Any:
     [
         (0.6, True, True, "coulomb_friction", True),
         (0.6, True, True, "stribeck_friction", True),
+        (0.6, True, True, "gain_along_the_way", False),  # found without a law
         (0.6, True, True, "second_mode", False),  # settled, and not held by friction
         (0.6, False, True, "coulomb_friction", False),
         (0.6, True, False, "coulomb_friction", False),

@@ -21,18 +21,14 @@ from bayeshaptic.report.page import lights
         (True, ("coulomb_friction", "hardening_spring"), False),
         (True, ("coulomb_friction", "actuator_saturation"), False),
         (True, ("coulomb_friction", "second_mode"), False),
+        (True, ("gain_along_the_way",), False),  # found without a law
     ],
 )
 def test_a_pair_over_the_velocity_of_a_held_device_is_a_reason_against_its_limit(
     held: bool, names: tuple[str, ...], said: bool
 ) -> None:
-    linear = {"second_mode"}
-    found = tuple(
-        SimpleNamespace(name=name, family="linear" if name in linear else "nonlinear")
-        for name in names
-    )
     analysis: Any = SimpleNamespace(model=SimpleNamespace(held=held))
-    closed: Any = SimpleNamespace(analysis=analysis, effects=found)
+    closed: Any = SimpleNamespace(analysis=analysis, effect_names=names)
     why = stand_ins(closed)
     assert (why is not None) == said
 
@@ -41,12 +37,12 @@ def test_the_loop_has_no_green_light_beside_that(monkeypatch: pytest.MonkeyPatch
     names = ("coulomb_friction", "drag")
     closed: Any = SimpleNamespace(
         analysis=SimpleNamespace(model=SimpleNamespace(held=True), sampled=True),
-        effects=tuple(SimpleNamespace(name=name, family="nonlinear") for name in names),
+        effect_names=names,
         force=None,
         verdict="explained",
     )
     monkeypatch.setattr(lights, "misfit_is_clear", lambda _: False)
     result: Any = SimpleNamespace(closed=closed)
     assert lights._loop(result).state == "doubt"
-    closed.effects = closed.effects[:1]
+    closed.effect_names = names[:1]
     assert lights._loop(result).state == "good"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
@@ -17,6 +18,7 @@ from bayeshaptic.effects.linear import (
     transmission_loss,
 )
 from bayeshaptic.effects.nonlinear import actuator, drag, friction, gravity, springs
+from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
 from bayeshaptic.effects.registry import register, registered
 from bayeshaptic.errors import InputError
 
@@ -64,3 +66,12 @@ def effect_class(name: str) -> Any:
     if name not in known:
         raise InputError(f"no effect {name!r}; there are {', '.join(known)}.")
     return known[name]
+
+
+def force_laws(names: Iterable[str]) -> list[type[NonlinearEffect]]:
+    """Those of some names that are laws of a force.
+
+    What ripples along the way is found without a law, and has a name of its own.
+    """
+    laws = {kind.name: kind for kind in effects("nonlinear")}
+    return [laws[name] for name in names if name in laws]

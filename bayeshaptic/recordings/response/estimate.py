@@ -65,14 +65,14 @@ def estimate_etfe(
     _check(recording, band_hz)
     if minimum_lines is not None and minimum_lines < 10:
         raise InputError(f"windows of {minimum_lines} lines are too narrow; use at least 10")
-    found = None
+    found = mended = None
     if recording.reference is None:
         # In the mean over the periods nothing tells them from the motion any more.
         mended = without_lone(recording)
         found = estimate_periodic(mended, band_hz, fewest_tones)
     spectra: PeriodicSpectra | RandomSpectra
-    spectra, points, notices = found or estimate_random(recording, band_hz, minimum_lines)
-    if found is not None:
+    spectra, points, notices = found or estimate_random(recording, band_hz, minimum_lines, mended)
+    if found and mended:
         notices += _of_lone(recording, mended)
         recording = mended
     period_lines = spectra.lines if found is not None else None

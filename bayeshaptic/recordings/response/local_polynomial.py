@@ -9,6 +9,7 @@ Wiley, 2012, chapter 7.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from typing import Any
 
 import numpy as np
@@ -82,11 +83,12 @@ def window_edges(
         by the last window.
     """
     edges = [0]
+    far, near = 10**decades, 10**STILL_NARROW
     while (start := edges[-1]) + minimum_lines <= len(frequency):
         low = frequency[start]
-        wide, narrow = np.searchsorted(frequency, low * 10 ** np.array([decades, STILL_NARROW]))
-        least = max(minimum_lines, min(ENOUGH_LINES, int(narrow) - start))
-        edges.append(max(start + least, int(wide)))
+        narrow = bisect_left(frequency, low * near) - start
+        least = max(minimum_lines, min(ENOUGH_LINES, narrow))
+        edges.append(max(start + least, bisect_left(frequency, low * far)))
     if len(edges) > 2 and edges[-1] > len(frequency):
         edges.pop()
     if len(edges) > 1:

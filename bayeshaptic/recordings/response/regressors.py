@@ -48,8 +48,9 @@ class Regressors:
 
     def response(self, block: Block) -> NDArray[Any]:
         """What a coefficient of one at each node makes of the force, shape (W, w, 3)."""
-        at_nodes = self.at_nodes[block.window, None, :]
-        return np.asarray(self.at_lines[block.line, None] * block.weights / at_nodes)
+        weights = block.weights * (1 / self.at_nodes[block.window, None, :])
+        weights *= self.at_lines[block.line, None]
+        return weights
 
     def known(self, block: Block) -> list[NDArray[Any]]:
         """The inputs, shape (W, w, 1) each: none in the padding, which has no force either."""

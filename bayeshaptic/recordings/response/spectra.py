@@ -142,6 +142,21 @@ class RandomSpectra:
         lines = np.diff(self.edges) - float(LEAKAGE_TERMS)
         return lines if self.ringing_hz is None else lines - 2.0 * ~np.isnan(self.ringing_hz)
 
+    def lowest(self, count: int) -> RandomSpectra:
+        """Its lowest windows alone."""
+        lines = slice(self.edges[count])
+
+        return RandomSpectra(
+            self.frequency_hz[lines],
+            self.force[lines],
+            self.position[lines],
+            self.edges[: count + 1],
+            self.floor[:count],
+            self.reference,
+            None if self.noise_slope is None else self.noise_slope[:count],
+            None if self.ringing_hz is None else self.ringing_hz[:count],
+        )
+
     def free(
         self, window: slice, response: bool
     ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
@@ -188,14 +203,14 @@ class RandomSpectra:
         target = np.zeros((count, k), dtype=complex)
         scatter = np.empty(count)
         for block in self.blocks:
+            # The position goes along as a last column: what is left of it is the last number.
             moved = [block.force[..., None] * columns.response(block), *columns.known(block)]
-            column = project_out(block.leakage, np.concatenate(moved, axis=-1))
-            q, triangle = np.linalg.qr(column)
-            z = np.einsum("wlk,wl->wk", q.conj(), block.position)
-            rest = block.position - np.einsum("wlk,wk->wl", q, z)
-            rows = z.shape[1]
-            design[block.window, :rows], target[block.window, :rows] = triangle, z
-            scatter[block.window] = np.sum(np.abs(rest) ** 2, axis=1)
+            both = np.concatenate([*moved, block.position[..., None]], axis=-1)
+            triangle = np.asarray(np.linalg.qr(project_out(block.leakage, both), mode="r"))
+            rows = min(triangle.shape[1], k)
+            design[block.window, :rows] = triangle[:, :rows, :k]
+            target[block.window, :rows] = triangle[:, :rows, k]
+            scatter[block.window] = np.sum(np.abs(triangle[:, k:, k]) ** 2, axis=1)
         return Windows(
             frequency_hz=self.nodes_hz,
             design=design,
@@ -207,7 +222,12 @@ class RandomSpectra:
 
 def project_out(basis: NDArray[Any], columns: NDArray[Any]) -> NDArray[Any]:
     """What is left of the columns (..., w, c) outside the span of the basis (..., w, b)."""
-    return columns - basis @ (np.swapaxes(basis.conj(), -1, -2) @ columns)
+    if np.iscomplexobj(columns) and not np.iscomplexobj(basis):
+        # Products with a real basis cost half as much by parts; made complex, it would be copied.
+        parts = np.ascontiguousarray(columns).view(columns.real.dtype)
+        return np.asarray(project_out(basis, parts).view(columns.dtype))
+    inside = basis @ (np.swapaxes(basis.conj(), -1, -2) @ columns)
+    return np.asarray(np.subtract(columns, inside, out=inside))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.numerics.triangular import back_substituted
 from bayeshaptic.recordings.response.local_polynomial import NODES
 from bayeshaptic.recordings.response.windows import Windows
 
@@ -111,8 +112,9 @@ def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> Loc
     denominator = np.concatenate([np.ones((count, 1)), np.zeros((count, 2))], axis=1) + 0j
     for _ in range(rounds):
         weight = 1 / (sd * np.abs(np.einsum("wij,wj->wi", powers, denominator)))
-        weighted = np.linalg.pinv(columns * weight[..., None], rcond=1e-12)
-        coefficients = (weighted @ (ratio * weight)[..., None])[..., 0]
+        both = np.concatenate([columns, ratio[..., None]], axis=-1) * weight[..., None]
+        triangle = np.asarray(np.linalg.qr(both, mode="r"))
+        coefficients = back_substituted(triangle[:, :5, :5], triangle[:, :5, 5])
         denominator[:, 1:] = coefficients[:, 3:]
     half = (windows.frequency_hz[:, 2] - centre) / NODES[2]
     edges = ((centre + half)[:-1] + (centre - half)[1:]) / 2

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 Reference = Callable[[NDArray[Any]], NDArray[Any]]
@@ -73,3 +74,24 @@ class Windows:
             self.lines[chosen],
             None if self.noise is None else self.noise[chosen],
         )
+
+    def after(self, others: Windows) -> Windows:
+        """With others in the place of as many of the lowest."""
+        count = len(others.lines)
+        return self._joined(others, lambda own, other: np.concatenate([other, own[count:]]))
+
+    def where(self, chosen: NDArray[Any], others: Windows) -> Windows:
+        """Those chosen by a mask, shape (W,), and in the place of each of the rest another."""
+
+        def either(own: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
+            mask = chosen.reshape(-1, *[1] * (own.ndim - 1))
+            return np.where(mask, own, other)
+
+        return self._joined(others, either)
+
+    def _joined(
+        self, others: Windows, join: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]]
+    ) -> Windows:
+        names = ("frequency_hz", "design", "target", "scatter", "lines")
+        found = (join(getattr(self, name), getattr(others, name)) for name in names)
+        return Windows(*found)

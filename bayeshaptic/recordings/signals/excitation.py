@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 # Excited lines lie at most 50 dB below the strongest.
 EXCITED = 1e-5
@@ -104,7 +105,7 @@ def _shifted(signal: NDArray[Any], period: int) -> bool:
 def _candidates(centred: NDArray[Any], most: int = 200) -> NDArray[np.int64]:
     """Lags, ascending, where the autocorrelation peaks; at most half of the record."""
     samples = len(centred)
-    size = 2 ** int(np.ceil(np.log2(2 * samples)))
+    size = next_fast_len(2 * samples, real=True)
     spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
     lags = np.arange(2, samples // 2 + 1)
     energy = np.concatenate([[0.0], np.cumsum(centred**2)])

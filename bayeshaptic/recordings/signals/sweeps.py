@@ -46,8 +46,8 @@ def moves_until(recording: Recording) -> float | None:
     the square of the frequency, and that of a free device by less than a count is rounded away: it
     seems to rest, or to answer less than it does.
     """
-    step = increment_unit(recording.position)
-    if step is None or not is_sweep(recording.force):
+    step = increment_unit(recording.position) if is_sweep(recording.force) else None
+    if step is None:
         return None
     length = max(round(_STRETCH_S / recording.period_s), _FEWEST)
     stretches = recording.samples // length

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayeshaptic.effects.library import effect_class
-from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
+from bayeshaptic.effects.library import force_laws
 from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.checks.sufficiency import MOST_IDLE, share_at_rest
 
@@ -25,9 +24,7 @@ def held_still(closed: Closed) -> str | None:
     recording = analysis.recording
     if not (analysis.etfe.direct and analysis.model.held) or recording is None:
         return None
-    forces = (effect.name for effect in closed.effects if effect.family == "nonlinear")
-    kinds = (effect_class(name) for name in forces)
-    if not any(issubclass(kind, NonlinearEffect) and kind.sticks for kind in kinds):
+    if not any(kind.sticks for kind in force_laws(closed.effect_names)):
         return None
     still = share_at_rest(recording)
     if still <= MOST_IDLE:

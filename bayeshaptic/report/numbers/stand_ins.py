@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayeshaptic.effects.library import effect_class
+from bayeshaptic.effects.library import force_laws
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import LOAD_VELOCITY, VELOCITY
 
@@ -22,8 +22,7 @@ def stand_ins(closed: Closed) -> str | None:
     """
     if not closed.analysis.model.held:
         return None
-    kinds = [effect_class(one.name) for one in closed.effects if one.family == "nonlinear"]
-    if sum(map(_over_the_velocity, kinds)) < 2:
+    if sum(map(_over_the_velocity, force_laws(closed.effect_names))) < 2:
         return None
     return (
         "two forces that go with the velocity were found on a device that somebody holds: others "
@@ -31,7 +30,7 @@ def stand_ins(closed: Closed) -> str | None:
     )
 
 
-def _over_the_velocity(kind: type) -> bool:
-    if not issubclass(kind, NonlinearEffect) or issubclass(kind, CommandEffect):
+def _over_the_velocity(kind: type[NonlinearEffect]) -> bool:
+    if issubclass(kind, CommandEffect):
         return False
     return not {VELOCITY, LOAD_VELOCITY}.isdisjoint(kind.over)

@@ -13,28 +13,21 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band, tells_until
 from bayeshaptic.recordings.response.estimators.direct import DirectSpectra
 from bayeshaptic.recordings.response.estimators.instrument import STRONG, InstrumentSpectra
+from bayeshaptic.recordings.response.estimators.lines import LOW_END_WINDOWS, Lines
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.estimators.ringing import ringing_poles
 from bayeshaptic.recordings.response.local_polynomial import (
     ENOUGH_LINES,
     default_minimum_lines,
-    window_edges,
 )
 from bayeshaptic.recordings.response.points import Points
-from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
-from bayeshaptic.recordings.response.window_reference import (
-    LocalRational,
-    fit_local_rational,
-    unit_mass,
-)
+from bayeshaptic.recordings.response.spectra import RandomSpectra
+from bayeshaptic.recordings.response.window_reference import LocalRational, fit_local_rational
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.sweeps import FEWEST_COUNTS, moves_until
 
-FEWEST_WINDOWS = 8
-# The lowest window then spans a factor 2.14: for 30 s and 24 lines, 0.7 to 1.5 Hz.
-LOW_END_WINDOWS = 0.875
 # Slower than this a hand wanders more than it answers; the paper's lowest frequency too.
 LOWEST_HZ = 0.3
 # Of the sampling rate: above, a command that is held moves next to nothing.
@@ -45,12 +38,13 @@ FEWEST_STRONG = 16
 BETTER = 10.0
 # Share of samples that were cut off, from which that may be why nothing follows the force.
 _MUCH_CUT_OFF = 0.05
-# What to advise: 12 lines are then 12 Hz, and limits below 20 Hz are common.
-SHORTEST_S = 1.0
 
 
 def estimate_random(
-    recording: Recording, band_hz: tuple[float, float] | None, minimum_lines: int | None
+    recording: Recording,
+    band_hz: tuple[float, float] | None,
+    minimum_lines: int | None,
+    mended: Recording | None = None,
 ) -> tuple[RandomSpectra, Points, tuple[Notice, ...]]:
     """Spectra, and what a person sees, of a recording with random excitation.
 
@@ -60,22 +54,24 @@ def estimate_random(
     band_hz : (low, high) or None
         Chosen from the data when None.
     minimum_lines : int or None
+    mended : Recording, optional
+        Without its wild samples, where these have been looked for.
 
     Raises
     ------
     InputError
-        When there are too few lines for `FEWEST_WINDOWS` windows, or no response.
+        When there are too few lines for eight windows, or no response.
     """
     minimum = minimum_lines or default_minimum_lines(recording.duration_s)
     notice: Notice | None
     if recording.reference is not None:
         spectra, notice = _through_reference(recording, band_hz, minimum)
     elif band_hz is None:
-        spectra, notice = _in_chosen_band(recording, minimum)
+        spectra, notice = _in_chosen_band(recording, minimum, mended or without_lone(recording))
     else:
         spectra, notice = _in_given_band(recording, band_hz, minimum)
-    spectra = _with_reference(spectra)
-    return spectra, points(spectra.windows()), (notice,) if notice else ()
+    spectra, windows = _with_reference(spectra)
+    return spectra, points(windows), (notice,) if notice else ()
 
 
 def estimate_direct(recording: Recording) -> tuple[DirectSpectra, Points]:
@@ -92,8 +88,9 @@ def estimate_direct(recording: Recording) -> tuple[DirectSpectra, Points]:
         When there are too few lines.
     """
     nyquist = 0.5 / recording.period_s
-    plain = _spectra(recording, (0.5 / recording.duration_s, nyquist), ENOUGH_LINES)
-    plain = replace(plain, floor=_rounding(recording.position) ** 2 * np.ones(len(plain.floor)))
+    lines = Lines.of(recording)
+    plain = lines.cut((0.5 / recording.duration_s, nyquist), ENOUGH_LINES)
+    plain = replace(plain, floor=lines.rounding**2 * np.ones(len(plain.floor)))
     plain = replace(plain, reference=_local_reference(plain)[0])
     # Where a hand's own motion falls steeply within a window, lines that weigh alike do not add up.
     plain = replace(plain, noise_slope=noise_slopes(plain))
@@ -121,27 +118,31 @@ def points(windows: Windows) -> Points:
     )
 
 
-def _in_chosen_band(recording: Recording, minimum: int) -> tuple[RandomSpectra, Notice]:
+def _in_chosen_band(
+    recording: Recording, minimum: int, mended: Recording
+) -> tuple[RandomSpectra, Notice]:
     widest = max(LOWEST_HZ, LOW_END_WINDOWS * minimum / recording.duration_s)
     # A wild sample is noise at all frequencies, until the loop mends it, in this band.
-    seen = without_lone(recording)
-    everything = _spectra(seen, (widest, 0.5 / recording.period_s), minimum)
+    lines = Lines.of(mended)
+    everything = lines.cut((widest, 0.5 / recording.period_s), minimum)
     try:
         low, high = choose_band(everything, recording.name)
     except InputError as error:
         raise _cut_off(recording) or error from None
     why, drives = "the force has power and the position answers it", "the force drives"
-    until = moves_until(seen)
+    until = moves_until(mended)
     if until is not None and low < until < high:
         high = until
         why = f"the sweep moves the device by {FEWEST_COUNTS} counts of its encoder or more"
         drives = f"the force moves the device by {FEWEST_COUNTS} counts of its encoder from"
-    until = tells_until(seen)
+    until = tells_until(mended)
     if low < until < high:
         high = until
         why += ", and what is between the samples of a velocity does not hide the loop"
     text = f"Band {low:.3g} to {high:.4g} Hz, chosen where {why}."
-    return _spectra(recording, (low, high), minimum, drives), Notice("note", "band", text)
+    if mended is not recording:
+        lines = Lines.of(recording)
+    return lines.cut((low, high), minimum, drives), Notice("note", "band", text)
 
 
 def _through_reference(
@@ -150,7 +151,8 @@ def _through_reference(
     """With the reference as instrument, between the lowest and the highest window that it moves."""
     lowest = max(LOWEST_HZ, LOW_END_WINDOWS * minimum / recording.duration_s)
     everything = band_hz or (lowest, HIGHEST_THROUGH_REFERENCE / recording.period_s)
-    spectra = _with_instrument(_spectra(recording, everything, minimum), recording)
+    lines = Lines.of(recording)
+    spectra = _with_instrument(lines.cut(everything, minimum), recording)
     strong = np.flatnonzero(spectra.strength > STRONG)
     if len(strong) < FEWEST_STRONG:
         raise InputError(
@@ -164,7 +166,7 @@ def _through_reference(
         f"Band {low:.3g} to {high:.4g} Hz, chosen where the reference moves the force: in "
         f"{len(strong)} of {len(spectra.strength)} windows."
     )
-    spectra = _with_instrument(_spectra(recording, (low, high), minimum), recording)
+    spectra = _with_instrument(lines.cut((low, high), minimum), recording)
     return spectra, Notice("note", "band", text)
 
 
@@ -196,7 +198,8 @@ def _in_given_band(
     recording: Recording, band_hz: tuple[float, float], minimum: int
 ) -> tuple[RandomSpectra, Notice | None]:
     """Without windows at the ends where there is no force."""
-    spectra = _spectra(recording, band_hz, minimum)
+    lines = Lines.of(recording)
+    spectra = lines.cut(band_hz, minimum)
     driven = np.flatnonzero(spectra.force_power > NO_POWER * np.var(recording.force))
     if len(driven) == len(spectra.force_power):
         return spectra, None
@@ -206,89 +209,37 @@ def _in_given_band(
     first, last = spectra.edges[driven[0]], spectra.edges[driven[-1] + 1] - 1
     low, high = (float(spectra.frequency_hz[line]) for line in (first, last))
     text = f"The force has no power outside {low:.3g} to {high:.4g} Hz ({asked})."
-    return _spectra(recording, (low, high), minimum), Notice("warning", "band", text)
+    return lines.cut((low, high), minimum), Notice("warning", "band", text)
 
 
-def _spectra(
-    recording: Recording,
-    band_hz: tuple[float, float],
-    minimum: int,
-    what: str = "the band is",
-) -> RandomSpectra:
-    samples = recording.samples
-    frequency = np.fft.rfftfreq(samples, recording.period_s)
-    # The last line of an even record, at the Nyquist frequency, is real: not one like the others.
-    usable = (samples - 1) // 2
-    first, last = np.searchsorted(frequency, np.array(band_hz) * (1 + np.array([-1e-9, 1e-9])))
-    lines = slice(max(first, 1), min(last, usable + 1))
-    # Eight windows in a narrow band, too.
-    decades = min(1 / 80, 0.99 * np.log10(band_hz[1] / band_hz[0]) / FEWEST_WINDOWS)
-    edges = window_edges(frequency[lines], minimum, decades)
-    if len(edges) <= FEWEST_WINDOWS:
-        count = len(frequency[lines])
-        raise InputError(_too_short(recording, band_hz, minimum, count, what))
-    position = _detrended(recording.position)
-    scale = 1 / np.sqrt(samples)
-    found = np.fft.rfft(position)[lines] * scale
-    power = np.add.reduceat(np.abs(found) ** 2, edges[:-1]) / np.diff(edges)
-    return RandomSpectra(
-        frequency_hz=frequency[lines],
-        force=np.fft.rfft(recording.force - recording.force.mean())[lines] * scale,
-        position=found,
-        edges=edges,
-        floor=_rounding(recording.position) ** 2 + REPEATS_TO**2 * power,
-        reference=unit_mass,
-    )
-
-
-def _rounding(position: NDArray[Any]) -> float:
-    return float(np.finfo(float).eps * np.max(np.abs(position)))
-
-
-def _too_short(
-    recording: Recording, band_hz: tuple[float, float], minimum: int, lines: int, what: str
-) -> str:
-    """What to say when the band holds too few lines."""
-    needed, (low, high) = FEWEST_WINDOWS * minimum, band_hz
-    where = f"{recording.name}: {recording.samples} samples ({recording.duration_s:.3g} s)"
-    if lines and high < 0.5 / recording.period_s:
-        return (
-            f"{where} are too few: {what} {low:.4g} to {high:.4g} Hz, {lines} lines of the "
-            f"spectrum, and {needed} are needed; record {needed / (high - low):.3g} s, or use a "
-            f"band that is {needed / recording.duration_s:.3g} Hz wide"
-        )
-    seconds = max((FEWEST_WINDOWS + LOW_END_WINDOWS) * minimum / high, SHORTEST_S)
-    return f"{where} are too few for a frequency response; record at least {seconds:.2g} s"
-
-
-def _with_reference(spectra: RandomSpectra) -> RandomSpectra:
+def _with_reference(spectra: RandomSpectra) -> tuple[RandomSpectra, Windows]:
     """With a local rational reference where it explains a window better than a unit mass.
 
-    And with the poles of modes that ring on, and the slope of the noise around it.
+    And with the poles of modes that ring on, and the slope of the noise around it; and the windows.
     """
-    rational, curved, scatter = _local_reference(spectra)
+    rational, curved, windows = _local_reference(spectra)
     if isinstance(spectra, InstrumentSpectra):
         spectra = replace(spectra, reference=rational)
-        return replace(spectra, noise_slope=noise_slopes(spectra.regressed()))
-    poles = ringing_poles(spectra, curved, scatter)
+        spectra = replace(spectra, noise_slope=noise_slopes(spectra.regressed()))
+        return spectra, spectra.windows()
+    poles = ringing_poles(spectra, curved, windows.scatter)
     if poles is not None:
         rational = rational.with_poles(poles)
     spectra = replace(spectra, reference=rational, ringing_hz=poles)
-    return replace(spectra, noise_slope=noise_slopes(spectra))
+    slopes = noise_slopes(spectra)
+    spectra = replace(spectra, noise_slope=slopes)
+    if poles is not None:
+        return spectra, spectra.windows()
+    # Others are as they were: noise falls within the lowest windows.
+    sloped = int(np.max(np.flatnonzero(slopes), initial=-1)) + 1
+    return spectra, windows.after(spectra.lowest(sloped).windows()) if sloped else windows
 
 
-def _local_reference(spectra: RandomSpectra) -> tuple[LocalRational, Any, NDArray[Any]]:
-    """The reference, where it is rational, and the scatter of each window around it."""
+def _local_reference(spectra: RandomSpectra) -> tuple[LocalRational, NDArray[Any], Windows]:
+    """The reference, in which windows it is rational, and the windows with it."""
     plain = spectra.windows()
     rational = fit_local_rational(plain)
     fitted = spectra.windows(rational)
     gain = (plain.lines - 1) * np.log(plain.scatter / fitted.scatter)
     curved = gain > BETTER
-    return rational.where(curved), curved, np.where(curved, fitted.scatter, plain.scatter)
-
-
-def _detrended(values: NDArray[Any]) -> NDArray[Any]:
-    """Without the straight line of least squares: large offsets cost digits."""
-    time = np.arange(len(values)) - (len(values) - 1) / 2
-    centred = values - values.mean()
-    return centred - time * (time @ centred) / (time @ time)
+    return rational.where(curved), curved, plain.where(~curved, fitted)

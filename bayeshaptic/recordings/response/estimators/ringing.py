@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.numerics.triangular import back_substituted
 from bayeshaptic.recordings.response.local_polynomial import NODES
 from bayeshaptic.recordings.response.regressors import Block, regressors
 from bayeshaptic.recordings.response.spectra import RandomSpectra, project_out
@@ -59,9 +60,12 @@ def ringing_poles(
     """
     tried = _or_beside(curved) & (np.diff(spectra.edges) >= FEWEST_LINES)
     poles_hz, left = np.full(len(tried), np.nan, complex), np.full(len(tried), np.inf)
+    floor = spectra.freedom * spectra.floor
     for block in _blocks(spectra, tried):
-        poles_hz[block.window], left[block.window] = _poles(spectra, block)
-    left += spectra.freedom * spectra.floor
+        own = block.window
+        promising = scatter[own] * np.exp(-RINGS / 2 / (spectra.freedom[own] - 1)) - floor[own]
+        poles_hz[own], left[own] = _poles(spectra, block, promising)
+    left += floor
 
     def explains(more: NDArray[Any], enough: float) -> NDArray[Any]:
         return (spectra.freedom - 1) * (np.log(more) - np.log(left)) > enough
@@ -102,8 +106,13 @@ def _left_by_tones(spectra: RandomSpectra, block: Block, poles_hz: NDArray[Any])
     return np.asarray(rest + spectra.freedom[block.window] * spectra.floor[block.window])
 
 
-def _poles(spectra: RandomSpectra, block: Block) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Poles that leave least in the windows of a block, Hz, and what they leave; shape (R,)."""
+def _poles(
+    spectra: RandomSpectra, block: Block, promising: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Poles that leave least in the windows of a block, Hz, and what they leave; shape (R,).
+
+    Looked for half as long where none leaves less than what would be `promising`, shape (R,).
+    """
     nodes = spectra.nodes_hz[block.window]
     centre = nodes[:, 1:2]
     half = (nodes[:, 2:] - centre) / NODES[2]
@@ -125,7 +134,9 @@ def _poles(spectra: RandomSpectra, block: Block) -> tuple[NDArray[Any], NDArray[
         pole = _bounded(_quotient(known, moved), line)
         weight = inside / np.abs(x - pole)
     best, least = pole, np.full(len(pole), np.inf)
-    for _ in range(_ROUNDS):
+    for number in range(_ROUNDS):
+        if number == _ROUNDS // 2 and not np.any(least < promising):
+            break
         peak = inside / (x - pole)
         columns = np.concatenate([peak[..., None], forced * peak[..., None]], -1)
         q, triangle = np.linalg.qr(project_out(block.leakage, columns))
@@ -135,8 +146,8 @@ def _poles(spectra: RandomSpectra, block: Block) -> tuple[NDArray[Any], NDArray[
         better = scatter < least
         best = np.where(better[:, None], pole, best)
         least = np.where(better, scatter, least)
-        coefficients = np.linalg.pinv(triangle, rcond=1e-12) @ z
-        slope = (columns @ coefficients) * peak[..., None]
+        coefficients = back_substituted(triangle, z[..., 0])
+        slope = (columns @ coefficients[..., None]) * peak[..., None]
         slope = project_out(q, project_out(block.leakage, slope))
         pole = _bounded(pole + _quotient(slope, rest), line)
     return (centre + half * best)[:, 0], least
