@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials import nonlinear as tried
+from bayeshaptic.diagnosis.trials.forces import called_for as tried
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.inference.least_squares import least_squares

@@ -15,8 +15,8 @@ from scipy.special import ndtr
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import FIT, State, Trial, log_likelihoods, share, weights
 from bayeshaptic.diagnosis.trials import beside
-from bayeshaptic.diagnosis.trials import nonlinear as tried
 from bayeshaptic.diagnosis.trials.beside import beside_tests
+from bayeshaptic.diagnosis.trials.forces import called_for as tried
 from bayeshaptic.diagnosis.trials.forces import search, slopes
 from bayeshaptic.diagnosis.trials.forces.along import Along
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
@@ -24,7 +24,8 @@ from bayeshaptic.diagnosis.trials.forces.search import _damped, _scan
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
 from bayeshaptic.diagnosis.trials.forces.slopes import Form, Reach, linearised, nudges_of, spread
 from bayeshaptic.diagnosis.trials.linear import linear_trials
-from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials, reconsidered
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
+from bayeshaptic.diagnosis.trials.other_laws import reconsidered
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.linear.attached_mass import SecondMode
@@ -354,16 +355,15 @@ def test_only_what_stands_out_to_first_order_is_scanned(monkeypatch: pytest.Monk
     ("score", "gain", "fitted"), [(4.0, 9, False), (4.0, 11, True), (7, 9, True)]
 )
 def test_what_hardly_stands_out_is_fitted_where_some_of_it_is_better_than_none(
-    monkeypatch: pytest.MonkeyPatch, score: float, gain: float, fitted: bool
+    score: float, gain: float, fitted: bool
 ) -> None:
-    monkeypatch.setattr(search, "fit_force", lambda bench, point: point)
     law: Any = SimpleNamespace(title="a law")
     hint: Any = SimpleNamespace(effect=law, strength=1.0, score=score)
     there: Any = SimpleNamespace(gain_fit=gain)
     nothing: Any = SimpleNamespace(gain_fit=10.0)
     bench: Any = SimpleNamespace(stays=lambda point: True)
     ways = [hint], lambda hint, part: there, nothing, [[law]]
-    found = search._followed(bench, *ways, Meter(), None)
+    found = search._followed(bench, *ways, lambda _, point: point, Meter(), None)
     assert found == ([there] if fitted else [])
 
 

@@ -55,7 +55,15 @@ def choose(
     close = [trial for trial in best if ties(best[0], trial)]
     if best[0].accepted.family == "linear":
         return max(close, key=worth)
-    return min(close, key=lambda trial: (trial.size, -trial.score))
+    return min(close, key=simplicity)
+
+
+def simplicity(trial: Trial) -> tuple[int, float]:
+    """Which of two laws that do as well is taken: the least.
+
+    Of as many numbers the one that is likelier on all windows, fitted to them or not.
+    """
+    return trial.size, -trial.gain_fit - trial.gain_choose
 
 
 def possible(trials: list[Trial]) -> list[Trial]:

@@ -224,6 +224,7 @@ def log_likelihoods(model: Model, windows: Windows, theta: Floats) -> Floats:
     power, freedom, c = _noise_with(model, windows, theta)
     nodes = windows.target.shape[1]
     pointwise = -freedom * np.log(windows.scatter + power / c) - nodes * np.log(c)
+    pointwise += windows.offset
     return np.array([pointwise[share(windows, part)].sum() for part in (FIT, CHOOSE)])
 
 

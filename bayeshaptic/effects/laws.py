@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import Place
+from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import Shape, Usual
 
 
@@ -33,3 +34,10 @@ def fitted(place: Place, usual: Usual) -> list[tuple[str, Shape]]:
 def corrections(usual: Usual) -> list[Shape]:
     """What laws add to simpler ones of the same thing, at the motor."""
     return [shape for kind in effects("nonlinear") for shape in kind.corrections(usual)]
+
+
+def simplest(effect: NonlinearEffect) -> NonlinearEffect | None:
+    """The simplest law of an effect's strength, at its place, where it contains one."""
+    kinds = (kind for kind in effects("nonlinear") if kind.strength == effect.strength)
+    laws = (kind(effect.place) for kind in kinds if not kind.dimensions)
+    return next((law for law in laws if effect.contains(law)), None)

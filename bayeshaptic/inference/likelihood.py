@@ -46,7 +46,7 @@ class Likelihood:
         spend(_CALL + len(theta) * self.windows.frequency_hz.size)
         value = np.empty(len(theta))
         log_likelihood(form, self._arrays, value)
-        return value
+        return value + np.sum(self.windows.offset)
 
     def pointwise(self, theta: Floats) -> Floats:
         """Log likelihood of every window, up to a constant of the data; shape (B, W).
@@ -55,7 +55,8 @@ class Likelihood:
         """
         left = self.deviations(theta).view(float)
         power = np.einsum("bwk,bwk->bw", left, left)
-        return -(self.windows.lines - 1) * np.log(self.windows.scatter + power)
+        left = np.log(self.windows.scatter + power)
+        return self.windows.offset - (self.windows.lines - 1) * left
 
     def deviations(self, theta: Floats) -> Complexes:
         """z - R g(theta): what the model leaves in every window, shape (B, W, r)."""

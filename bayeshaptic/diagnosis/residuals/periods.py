@@ -21,8 +21,12 @@ from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.response.local_polynomial import leakage_terms, window_edges
-from bayeshaptic.recordings.response.spectra import PeriodicSpectra, project_out
+from bayeshaptic.recordings.response.local_polynomial import (
+    leakage_terms,
+    project_out,
+    window_edges,
+)
+from bayeshaptic.recordings.response.spectra import PeriodicSpectra
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
 from bayeshaptic.types import Bools, Complexes, Floats, Ints

@@ -51,6 +51,11 @@ def slow_motion(motion: Floats, period_s: float, edge_hz: float) -> Floats:
     return np.asarray(sosfiltfilt(low, motion))
 
 
+def slow_share(frequency_hz: Floats, edge_hz: float) -> Floats:
+    """What `slow_motion` keeps at frequencies in Hz, any shape."""
+    return np.asarray(1 / (1 + (frequency_hz / edge_hz) ** (2 * HAND_ORDER)))
+
+
 def drifts(system: LinearSystem, samples: int, period_s: float) -> Floats:
     """Standing still, and what a constant force and a push do, shape (N, 3)."""
     steady = np.ones(samples)

@@ -14,8 +14,8 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.called_for import is_there
 from bayeshaptic.diagnosis.trials.forces.hints import hints
-from bayeshaptic.diagnosis.trials.nonlinear import is_there
 from bayeshaptic.effects.laws import BESIDE
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR

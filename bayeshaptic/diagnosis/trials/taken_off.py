@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bayeshaptic.diagnosis.state import Change
+from bayeshaptic.diagnosis.state import Accepted, Change
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import RandomSpectra
+from bayeshaptic.types import Floats
 
 
-def with_forces(etfe: Etfe, changes: Sequence[Change], sign: float = 1.0) -> Etfe:
-    """The measurement with what forces took off put back; with a sign of -1 once more without."""
+def with_forces(
+    etfe: Etfe, changes: Sequence[Change], sign: float = 1.0, louder: Floats | None = None
+) -> Etfe:
+    """The measurement with what forces took off put back; with a sign of -1 once more without.
+
+    `louder`, (W,), is how many times as far a hand moves it without those that are off.
+    """
     own, spectra = etfe.recording, etfe.spectra
     assert own is not None and isinstance(spectra, RandomSpectra)
     for change in changes:
@@ -25,4 +31,12 @@ def with_forces(etfe: Etfe, changes: Sequence[Change], sign: float = 1.0) -> Etf
             force=spectra.force + sign * change.force,
             position=spectra.position + sign * change.position,
         )
-    return replace(etfe, spectra=spectra, recording=own)
+    return replace(etfe, spectra=replace(spectra, louder=louder), recording=own)
+
+
+def put_back(etfe: Etfe, change: Change, rest: Sequence[Accepted]) -> Etfe:
+    """The measurement with what an effect took off put back, `rest` what has not been."""
+    spectra = etfe.spectra
+    assert isinstance(spectra, RandomSpectra)
+    louder = spectra.louder if any(one.acts for one in rest) else None
+    return with_forces(etfe, (change,), louder=louder)

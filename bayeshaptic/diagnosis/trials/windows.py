@@ -14,9 +14,10 @@ from bayeshaptic.diagnosis.state import Change, State, Trial, fit_part, log_like
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.diagnosis.trials.linear import Sight, first_sight, linear_trials
-from bayeshaptic.diagnosis.trials.nonlinear import found_anew, nonlinear_trials, reconsidered
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
+from bayeshaptic.diagnosis.trials.other_laws import found_anew, reconsidered
 from bayeshaptic.diagnosis.trials.ripples import ripple_trials
-from bayeshaptic.diagnosis.trials.taken_off import with_forces
+from bayeshaptic.diagnosis.trials.taken_off import put_back
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.numerics.spending import Meter
@@ -178,13 +179,13 @@ def _on_other_samples(trial: Trial) -> Trial:
 def _undone(state: State, index: int, change: Change) -> State:
     """The state without an effect."""
     model, etfe, theta = state.model, state.etfe, state.fit.theta
+    left = state.accepted[:index] + state.accepted[index + 1 :]
     if change.effect is not None:
         gone = {parameter.name for parameter in change.effect.parameters}
         theta = theta[[name not in gone for name in model.names]]
         model = model.without_effect(change.effect)
     else:
-        etfe = with_forces(etfe, (change,))
-    left = state.accepted[:index] + state.accepted[index + 1 :]
+        etfe = put_back(etfe, change, left)
     return State(etfe, least_squares(model, etfe, start=theta), left)
 
 

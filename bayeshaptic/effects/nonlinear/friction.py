@@ -98,6 +98,8 @@ class StribeckFriction(_DryFriction):
     over = (VELOCITY, LOAD_VELOCITY)
     dimensions = {"static_excess": "number", "stribeck_velocity": "velocity"}
     tuned = ("static_excess", "stribeck_velocity")
+    # Dry cast iron has some seven times the friction at rest, clean steel twice: no pair has more.
+    most = {"static_excess": 6.0}
     plain = {"static_excess": 0.0}
 
     @classmethod

@@ -88,6 +88,11 @@ class NonlinearEffect(ABC):
         """Whether one of the raised variables or tests is this effect's."""
         return bool(raised & set(self.over))
 
+    @property
+    def grounded(self) -> bool:
+        """Whether it acts between a mass and the ground, and so in the motion that a hand makes."""
+        return self.place.second is None
+
     def contains(self, other: NonlinearEffect) -> bool:
         """Whether another is the simplest law of its strength, and it is that with some shape."""
         return bool(self.plain) and not other.shape and other.strength == self.strength
@@ -126,6 +131,11 @@ class CommandEffect(NonlinearEffect):
 
     It adds no force to the mechanism: it takes some of the commanded one away.
     """
+
+    @property
+    def grounded(self) -> bool:
+        """It acts on the command alone."""
+        return False
 
     @abstractmethod
     def lost(self, strength: float, command: Floats) -> Floats:

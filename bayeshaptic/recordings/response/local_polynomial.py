@@ -56,6 +56,16 @@ def interpolation(position: NDArray[Any]) -> NDArray[Any]:
     return np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2], axis=-1)
 
 
+def project_out(basis: NDArray[Any], columns: NDArray[Any]) -> NDArray[Any]:
+    """What is left of the columns (..., w, c) outside the span of the basis (..., w, b)."""
+    if np.iscomplexobj(columns) and not np.iscomplexobj(basis):
+        # Products with a real basis cost half as much by parts; made complex, it would be copied.
+        parts = np.ascontiguousarray(columns).view(columns.real.dtype)
+        return np.asarray(project_out(basis, parts).view(columns.dtype))
+    inside = basis @ (np.swapaxes(basis.conj(), -1, -2) @ columns)
+    return np.asarray(np.subtract(columns, inside, out=inside))
+
+
 # Wide enough to lose little to leakage, and still narrow enough for a parabola if it is a
 # tenth of the frequency.
 ENOUGH_LINES, STILL_NARROW = 24, 1 / 25

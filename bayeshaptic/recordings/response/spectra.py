@@ -14,6 +14,7 @@ from bayeshaptic.recordings.response.local_polynomial import (
     NODES,
     interpolation,
     leakage_terms,
+    project_out,
 )
 from bayeshaptic.recordings.response.regressors import Block, regressors
 from bayeshaptic.recordings.response.windows import Reference, Windows
@@ -57,6 +58,8 @@ class RandomSpectra:
     ringing_hz : complex ndarray, shape (W,), or None
         The pole f + j a / 2 pi of a mode at f, its decay a, whose leakage a window shows; nan in
         the others, and None where it is in all of them (`estimators/ringing.py`).
+    louder : ndarray, shape (W,), or None
+        That of its `Windows`.
     """
 
     frequency_hz: NDArray[Any] = field(repr=False)
@@ -67,6 +70,7 @@ class RandomSpectra:
     reference: Reference = field(repr=False)
     noise_slope: NDArray[Any] | None = field(default=None, repr=False)
     ringing_hz: NDArray[Any] | None = field(default=None, repr=False)
+    louder: NDArray[Any] | None = field(default=None, repr=False)
 
     @property
     def lines(self) -> int:
@@ -155,6 +159,7 @@ class RandomSpectra:
             self.reference,
             None if self.noise_slope is None else self.noise_slope[:count],
             None if self.ringing_hz is None else self.ringing_hz[:count],
+            None if self.louder is None else self.louder[:count],
         )
 
     def free(
@@ -217,17 +222,8 @@ class RandomSpectra:
             target=target,
             scatter=scatter + self.freedom * self.floor,
             lines=self.freedom,
+            louder=self.louder,
         )
-
-
-def project_out(basis: NDArray[Any], columns: NDArray[Any]) -> NDArray[Any]:
-    """What is left of the columns (..., w, c) outside the span of the basis (..., w, b)."""
-    if np.iscomplexobj(columns) and not np.iscomplexobj(basis):
-        # Products with a real basis cost half as much by parts; made complex, it would be copied.
-        parts = np.ascontiguousarray(columns).view(columns.real.dtype)
-        return np.asarray(project_out(basis, parts).view(columns.dtype))
-    inside = basis @ (np.swapaxes(basis.conj(), -1, -2) @ columns)
-    return np.asarray(np.subtract(columns, inside, out=inside))
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,8 @@ class Windows:
         n: complex degrees of freedom of target and scatter together.
     noise : ndarray, shape (W,), or None
         Variance of a line's noise as a first fit leaves it; None: as the scatter tells.
+    louder : ndarray, shape (W,), or None
+        How many times as far a hand would move the device without the forces that were taken off.
     """
 
     frequency_hz: NDArray[Any]
@@ -58,6 +60,16 @@ class Windows:
     scatter: NDArray[Any]
     lines: NDArray[Any]
     noise: NDArray[Any] | None = None
+    louder: NDArray[Any] | None = None
+
+    @property
+    def offset(self) -> NDArray[Any] | float:
+        """What is due to `louder` in the log likelihood of each window, shape (W,), or 0.
+
+        What was measured is the motion with the forces in it, whatever they are taken for: its
+        density is that of the motion without them times the Jacobian of one over the other.
+        """
+        return 0.0 if self.louder is None else 2 * (self.lines - 1) * np.log(self.louder)
 
     @property
     def inputs(self) -> int:
@@ -73,6 +85,7 @@ class Windows:
             self.scatter[chosen],
             self.lines[chosen],
             None if self.noise is None else self.noise[chosen],
+            None if self.louder is None else self.louder[chosen],
         )
 
     def after(self, others: Windows) -> Windows:

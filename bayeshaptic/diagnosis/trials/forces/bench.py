@@ -17,6 +17,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.residuals.columns import line_transform
 from bayeshaptic.diagnosis.state import Change, State, fit_part, log_likelihoods
+from bayeshaptic.diagnosis.trials.forces.answer import Answer
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
 from bayeshaptic.diagnosis.trials.taken_off import with_forces
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, NonlinearEffect
@@ -165,9 +166,17 @@ class ForceBench:
             np.isfinite(self.simulation.added(point.forces, point.theta, point.motion)).all()
         )
 
-    def without(self, changes: Sequence[Change]) -> Etfe:
-        """The measurement without what forces do."""
-        return with_forces(self._etfe, changes, -1.0)
+    def without(self, changes: Sequence[Change], theta: Floats) -> Etfe:
+        """The measurement without what forces do beside linear parameters, shape (P,)."""
+        added, louder = answered(changes), None
+        if self.held and added is not None:
+            louder = self.answer(theta).louder(added, self._somewhere)
+        return with_forces(self._etfe, changes, -1.0, louder)
+
+    def answer(self, theta: Floats) -> Answer:
+        """How the answer of forces to a motion is read beside linear parameters, shape (P,)."""
+        system, spectra = self.model.system(theta), self._etfe.spectra
+        return Answer.of(system, self.frequency_hz, spectra.position, self.simulation.edge_hz)  # type: ignore[attr-defined]
 
     def changes(self, forces: tuple[Acting, ...], added: Floats) -> tuple[Change, ...]:
         """What each force takes off the recording, of the motions that they add, (F, N)."""
@@ -200,7 +209,7 @@ class ForceBench:
         if np.isnan(added).any():
             return None
         changes = self.changes(forces, added)
-        etfe = self.without(changes)
+        etfe = self.without(changes, theta)
         return changes, etfe, self.windows(etfe, theta)
 
     def _valued(self, forces: tuple[Acting, ...], theta: Floats, found: _Simulated | None) -> Point:
@@ -212,6 +221,12 @@ class ForceBench:
 
     def _likelihoods(self, theta: Floats, windows: Windows) -> Floats:
         return log_likelihoods(self.model, windows, theta)
+
+
+def answered(changes: Sequence[Change]) -> Complexes | None:
+    """What those that answer to a hand add to the position at the lines, (L,); None: none does."""
+    own = [c.position for c in changes if c.acting and c.acting.effect.grounded]
+    return np.asarray(sum(own)) if own else None
 
 
 def _motion(changes: Sequence[Change]) -> Floats:

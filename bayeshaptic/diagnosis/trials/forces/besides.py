@@ -19,7 +19,7 @@ import numpy as np
 from numpy.linalg import lstsq
 from scipy.fft import next_fast_len
 
-from bayeshaptic.diagnosis.residuals.unforced import HAND_ORDER, parts, slow_motion
+from bayeshaptic.diagnosis.residuals.unforced import parts, slow_motion, slow_share
 from bayeshaptic.diagnosis.trials.forces.at_rest import AtRest
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.types import Floats
@@ -92,13 +92,12 @@ class Hand:
         count = next_fast_len(len(motion), real=True)
         spectrum = np.fft.rfft(motion, count)
         far = 4.0  # edges, where a hundred-thousandth of the motion counts as slow
-        frequency_hz = np.fft.rfftfreq(count, self.period_s)[: len(spectrum)]
+        frequency_hz = np.asarray(np.fft.rfftfreq(count, self.period_s)[: len(spectrum)])
         frequency_hz = frequency_hz[frequency_hz < far * self.edge_hz]
         frequency_hz[0] = frequency_hz[1]  # where a hand only damps there is no response at rest
-        slow = 1 / (1 + (frequency_hz / self.edge_hz) ** (2 * HAND_ORDER))
         s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
         ratio = self.usual.continuous_response(s)[0] / self.response.continuous_response(s)[0]
-        spectrum[: len(s)] /= 1 + slow * (ratio - 1)
+        spectrum[: len(s)] /= 1 + slow_share(frequency_hz, self.edge_hz) * (ratio - 1)
         return np.fft.irfft(spectrum, count)[: len(motion)]
 
 

@@ -71,7 +71,7 @@ def _fit(bench: ForceBench, found: Point) -> Point:
     form, found = Form.of(found), _near(bench, found, found.forces, found.theta)
     first, before, best = form.logs(found), found, found
     reach, furthest = Reach(nudges_of(bench), np.ones(len(first))), 1.0
-    rounds = 60 if bench.before else 20  # ridges of two forces are long
+    rounds = 20 if len(first) == 1 else 60  # ridges of several numbers are long
     along: Along | None = None
     for _ in range(rounds):
         step, along = _joint_step(bench, form, best, form.logs(best) - first, reach, along)

@@ -52,7 +52,9 @@ def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
     return _scored(bench, bench.as_it_is(bench.before, theta, bench.known_motion), tried)
 
 
-def departures(bench: ForceBench, known: Point, effects: Sequence[NonlinearEffect]) -> list[Hint]:
+def departures(
+    bench: ForceBench, known: Point, effects: Sequence[NonlinearEffect], index: int = -1
+) -> list[Hint]:
     """What laws that contain that of a known force would be in its place, to first order.
 
     A hint's strength is the part of the way from the simple law to the effect's own shape.
@@ -64,12 +66,14 @@ def departures(bench: ForceBench, known: Point, effects: Sequence[NonlinearEffec
         Of the simple law, fitted.
     effects : sequence of NonlinearEffect
         At its place.
+    index : int
+        Which of the point's forces it is.
     """
-    *before, own = known.forces
-    tried = [
-        (effect, _FAINT, (*before, Acting(effect.departing(_FAINT), own.strength)))
-        for effect in effects
-    ]
+    tried = []
+    for effect in effects:
+        forces = list(known.forces)
+        forces[index] = Acting(effect.departing(_FAINT), forces[index].strength)
+        tried.append((effect, _FAINT, tuple(forces)))
     return _scored(bench, known, tried)
 
 
@@ -91,7 +95,9 @@ def _scored(
         with_it = simulation.added_near(acting, theta, near).sum(axis=0)
         if np.isfinite(with_it).all():
             usable.append(effect)
-            moved.append((with_it - own) / little)
+            # Where no force is known what a hand would do without one is left to the fit: with it
+            # other laws stand out where the model lacks something else, and each takes a fit.
+            moved.append(((with_it - own) / little, effect.grounded and bool(found.forces)))
     if not usable:
         return []
     residual, linear, forces, _ = slopes_of_all(bench, found, moved)

@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
 from bayeshaptic.diagnosis.trials.forces.hints import Hint, departures, hints
+from bayeshaptic.diagnosis.trials.forces.nested import fit_nested
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import (
     Acting,
@@ -107,8 +108,11 @@ def beside_others(
     laws: Sequence[Variants],
     meter: Meter,
     tick: Callable[[str], None] | None = None,
+    least: float = 0.0,
 ) -> list[Point]:
     """The best variant of each law beside the forces that the state has, where it stands out.
+
+    By the `least` of standard deviations that is given, too.
 
     A scan would be lost there in how roughly a motion that sticks goes with the linear parameters:
     where a force was worth 263 in log likelihood, the best of five strengths had -9.
@@ -119,9 +123,11 @@ def beside_others(
         force = Acting(hint.effect, part * hint.strength)
         return bench.point((*bench.before, force), theta, expected=bench.known_motion)
 
-    every = hints(bench, [effect for law in laws for effect in law])
+    every = [
+        h for h in hints(bench, [effect for law in laws for effect in law]) if h.score >= least
+    ]
     nothing = bench.point(bench.before, theta, expected=bench.known_motion) if every else None
-    return _followed(bench, every, start, nothing, laws, meter, tick)
+    return _followed(bench, every, start, nothing, laws, fit_nested, meter, tick)
 
 
 def containing(
@@ -146,7 +152,7 @@ def containing(
         return bench.point((*before, Acting(law, own.strength)), known.theta, expected=known.motion)
 
     every = departures(bench, known, [effect for law in laws for effect in law])
-    return _followed(bench, every, start, known, laws, meter, tick)
+    return _followed(bench, every, start, known, laws, fit_force, meter, tick)
 
 
 def _followed(
@@ -155,6 +161,7 @@ def _followed(
     start: Callable[[Hint, float], Point],
     nothing: Point | None,
     laws: Sequence[Variants],
+    fit: Callable[[ForceBench, Point], Point],
     meter: Meter,
     tick: Callable[[str], None] | None,
 ) -> list[Point]:
@@ -175,7 +182,7 @@ def _followed(
         point = max((start(best, part) for part in _PARTS), key=lambda point: point.gain_fit)
         least = -np.inf if nothing is None or best.score > _CLEARLY else nothing.gain_fit
         if point.gain_fit > least and meter.affords(best.effect.title):
-            found.append(fit_force(bench, point))
+            found.append(fit(bench, point))
     return [one for one in found if bench.stays(one)]
 
 

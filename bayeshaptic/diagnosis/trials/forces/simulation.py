@@ -6,7 +6,7 @@ encoder would miss half of the friction.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -77,7 +77,8 @@ class Simulation:
         return _between(self.recording.position)
 
     @cached_property
-    def _edge_hz(self) -> float:
+    def edge_hz(self) -> float:
+        """Up to where a hand's motion is read off the encoder."""
         return hand_edge_hz(self.recording.position, self.recording.period_s)
 
     @cached_property
@@ -88,7 +89,7 @@ class Simulation:
         """
         if not self.model.held:
             return None
-        rests = at_rest(self.recording, self.model.system(self.usual), self._edge_hz)
+        rests = at_rest(self.recording, self.model.system(self.usual), self.edge_hz)
         return None if rests is None else replace(self, rests=rests)
 
     @cached_property
@@ -169,9 +170,9 @@ class Simulation:
         What nothing known makes, the measured position less what the command does, and from a
         motion of the first kind to what each force that moves a mass adds.
         """
-        acting = [one for one in forces if not isinstance(one.effect, CommandEffect)]
+        acting = _moving(forces)
         order = sorted(range(len(acting)), key=lambda i: acting[i].effect.sticks)
-        places = tuple(dict.fromkeys(one.effect.place for one in acting))
+        places = _places(acting)
         laws = [one.effect.law(one.strength, self.model, theta) for one in acting]
         linear = self._linear(theta, self.command - self.lost(forces), places)
         left, mechanism = self._left(linear), self.model.system(theta).mechanism
@@ -199,7 +200,7 @@ class Simulation:
         if self.model.held:
             own, usual = self.model.system(theta), self.model.system(self.usual)
             kind = Hand if _against_ground(places) else HandAfar
-            return kind(self.recording.period_s, self._edge_hz, own, usual, self.rests)
+            return kind(self.recording.period_s, self.edge_hz, own, usual, self.rests)
         if not _against_ground(places):
             return Nothing()  # that a spring between the masses would know of
         kept, mean = self._usual_drifts.shape[1], float(self.recording.force.mean())
@@ -245,6 +246,15 @@ class Simulation:
             return 0.0
         values = dict(zip(self.model.names, theta.tolist(), strict=True))
         return _between(stretched(taken, self.recording.period_s, values))
+
+
+def _moving(forces: Sequence[Acting]) -> list[Acting]:
+    """Those that move a mass."""
+    return [one for one in forces if not isinstance(one.effect, CommandEffect)]
+
+
+def _places(forces: Sequence[Acting]) -> tuple[Place, ...]:
+    return tuple(dict.fromkeys(one.effect.place for one in forces))
 
 
 def _against_ground(places: tuple[Place, ...]) -> bool:

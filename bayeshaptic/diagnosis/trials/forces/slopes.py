@@ -6,15 +6,16 @@ linear parameters: its slopes, simulated, enter the likelihood as further inputs
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.state import Change, share, weights
 from bayeshaptic.diagnosis.trials.forces.along import Along, slopes_along
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point, answered
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
@@ -26,6 +27,7 @@ from bayeshaptic.types import Complexes, Floats
 NUDGE = 0.1  # relative, of strength and shape for the slopes
 _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
 _ALL = (0, 1, 2, 3)  # windows
+Further = tuple[Floats, bool]  # a motion, and whether a force against the ground makes it
 _SMOOTH = 1e-3  # share of these distances where a sticking mass's motion goes smoothly
 
 
@@ -38,14 +40,18 @@ class Form:
     """The largest logarithms, shape (J,)."""
     shape: NDArray[np.bool_]
     """Which of them are of a shape."""
+    grounded: NDArray[np.bool_]
+    """Which of them are of a force that acts against the ground."""
 
     @classmethod
     def of(cls, found: Point) -> Form:
-        bounds, shape = [], []
+        bounds, shape, grounded = [], [], []
         for effect in (one.effect for one in found.forces):
             bounds += [np.inf, *(effect.most.get(name, np.inf) for name in effect.tuned)]
             shape += [False, *(True for _ in effect.tuned)]
-        return cls(found.forces, np.log(bounds), np.array(shape, bool))
+            grounded += [effect.grounded] * (1 + len(effect.tuned))
+        numbers = np.array(shape, bool), np.array(grounded, bool)
+        return cls(found.forces, np.log(bounds), *numbers)
 
     def logs(self, found: Point) -> Floats:
         numbers = []
@@ -92,17 +98,17 @@ def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
 
 
 def slopes_of_all(
-    bench: ForceBench, found: Point, motions: list[Floats] | None = None
+    bench: ForceBench, found: Point, further: Sequence[Further] = ()
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """Residuals of all windows at fitted forces, and their slopes.
 
     Over the linear parameters that are free, over the logarithms of strengths and shapes, and last
-    over further `motions`; and which of the linear parameters are free.
+    over `further` motions; and which of the linear parameters are free.
     """
     form = Form.of(found)
     none = 0 * form.logs(found)
     reach = Reach(nudges_of(bench), _SMOOTH + none)
-    residuals, start, _ = linearised(bench, form, found, none, reach, _ALL, motions)
+    residuals, start, _ = linearised(bench, form, found, none, reach, _ALL, further)
     here, size = residuals(start), bench.model.size
     slopes = jacobian(residuals, start, here)[0]
     _, low, high = search_box(bench.model)
@@ -145,7 +151,7 @@ def linearised(
     moved: Floats,
     reach: Reach,
     parts: tuple[int, ...],
-    motions: list[Floats] | None = None,
+    further: Sequence[Further] = (),
     along: Along | None = None,
 ) -> tuple[Callable[[Floats], Floats], Floats, Along]:
     """Residuals around forces, linear in their motion, and their start.
@@ -164,8 +170,8 @@ def linearised(
     reach : Reach
     parts : tuple of int
         Which of the windows are fitted.
-    motions : list of ndarray, optional
-        Further motions, whose sizes are fitted, too.
+    further : list of (ndarray, bool)
+        Further motions, whose sizes are fitted, too; and whether of a force against the ground.
     along : Along, optional
         The slopes over the linear parameters that were used last.
 
@@ -177,7 +183,7 @@ def linearised(
     along : Along
         The slopes over the linear parameters that were used.
     """
-    further, simulation = motions or [], bench.simulation
+    simulation = bench.simulation
     logs, theta, near = form.logs(found), found.theta, reach.near
     forces = form.at(logs)
     added = simulation.added(forces, theta, found.motion)
@@ -201,14 +207,39 @@ def linearised(
         each = slopes_along(bench, forces, theta, added, nearest * reach.linear)
         along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
+    changes = bench.changes(forces, added)
     columns = [
         *(bench.at_lines(slope) for slope in slopes),
         *along.slopes.reshape(-1, along.slopes.shape[-1]),
-        *(bench.at_lines(motion) for motion in further),
+        *(bench.at_lines(motion) for motion, _ in further),
     ]
-    windows, weight = _weighed_windows(bench, bench.changes(forces, added), theta, columns, parts)
+    by_strengths = np.tile(form.grounded[along.strengths], len(along.slopes))
+    grounded = np.array([*form.grounded, *by_strengths, *(own for _, own in further)], bool)
+    columns = _with_a_hand(bench, changes, theta, columns, grounded)
+    windows, weight = _weighed_windows(bench, changes, theta, columns, parts)
     start = np.concatenate([phi, np.zeros(len(logs) + len(further))])[None]
     return _residuals(bench.model, windows, weight, form.shape, moved, start, along), start, along
+
+
+def _with_a_hand(
+    bench: ForceBench,
+    changes: tuple[Change, ...],
+    theta: Floats,
+    slopes: list[Complexes],
+    grounded: NDArray[np.bool_],
+) -> list[Complexes]:
+    """Slopes of the motion, with those of what a hand would do without the forces.
+
+    The more they take off, the further it alone would have moved the device: see `Windows.louder`.
+    As it was measured that is a slope like those of the motion.
+    """
+    if not (bench.held and grounded.any()):
+        return slopes
+    spectra: Any = bench.without(changes, theta).spectra
+    left = spectra.position - bench.model.response(theta, bench.frequency_hz) * spectra.force
+    found = np.array(slopes)
+    found[grounded] += left * bench.answer(theta).growth(answered(changes), found[grounded])
+    return list(found)
 
 
 def _weighed_windows(
@@ -219,7 +250,7 @@ def _weighed_windows(
     parts: tuple[int, ...],
 ) -> tuple[Windows, Floats]:
     """Windows without what forces changed, with slopes as inputs; and roots of their weights."""
-    etfe = bench.without(changes)
+    etfe = bench.without(changes, theta)
     windows = bench.windows(etfe, theta, columns)
     # The many slopes leave too little of a window to read its noise from.
     left, scattered = weights(bench.model, bench.windows(etfe, theta), theta)

@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.recordings.response.local_polynomial import LEAKAGE_TERMS
+from bayeshaptic.recordings.response.local_polynomial import LEAKAGE_TERMS, project_out
 from bayeshaptic.recordings.response.regressors import Block, regressors
-from bayeshaptic.recordings.response.spectra import RandomSpectra, project_out
+from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.recordings.response.windows import Reference, Windows
 
 # F of the force's regression on the reference in a window, from which on what noise in the force

@@ -1,0 +1,144 @@
+"""Other laws in the place of those that were found, and two forces in the place of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.diagnosis import acceptance
+from bayeshaptic.diagnosis.state import Accepted, State, Trial
+from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.called_for import called_for
+from bayeshaptic.diagnosis.trials.forces.hints import departures
+from bayeshaptic.diagnosis.trials.forces.search import beside_others, fitted, search
+from bayeshaptic.diagnosis.trials.forces.trial import force_trial
+from bayeshaptic.diagnosis.trials.taken_off import put_back
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
+from bayeshaptic.effects.nonlinear.protocol import CommandEffect, NonlinearEffect
+from bayeshaptic.inference.fit import summarise
+from bayeshaptic.inference.least_squares import least_squares, polish
+from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings.response.etfe import compress
+
+# How far another force must stand out beside the simple law, over how far the larger law does: then
+# it is worth half as much to first order.  Of held devices with friction that falls (four) a drag
+# had 0.5, 0.5, 0.5 and 1.0, of those with friction and a drag (two) 1.0 and 1.4.
+_AS_FAR = 0.7
+
+
+def in_the_place_of_one(
+    trials: Sequence[Trial], meter: Meter, tick: Callable[[str], None] | None
+) -> list[Trial]:
+    """Two forces in the place of one whose law contains a simpler one: that, and another.
+
+    Friction that falls with the velocity bends like dry friction with a drag, and a damper makes up
+    for the rest: it explained a held device that had both, with 1.8 times its limit.
+    """
+    found = []
+    laws = [(trial, _law(trial)) for trial in trials if trial.convincing]
+    for simple, own in laws:
+        larger = [law for _, law in laws if law.contains(own)]
+        recording = simple.state.etfe.unbroken
+        if not (larger and simple.state.model.held) or recording is None:
+            continue
+        bench = ForceBench(simple.state, recording)
+        theta = simple.state.fit.theta
+        motion = bench.simulation.motions(theta, (MOTOR, LOAD, CONNECTION))
+        here = bench.as_it_is(bench.before, theta, bench.known_motion)
+        least = _AS_FAR * max((h.score for h in departures(bench, here, larger)), default=np.inf)
+        others, _ = called_for(simple.state, {v for law in larger for v in law.over}, motion)
+        inner = [law for law in others if not isinstance(law[0], CommandEffect)]
+        for point in beside_others(bench, inner, meter, tick, least):
+            trial = force_trial(bench, point)
+            found.append(
+                replace(
+                    trial,
+                    gain_fit=simple.gain_fit + trial.gain_fit,
+                    gain_choose=simple.gain_choose + trial.gain_choose,
+                )
+            )
+    return found
+
+
+def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
+    """With another law in the place of an earlier force, where that predicts more.
+
+    What an earlier force was found to be was found without the last one: cubic damping for a drag,
+    where friction was not known of.  Where others do as well the limit spreads over them.  The very
+    same state where none comes near.
+    """
+    forces = [one for one in state.accepted if one.change and one.change.acting]
+    for one in forces[:-1] if state.etfe.unbroken else ():
+        if one in state.accepted:
+            state = _likeliest(state, _instead_of(one, state, meter, tick))
+    return state
+
+
+def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
+    """The state with its last force searched for and fitted once more; as it is without one.
+
+    Where it was found beside a linear effect that the state does not have any more it may be at
+    another place, and larger, or have another law.
+    """
+    *rest, last = state.accepted
+    if last.change is None or last.change.acting is None:
+        return state
+    etfe = put_back(state.etfe, last.change, rest)
+    bare = State(etfe, least_squares(state.model, etfe, start=state.fit.theta), tuple(rest))
+    assert etfe.recording
+    bench = ForceBench(bare, etfe.recording)
+    motion = bench.simulation.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
+    present = last.change.acting.effect
+    if meter.affords(last.title):
+        own = search(bench, list(present.candidates(bare.model, motion)), motion, tick)
+    else:  # as it is, but what it leaves open without that effect is asked for
+        own = bench.point((*bench.before, last.change.acting), state.fit.theta)
+    laws, _ = called_for(bare, set(present.over), motion)
+    others = [law for law in laws if law[0].name != present.name]
+    found = [*fitted(bench, [own], meter), *beside_others(bench, others, meter, tick)]
+    trials = [force_trial(bench, point) for point in found]
+    return max(trials, key=lambda trial: trial.score).state if trials else state
+
+
+def _instead_of(
+    one: Accepted, state: State, meter: Meter, tick: Callable[[str], None] | None
+) -> list[Trial]:
+    """A force that a state has as a trial, and then others that could be in its place."""
+    assert one.change and one.change.acting
+    present = one.change.acting.effect
+    rest = tuple(accepted for accepted in state.accepted if accepted is not one)
+    etfe = put_back(state.etfe, one.change, rest)
+    windows = compress(etfe, state.fit.response)
+    fit = summarise(state.model, windows, polish(state.model, windows, state.fit.theta))
+    without = State(etfe, fit, rest)
+    assert etfe.recording
+    bench = ForceBench(without, etfe.recording)
+    motion = bench.simulation.motions(fit.theta, (MOTOR, LOAD, CONNECTION))
+    laws = [
+        [e for e in law if (e.name, e.place) != (present.name, present.place)]
+        for law in called_for(without, set(present.over), motion)[0]
+    ]
+    here = bench.point((*bench.before, one.change.acting), state.fit.theta)
+    if not bench.stays(here):
+        return []
+    others = beside_others(bench, [law for law in laws if law], meter, tick)
+    return [force_trial(bench, point) for point in (here, *others)]
+
+
+def _likeliest(state: State, found: list[Trial]) -> State:
+    """Of trials, the state's own first, the one that explains most, spread over those near it."""
+    if len(found) < 2:
+        return state
+    most = max(found, key=lambda trial: trial.score)
+    near = [trial for trial in found if acceptance.ties(most, trial)]
+    best = min(near, key=acceptance.simplicity)
+    return state if near == found[:1] else acceptance.with_ties(best, near)
+
+
+def _law(trial: Trial) -> NonlinearEffect:
+    """The law of the force that is tried."""
+    change = trial.accepted.change
+    assert change and change.acting
+    return change.acting.effect
