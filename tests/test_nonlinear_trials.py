@@ -25,7 +25,7 @@ from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
 from bayeshaptic.diagnosis.trials.forces.slopes import Form, Reach, linearised, nudges_of, spread
 from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
-from bayeshaptic.diagnosis.trials.other_laws import reconsidered
+from bayeshaptic.diagnosis.trials.other_laws import found_anew, reconsidered
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.linear.attached_mass import SecondMode
@@ -213,9 +213,13 @@ def test_an_effect_that_a_force_was_taken_for_goes_when_the_force_is_found(
     trials = WindowTrials(state)
     lighter = trials.without_needless(found.state, Meter(), lambda _: None)
     assert [one.name for one in lighter.accepted] == ["dahl_friction"]
-    unspent = Meter(limit=0.0)  # nothing is simulated where nothing is left to spend
+    unspent = Meter(limit=0.0)  # nothing is searched for where nothing is left to spend
     assert trials.without_needless(found.state, unspent, lambda _: None) is found.state
     assert unspent.skipped == [found.accepted.title]
+    wide = replace(found.accepted, limit_log_sd=9.0)  # beside a linear effect that is gone
+    stale = replace(found.state, fit=state.fit, accepted=(wide,))
+    anew = found_anew(stale, unspent)
+    assert anew.accepted[-1].limit_log_sd < 9.0
 
 
 def test_the_law_on_the_way_from_the_simple_one() -> None:

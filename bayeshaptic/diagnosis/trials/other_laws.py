@@ -89,12 +89,13 @@ def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = 
     bare = State(etfe, least_squares(state.model, etfe, start=state.fit.theta), tuple(rest))
     assert etfe.recording
     bench = ForceBench(bare, etfe.recording)
+    if not meter.affords(last.title):
+        # As it is; what it leaves open beside an effect that is gone says nothing any more.
+        here = bench.point((*bench.before, last.change.acting), state.fit.theta)
+        return force_trial(bench, here).state if bench.stays(here) else state
     motion = bench.simulation.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
     present = last.change.acting.effect
-    if meter.affords(last.title):
-        own = search(bench, list(present.candidates(bare.model, motion)), motion, tick)
-    else:  # as it is, but what it leaves open without that effect is asked for
-        own = bench.point((*bench.before, last.change.acting), state.fit.theta)
+    own = search(bench, list(present.candidates(bare.model, motion)), motion, tick)
     laws, _ = called_for(bare, set(present.over), motion)
     others = [law for law in laws if law[0].name != present.name]
     found = [*fitted(bench, [own], meter), *beside_others(bench, others, meter, tick)]
