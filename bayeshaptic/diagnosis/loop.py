@@ -207,8 +207,17 @@ class Loop:
             lambda trial: acceptance.excess(remaining(trial)),
             lambda trial: worth(trial.state.fit),
         )
+        # Two forces in the place of one come together.
+        known = {effect.title for effect in self.state.accepted}
+        together = {e.title for e in chosen.state.accepted[:-1]} - known if chosen else set()
         self._candidates += [
-            Candidate(t.name, t.accepted.title, t.score, t is chosen, self._number)
+            Candidate(
+                t.name,
+                t.accepted.title,
+                t.score,
+                t is chosen or t.accepted.title in together,
+                self._number,
+            )
             for t in sorted(trials, key=lambda trial: -trial.score)
         ]
         self._rejected = tuple(t for t in near if t is not chosen and _may_be(t))
