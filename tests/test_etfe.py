@@ -21,6 +21,7 @@ from scipy.signal import butter, lfilter
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
+from bayeshaptic.recordings.response.estimators.random_excitation import points
 from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
 
@@ -197,6 +198,21 @@ def test_what_cannot_be_estimated_is_refused_in_one_line(recording, band_hz, say
     with pytest.raises(InputError) as error:
         estimate_etfe(recording(), band_hz)
     assert says in str(error.value) and "\n" not in str(error.value)
+
+
+def test_what_is_shown_is_what_the_windows_of_the_spectra_say():
+    """Windows are made again where their noise falls with the frequency alone."""
+    rng = np.random.default_rng(8)
+    force = limited_noise(rng, 20000, 1e-3, 200.0)
+    device = Device(PHANTOM_HELD, 1e-3)
+    wander = lfilter(*butter(4, 0.6, fs=1e3), rng.standard_normal(len(force)))
+    position = device.simulate(force) + 0.3 * wander * device.simulate(force).std() / wander.std()
+    etfe = estimate_etfe(Recording(force, position, 1e-3))
+    slopes = etfe.spectra.noise_slope
+    assert slopes.any() and not slopes.all()
+    said = points(etfe.spectra.windows())
+    np.testing.assert_allclose(etfe.value, said.value, rtol=1e-9)
+    np.testing.assert_allclose(etfe.variance, said.variance, rtol=1e-9)
 
 
 def test_narrow_windows_for_short_blocks():

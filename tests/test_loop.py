@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import chirp
 
+from bayeshaptic.diagnosis import loop
 from bayeshaptic.diagnosis.loop import Loop, trace
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
 from bayeshaptic.diagnosis.residuals.residual import smooth_columns
@@ -47,6 +49,15 @@ def fitted(held: bool, seconds: float, effects: Effects) -> tuple[Bench, Etfe, F
         recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
     )
     return bench, etfe, least_squares(build_model("grasped" if held else "free", "lhifam"), etfe)
+
+
+def test_two_forces_in_the_place_of_one_are_accepted_together() -> None:
+    def state(*titles: str) -> Any:
+        return SimpleNamespace(accepted=tuple(SimpleNamespace(title=title) for title in titles))
+
+    both: Any = SimpleNamespace(state=state("a mode", "friction", "drag"))
+    assert loop._came_with(both, state("a mode")) == {"friction"}
+    assert loop._came_with(both, state("a mode", "friction")) == set()
 
 
 def test_candidates_begin_afresh_only_while_nothing_explains(monkeypatch) -> None:

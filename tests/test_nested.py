@@ -93,6 +93,7 @@ def test_friction_and_a_drag_are_found_in_the_place_of_friction_that_falls(
     (falls,) = [trial for trial in trials if trial.name == "stribeck_friction"]
     (both,) = [trial for trial in trials if trial.name == "drag" and _forces(trial) == 2]
     assert falls.convincing and both.convincing
+    assert (falls.size, both.size) == (3, 2)  # numbers of the forces that each adds
     near = [trial for trial in (falls, both) if acceptance.ties(both, trial)]
     assert min(near, key=acceptance.simplicity) is both
     sizes = {one.name: next(iter(one.estimates.values())).mean for one in both.state.accepted}

@@ -207,9 +207,7 @@ class Loop:
             lambda trial: acceptance.excess(remaining(trial)),
             lambda trial: worth(trial.state.fit),
         )
-        # Two forces in the place of one come together.
-        known = {effect.title for effect in self.state.accepted}
-        together = {e.title for e in chosen.state.accepted[:-1]} - known if chosen else set()
+        together = _came_with(chosen, self.state) if chosen else set()
         self._candidates += [
             Candidate(
                 t.name,
@@ -270,6 +268,12 @@ class Loop:
 def _may_be(trial: Trial) -> bool:
     """Whether it may be what is left: a force that gains a little is, under another law."""
     return trial.convincing or trial.accepted.family == "nonlinear"
+
+
+def _came_with(chosen: Trial, before: State) -> set[str]:
+    """Titles of what is accepted besides a trial's own: two forces come in the place of one."""
+    known = {effect.title for effect in before.accepted}
+    return {effect.title for effect in chosen.state.accepted[:-1]} - known
 
 
 def _raises(before: State, after: State) -> bool:

@@ -57,6 +57,7 @@ def in_the_place_of_one(
                     trial,
                     gain_fit=simple.gain_fit + trial.gain_fit,
                     gain_choose=simple.gain_choose + trial.gain_choose,
+                    size=simple.size + trial.size,
                 )
             )
     return found
@@ -135,7 +136,9 @@ def _likeliest(state: State, found: list[Trial]) -> State:
     most = max(found, key=lambda trial: trial.score)
     near = [trial for trial in found if acceptance.ties(most, trial)]
     best = min(near, key=acceptance.simplicity)
-    return state if near == found[:1] else acceptance.with_ties(best, near)
+    if len(near) == 1 and best is found[0]:
+        return state
+    return acceptance.with_ties(best, near)
 
 
 def _law(trial: Trial) -> NonlinearEffect:

@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 def stand_ins(closed: Closed) -> str | None:
     """Why two forces over the velocity leave a held device's limit open; None where they do not.
 
-    Of four held devices with dry friction and a drag, in open loop, none had these found: cubic
-    damping, and dry friction or one that falls, fitted about as well, with dampers that made the
-    limits 2.4 to 5.7 dB too high (benchmarks/README.md).  Of eighteen devices with such pairs that
-    nobody holds every interval holds; of eight held ones with one friction none is refused.
+    Of twenty held devices with dry friction and a drag, in open loop, eighteen have these found
+    and nineteen intervals hold; but where friction falls with the velocity besides (eight) others
+    fit about as well, with medians of 0.27 to 1.8 times the limit (benchmarks/README.md).  Of eighteen
+    devices with such pairs that nobody holds every interval holds; of eight held ones with one
+    friction none is refused.
     """
     if not closed.analysis.model.held:
         return None

@@ -11,6 +11,10 @@ from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.slopes import slopes_of_all
 from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
 
+# Standard deviations, from which on a hint is followed: worth 9/4 on the windows to fit, where 10
+# are asked for; and the parts of its strength that are tried, which may be far too much.
+STANDS_OUT = 3.0
+PARTS = 1.0, 0.3, 0.1
 _FAINT = 0.01  # of the faintest strength, or of the way to a law, for the slope over it
 
 

@@ -10,13 +10,11 @@ from __future__ import annotations
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
-from bayeshaptic.diagnosis.trials.forces.hints import departures
+from bayeshaptic.diagnosis.trials.forces.hints import PARTS, STANDS_OUT, departures
 from bayeshaptic.effects.laws import simplest
 from bayeshaptic.effects.nonlinear.protocol import Acting
 
-_STANDS_OUT = 3.0  # standard deviations, as of any law beside another
 _STRENGTHS = 1.0, 1.5, 2.2, 3.3  # of the simple law over the larger one's, which adds to that
-_PARTS = 1.0, 0.3, 0.1  # of the way to the larger law, which first order may think too long
 
 
 def fit_nested(bench: ForceBench, start: Point) -> Point:
@@ -41,10 +39,10 @@ def fit_nested(bench: ForceBench, start: Point) -> Point:
     hints = [] if plain.motion is None else departures(bench, plain, [larger], index)
     if not hints:  # it runs away
         return fit_force(bench, start)
-    if hints[0].score < _STANDS_OUT:
+    if hints[0].score < STANDS_OUT:
         return plain
     strength, way = plain.forces[index].strength, hints[0].strength
-    laws = [larger.departing(min(part * way, 1.0)) for part in _PARTS]
+    laws = [larger.departing(min(part * way, 1.0)) for part in PARTS]
     full = fit_force(
         bench, _likeliest(bench, plain, index, [Acting(law, strength) for law in laws])
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
-from bayeshaptic.diagnosis.trials.forces.hints import Hint, departures, hints
+from bayeshaptic.diagnosis.trials.forces.hints import PARTS, STANDS_OUT, Hint, departures, hints
 from bayeshaptic.diagnosis.trials.forces.nested import fit_nested
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import (
@@ -24,11 +24,9 @@ from bayeshaptic.types import Floats
 
 Variants = list[NonlinearEffect]  # of one effect
 
-_STANDS_OUT = 3.0  # standard deviations: worth 9/4 on the windows to fit, where 10 are asked for
 _CLEARLY = 6.0  # standard deviations, where first order promises 18: see `_followed`
 _IN_REACH = 0.5  # of the largest score: the rest is worth less than a quarter of the best
 _HOPELESS = 0.3  # share of the best gain so far below which a force is not followed up
-_PARTS = 1.0, 0.3, 0.1  # of a strength to first order, which may be far too much
 _NEAR = np.array([0.8, 1.0])
 
 
@@ -70,7 +68,7 @@ def to_scan(
     scores = {id(hint.effect): hint.score for hint in hints(bench, scored)} if scored else {}
 
     def standing_out(law: Variants) -> Variants:
-        least = max(_STANDS_OUT, _IN_REACH * max(scores.get(id(e), 0.0) for e in law))
+        least = max(STANDS_OUT, _IN_REACH * max(scores.get(id(e), 0.0) for e in law))
         return [effect for effect in law if scores.get(id(effect), np.inf) >= least]
 
     return own + [kept for law in new if (kept := standing_out(law))]
@@ -175,11 +173,11 @@ def _followed(
     for law in laws:
         own = [hint for hint in every if any(hint.effect is effect for effect in law)]
         best = max(own, key=lambda hint: hint.score, default=None)
-        if best is None or best.score < max(_STANDS_OUT, _IN_REACH * most):
+        if best is None or best.score < max(STANDS_OUT, _IN_REACH * most):
             continue
         if tick:
             tick(best.effect.title)
-        point = max((start(best, part) for part in _PARTS), key=lambda point: point.gain_fit)
+        point = max((start(best, part) for part in PARTS), key=lambda point: point.gain_fit)
         least = -np.inf if nothing is None or best.score > _CLEARLY else nothing.gain_fit
         if point.gain_fit > least and meter.affords(best.effect.title):
             found.append(fit(bench, point))
