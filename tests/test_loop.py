@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.signal import chirp
 
-from bayeshaptic.diagnosis import loop
+from bayeshaptic.diagnosis import loop as closing
 from bayeshaptic.diagnosis.loop import Loop, trace
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
 from bayeshaptic.diagnosis.residuals.residual import smooth_columns
@@ -56,8 +56,8 @@ def test_two_forces_in_the_place_of_one_are_accepted_together() -> None:
         return SimpleNamespace(accepted=tuple(SimpleNamespace(title=title) for title in titles))
 
     both: Any = SimpleNamespace(state=state("a mode", "friction", "drag"))
-    assert loop._came_with(both, state("a mode")) == {"friction"}
-    assert loop._came_with(both, state("a mode", "friction")) == set()
+    assert closing._came_with(both, state("a mode")) == {"friction"}
+    assert closing._came_with(both, state("a mode", "friction")) == set()
 
 
 def test_candidates_begin_afresh_only_while_nothing_explains(monkeypatch) -> None:

@@ -17,9 +17,9 @@ def stand_ins(closed: Closed) -> str | None:
 
     Of twenty held devices with dry friction and a drag, in open loop, eighteen have these found
     and nineteen intervals hold; but where friction falls with the velocity besides (eight) others
-    fit about as well, with medians of 0.27 to 1.8 times the limit (benchmarks/README.md).  Of eighteen
-    devices with such pairs that nobody holds every interval holds; of eight held ones with one
-    friction none is refused.
+    fit about as well, with medians of 0.27 to 1.8 times the limit (benchmarks/README.md).  Of
+    eighteen devices with such pairs that nobody holds every interval holds; of eight held ones with
+    one friction none is refused.
     """
     if not closed.analysis.model.held:
         return None
