@@ -41,7 +41,7 @@ class Likelihood:
         form = self._rational_form(theta)
         if form is None:
             return self.pointwise(theta).sum(axis=1)
-        from bayeshaptic.models.response.kernels.rational import log_likelihood
+        from bayeshaptic.models.response.kernels.likelihood import log_likelihood
 
         spend(_CALL + len(theta) * self.windows.frequency_hz.size)
         value = np.empty(len(theta))
@@ -72,7 +72,7 @@ class Likelihood:
         spend(_CALL + each * len(theta) * self.windows.frequency_hz.size)
         if form is None:
             return self.plain_deviations(theta) * weight[:, None]
-        from bayeshaptic.models.response.kernels.rational import deviations
+        from bayeshaptic.models.response.kernels.likelihood import deviations
 
         out = np.empty((len(theta), *self.windows.target.shape, 2))
         deviations(form, self._arrays, weight, out)

@@ -30,7 +30,7 @@ class RationalArrays(NamedTuple):
         1 - e^{-j theta}, real and imaginary part.
     high : ndarray of int
         Nodes where the nearest aliases are taken by themselves.
-    bernoulli, binomials : ndarray
+    bernoulli, binomials, economy : ndarray
         See `sampled.alias_tables`.
     """
 
@@ -45,6 +45,7 @@ class RationalArrays(NamedTuple):
     high: Ints
     bernoulli: Floats
     binomials: Floats
+    economy: Floats
 
 
 class WindowArrays(NamedTuple):
@@ -74,17 +75,28 @@ class WindowArrays(NamedTuple):
 
 
 class Space(NamedTuple):
-    """What the response of one row is made in."""
+    """What the responses of some rows with one delay, R at most, are made in.
+
+    Attributes
+    ----------
+    matrix, far_matrix : ndarray, shape (ORDER + 1, ORDER)
+        From the series in 1/s to that over all aliases, and to that without the nearest ones.
+    tail, far_tail : ndarray, shape (R, ORDER)
+        Coefficients of these series: even powers, then odd ones.
+    poles : ndarray, shape (2, L)
+        The closed form of a row's poles.
+    begun : ndarray, shape (4, L)
+        Higher powers of numerator and denominator; zeros where there are none.
+    factor : ndarray, shape (2, L)
+        Hold and delay.
+    response : ndarray, shape (R, 2, L)
+    """
 
     matrix: Floats
     far_matrix: Floats
     tail: Floats
     far_tail: Floats
-    ne: Floats
-    no: Floats
-    de: Floats
-    do: Floats
-    tail_re: Floats
-    tail_im: Floats
-    factor_re: Floats
-    factor_im: Floats
+    poles: Floats
+    begun: Floats
+    factor: Floats
+    response: Floats

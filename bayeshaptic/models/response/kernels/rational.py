@@ -1,11 +1,15 @@
 """The compiled part of `../rational.py`, with the formulas of `../sampled.py`.
 
-One row of the batch at a time: its response at all nodes is made in a few small arrays, and used
-there, written out or put into the windows of a likelihood.
+Some rows of the batch at a time, which have one delay: their responses at all nodes are made in a
+few small arrays, and written out or put into the windows of a likelihood.  A function that is given
+tuples of arrays counts references to each of them, which takes as long as a third of a row: so the
+loops over rows are within these functions.
 
 Polynomials at s = j w are split into even and odd powers, which are real: with z = theta^2, the
 even ones in z, the odd ones theta times a polynomial in z.  Loops over the nodes read and write few
 arrays, so that the compiler makes vector instructions of them.
+
+It contains `alias_series.py` beside it, and is to be compiled anew where that is changed.
 """
 
 from __future__ import annotations
@@ -15,72 +19,154 @@ import math
 import numpy as np
 
 from bayeshaptic.compiled import kernel
-from bayeshaptic.models.response.kernels.arrays import RationalArrays, Space, WindowArrays
+from bayeshaptic.models.response.kernels.alias_series import alias_matrix, combine, economise
+from bayeshaptic.models.response.kernels.arrays import RationalArrays, Space
 from bayeshaptic.numerics.cos_sin import cos_sin
-from bayeshaptic.numerics.weighted_logs import weighted_logs
 from bayeshaptic.types import Floats
 
-
-@kernel(inline=True)
-def _values(c: Floats, theta: Floats, out: Floats) -> None:
-    """A polynomial in z with 4 n coefficients, at all nodes."""
-    for group in range(len(c) // 4 - 1, -1, -1):
-        c0, c1, c2, c3 = c[4 * group], c[4 * group + 1], c[4 * group + 2], c[4 * group + 3]
-        if 4 * group + 4 == len(c):
-            for node in range(len(theta)):
-                z = theta[node] * theta[node]
-                out[node] = ((c3 * z + c2) * z + c1) * z + c0
-        else:
-            for node in range(len(theta)):
-                z = theta[node] * theta[node]
-                out[node] = (((out[node] * z + c3) * z + c2) * z + c1) * z + c0
+TOGETHER = 4  # rows whose responses stay in the nearest cache
 
 
 @kernel(inline=True)
-def _long(c: Floats, theta: Floats, out: Floats) -> None:
-    """A polynomial in z with 14 coefficients, at all nodes."""
-    c0, c1, c2, c3, c4, c5, c6 = c[0], c[1], c[2], c[3], c[4], c[5], c[6]
-    d0, d1, d2, d3, d4, d5, d6 = c[7], c[8], c[9], c[10], c[11], c[12], c[13]
+def rows_from(first: int, turns: Floats) -> int:
+    """Where the rows end that are taken together with this one: they have its delay."""
+    last = first + 1
+    while last < len(turns) and last - first < TOGETHER and turns[last] == turns[first]:
+        last += 1
+    return last
+
+
+@kernel(inline=True)
+def space_of(form: RationalArrays) -> Space:
+    """Arrays for `respond_together`."""
+    nodes, terms = len(form.theta), len(form.binomials)
+    powers = 2 * form.binomials.shape[2]
+    return Space(
+        np.empty((terms, powers)),
+        np.empty((terms, powers)),
+        np.empty((TOGETHER, powers)),
+        np.empty((TOGETHER, powers)),
+        np.empty((2, nodes)),
+        np.zeros((4, nodes)),
+        np.empty((2, nodes)),
+        np.empty((TOGETHER, 2, nodes)),
+    )
+
+
+@kernel(inline=True)
+def respond_together(form: RationalArrays, first: int, last: int, space: Space) -> None:
+    """The responses of rows with one delay, in `space.response`.
+
+    The tables of a delay stay in `space`: rows are taken in their order.
+    """
+    turns = form.turns[first]
+    late = turns - math.floor(turns)
+    if first == 0 or turns != form.turns[first - 1]:
+        alias_matrix(late, False, form.bernoulli, form.binomials, space.matrix)
+        if len(form.high):
+            alias_matrix(late, True, form.bernoulli, form.binomials, space.far_matrix)
+        _delay(turns, form.theta, form.hold, space.factor[0], space.factor[1])
+    combine(space.matrix, form.series, first, last, space.tail)
+    economise(space.tail, form.economy, last - first)
+    _add_up(form, first, last, space)
+    if len(form.high):
+        combine(space.far_matrix, form.series, first, last, space.far_tail)
+        _towards_nyquist(form, first, last, late, space)
+    for row in range(first, last):
+        if form.pole_count[row] != 0:
+            _add_poles(form, row, space, space.response[row - first])
+
+
+@kernel(inline=True)
+def _begin(coefficients: Floats, row: int, theta: Floats, out: Floats) -> None:
+    """Horner's scheme for both parts of a polynomial, as far as their four lowest coefficients.
+
+    Nothing is done where there are no more than those.
+    """
+    for part in range(2):
+        for group in range(coefficients.shape[2] // 4 - 1, 0, -1):
+            c0, c1 = coefficients[row, part, 4 * group], coefficients[row, part, 4 * group + 1]
+            c2, c3 = coefficients[row, part, 4 * group + 2], coefficients[row, part, 4 * group + 3]
+            top = 4 * group + 4 == coefficients.shape[2]
+            for node in range(len(theta)):
+                z = theta[node] * theta[node]
+                before = 0.0 if top else out[part, node]
+                out[part, node] = (((before * z + c3) * z + c2) * z + c1) * z + c0
+
+
+@kernel(inline=True)
+def _add_up(form: RationalArrays, first: int, last: int, space: Space) -> None:
+    """Numerator over denominator and the alias series, behind hold and delay."""
+    theta, factor, out, begun = form.theta, space.factor, space.response, space.begun
+    numerator, denominator, tail = form.numerator, form.denominator, space.tail
+    half = tail.shape[1] // 2
+    for row in range(first, last):
+        _begin(numerator, row, theta, begun[:2])
+        _begin(denominator, row, theta, begun[2:])
+        real, imag = out[row - first, 0], out[row - first, 1]
+        _ten(tail[row - first, :half], theta, real)
+        _ten(tail[row - first, half:], theta, imag)
+        _finish(numerator[row], denominator[row], begun, theta, factor, real, imag)
+
+
+@kernel(inline=True)
+def _finish(
+    top: Floats,
+    bottom: Floats,
+    begun: Floats,
+    theta: Floats,
+    factor: Floats,
+    real: Floats,
+    imag: Floats,
+) -> None:
+    """Numerator over denominator, by their four lowest powers and what has begun above these.
+
+    Added to the alias series, and all that behind hold and delay.
+    """
+    a0, a1, a2, a3 = top[0, 0], top[0, 1], top[0, 2], top[0, 3]
+    b0, b1, b2, b3 = top[1, 0], top[1, 1], top[1, 2], top[1, 3]
+    c0, c1, c2, c3 = bottom[0, 0], bottom[0, 1], bottom[0, 2], bottom[0, 3]
+    d0, d1, d2, d3 = bottom[1, 0], bottom[1, 1], bottom[1, 2], bottom[1, 3]
+    a, b, c, d = begun[0], begun[1], begun[2], begun[3]
+    factor_re, factor_im = factor[0], factor[1]
+    for node in range(len(theta)):
+        x = theta[node]
+        z = x * x
+        ne = (((a[node] * z + a3) * z + a2) * z + a1) * z + a0
+        no = (((b[node] * z + b3) * z + b2) * z + b1) * z + b0
+        de = (((c[node] * z + c3) * z + c2) * z + c1) * z + c0
+        do = (((d[node] * z + d3) * z + d2) * z + d1) * z + d0
+        size = 1.0 / (x * (de * de + z * do * do))
+        re = x * size * (no * de - ne * do) + real[node]
+        im = x * imag[node] - size * (ne * de + z * no * do)
+        real[node] = re * factor_re[node] - im * factor_im[node]
+        imag[node] = re * factor_im[node] + im * factor_re[node]
+
+
+@kernel(inline=True)
+def _ten(c: Floats, theta: Floats, out: Floats) -> None:
+    """A polynomial in z with ten coefficients, at all nodes."""
+    c0, c1, c2, c3, c4 = c[0], c[1], c[2], c[3], c[4]
+    c5, c6, c7, c8, c9 = c[5], c[6], c[7], c[8], c[9]
     for node in range(len(theta)):
         z = theta[node] * theta[node]
-        value = (((((d6 * z + d5) * z + d4) * z + d3) * z + d2) * z + d1) * z + d0
-        value = (((value * z + c6) * z + c5) * z + c4) * z + c3
+        value = (((((c9 * z + c8) * z + c7) * z + c6) * z + c5) * z + c4) * z + c3
         out[node] = ((value * z + c2) * z + c1) * z + c0
 
 
 @kernel(inline=True)
-def _alias_matrix(
-    late: float, far: bool, bernoulli: Floats, binomials: Floats, out: Floats
+def _towards_nyquist(
+    form: RationalArrays, first: int, last: int, late: float, space: Space
 ) -> None:
-    """From h_q T^q to the coefficients A_p, split, for a delay of `late` periods; (q, 2 n).
-
-    `far` leaves the terms k = 1 and -1 out.
-    """
-    sums = np.zeros(len(bernoulli))
-    for n in range(len(sums)):  # B_n(late) / n!
-        power = 1.0
-        for k in range(n + 1):
-            sums[n] += bernoulli[n, k] * power
-            power *= late
-    if far:
-        size = 1.0
-        for n in range(1, len(sums)):
-            size /= 2 * math.pi
-            sums[n] += 2 * math.cos(2 * math.pi * late - 0.5 * math.pi * n) * size
-    count, half = out.shape[1], out.shape[1] // 2
-    for q in range(out.shape[0]):
-        for p in range(count):
-            sign = -1.0 if p % 4 >= 2 else 1.0
-            out[q, p % 2 * half + p // 2] = sign * binomials[q, p] * sums[p + q + 1]
-
-
-@kernel(inline=True)
-def _combine(matrix: Floats, h: Floats, out: Floats) -> None:
-    out[:] = 0.0
-    for q in range(len(h)):
-        weight = h[q]
-        for p in range(len(out)):
-            out[p] += weight * matrix[q, p]
+    """Responses at the high nodes, where the nearest aliases are taken by themselves."""
+    factor, out = space.factor, space.response
+    for row in range(first, last):
+        top, bottom, tail = form.numerator[row], form.denominator[row], space.far_tail[row - first]
+        for i in range(len(form.high)):
+            node = form.high[i]
+            value = _near_nyquist(top, bottom, tail, late, form.theta[node])
+            value *= complex(factor[0, node], factor[1, node])
+            out[row - first, 0, node], out[row - first, 1, node] = value.real, value.imag
 
 
 @kernel(inline=True)
@@ -116,66 +202,9 @@ def _delay(turns: float, theta: Floats, hold: Floats, out_re: Floats, out_im: Fl
 
 
 @kernel(inline=True)
-def _space(form: RationalArrays) -> Space:
-    nodes, order = len(form.theta), form.binomials.shape[1]
-    return Space(
-        np.empty(form.binomials.shape),
-        np.empty(form.binomials.shape),
-        np.empty(order),
-        np.empty(order),
-        np.empty(nodes),
-        np.empty(nodes),
-        np.empty(nodes),
-        np.empty(nodes),
-        np.empty(nodes),
-        np.empty(nodes),
-        np.empty(nodes),
-        np.empty(nodes),
-    )
-
-
-@kernel(inline=True)
-def _respond(form: RationalArrays, row: int, space: Space, real: Floats, imag: Floats) -> None:
-    """The response of one row at all nodes."""
-    matrix, far_matrix, tail, far_tail = space[:4]
-    ne, no, de, do, tail_re, tail_im, factor_re, factor_im = space[4:]
-    theta, turns = form.theta, form.turns[row]
-    late = turns - math.floor(turns)
-    if row == 0 or turns != form.turns[row - 1]:
-        _alias_matrix(late, False, form.bernoulli, form.binomials, matrix)
-        if len(form.high):
-            _alias_matrix(late, True, form.bernoulli, form.binomials, far_matrix)
-        _delay(turns, theta, form.hold, factor_re, factor_im)
-    top, bottom, half = form.numerator[row], form.denominator[row], len(tail) // 2
-    _combine(matrix, form.series[row], tail)
-    _values(top[0], theta, ne)
-    _values(top[1], theta, no)
-    _values(bottom[0], theta, de)
-    _values(bottom[1], theta, do)
-    _long(tail[:half], theta, tail_re)
-    _long(tail[half:], theta, tail_im)
-    if len(form.high):
-        _combine(far_matrix, form.series[row], far_tail)
-    for node in range(len(theta)):
-        x = theta[node]
-        z = x * x
-        size = 1.0 / (x * (de[node] * de[node] + z * do[node] * do[node]))
-        re = x * size * (no[node] * de[node] - ne[node] * do[node]) + tail_re[node]
-        im = x * tail_im[node] - size * (ne[node] * de[node] + z * no[node] * do[node])
-        real[node] = re * factor_re[node] - im * factor_im[node]
-        imag[node] = re * factor_im[node] + im * factor_re[node]
-    for node in form.high:
-        value = _near_nyquist(top, bottom, far_tail, late, theta[node])
-        value *= complex(factor_re[node], factor_im[node])
-        real[node], imag[node] = value.real, value.imag
-    if form.pole_count[row] != 0:
-        _add_poles(form, row, space, real, imag)
-
-
-@kernel(inline=True)
-def _add_poles(form: RationalArrays, row: int, space: Space, real: Floats, imag: Floats) -> None:
+def _add_poles(form: RationalArrays, row: int, space: Space, response: Floats) -> None:
     """Add the closed form of a row's poles; a negative count: they are all there is."""
-    re, im = space.ne, space.no
+    re, im, real, imag = space.poles[0], space.poles[1], response[0], response[1]
     hold_re, hold_im = form.hold[0], form.hold[1]
     re[:], im[:] = 0.0, 0.0
     for pole in range(abs(form.pole_count[row])):
@@ -202,106 +231,13 @@ def _add_poles(form: RationalArrays, row: int, space: Space, real: Floats, imag:
 @kernel
 def respond(form: RationalArrays, out: Floats) -> None:
     """The response of every row; `out` is (B, 2, L), real and imaginary part."""
-    space = _space(form)
-    for row in range(len(out)):
-        _respond(form, row, space, out[row, 0], out[row, 1])
-
-
-@kernel(inline=True)
-def _deviate(
-    windows: WindowArrays, number: int, real: Floats, imag: Floats, re: Floats, im: Floats
-) -> None:
-    """z - R g in all windows, of the combination with this number."""
-    count, nodes = len(re), windows.design_re.shape[1]
-    target_re, target_im = windows.target_re[number], windows.target_im[number]
-    design_re, design_im = windows.design_re[number], windows.design_im[number]
-    if nodes == 3:  # in one go
-        a, b, c = design_re[0], design_re[1], design_re[2]
-        d, e, f = design_im[0], design_im[1], design_im[2]
-        g, h, i = real[:count], real[count : 2 * count], real[2 * count :]
-        u, v, w = imag[:count], imag[count : 2 * count], imag[2 * count :]
-        for n in range(count):
-            left = target_re[n] - a[n] * g[n] - b[n] * h[n] - c[n] * i[n]
-            re[n] = left + d[n] * u[n] + e[n] * v[n] + f[n] * w[n]
-            left = target_im[n] - a[n] * u[n] - b[n] * v[n] - c[n] * w[n]
-            im[n] = left - d[n] * g[n] - e[n] * h[n] - f[n] * i[n]
-        return
-    re[:], im[:] = target_re, target_im
-    for node in range(nodes):
-        a, d = design_re[node], design_im[node]
-        g, u = real[node * count : (node + 1) * count], imag[node * count : (node + 1) * count]
-        for n in range(count):
-            re[n] += d[n] * u[n] - a[n] * g[n]
-            im[n] -= a[n] * u[n] + d[n] * g[n]
-
-
-@kernel(inline=True)
-def _powers(
-    windows: WindowArrays, real: Floats, imag: Floats, power: Floats, re: Floats, im: Floats
-) -> None:
-    """s0 + |z - R g|^2 in all windows."""
-    if windows.triangular:
-        _triangular_powers(windows, real, imag, power)
-        return
-    power[:] = windows.scatter
-    for number in range(len(windows.target_re)):
-        _deviate(windows, number, real, imag, re, im)
-        for window in range(len(power)):
-            power[window] += re[window] * re[window] + im[window] * im[window]
-
-
-@kernel(inline=True)
-def _triangular_powers(windows: WindowArrays, real: Floats, imag: Floats, power: Floats) -> None:
-    """The same for three nodes and triangular R: random excitation."""
-    count = len(power)
-    a, b, c = windows.design_re[0, 0], windows.design_re[0, 1], windows.design_re[0, 2]
-    d, e, f = windows.design_re[1, 1], windows.design_re[1, 2], windows.design_re[2, 2]
-    aj, bj, cj = windows.design_im[0, 0], windows.design_im[0, 1], windows.design_im[0, 2]
-    dj, ej, fj = windows.design_im[1, 1], windows.design_im[1, 2], windows.design_im[2, 2]
-    x, y, z = windows.target_re[0], windows.target_re[1], windows.target_re[2]
-    xj, yj, zj = windows.target_im[0], windows.target_im[1], windows.target_im[2]
-    g, h, i = real[:count], real[count : 2 * count], real[2 * count :]
-    gj, hj, ij = imag[:count], imag[count : 2 * count], imag[2 * count :]
-    scatter = windows.scatter
-    for n in range(count):
-        re = x[n] - a[n] * g[n] - b[n] * h[n] - c[n] * i[n]
-        re = re + aj[n] * gj[n] + bj[n] * hj[n] + cj[n] * ij[n]
-        im = xj[n] - a[n] * gj[n] - b[n] * hj[n] - c[n] * ij[n]
-        im = im - aj[n] * g[n] - bj[n] * h[n] - cj[n] * i[n]
-        total = scatter[n] + re * re + im * im
-        re = y[n] - d[n] * h[n] - e[n] * i[n] + dj[n] * hj[n] + ej[n] * ij[n]
-        im = yj[n] - d[n] * hj[n] - e[n] * ij[n] - dj[n] * h[n] - ej[n] * i[n]
-        total = total + re * re + im * im
-        re = z[n] - f[n] * i[n] + fj[n] * ij[n]
-        im = zj[n] - f[n] * ij[n] - fj[n] * i[n]
-        power[n] = total + re * re + im * im
-
-
-@kernel
-def deviations(form: RationalArrays, windows: WindowArrays, scale: Floats, out: Floats) -> None:
-    """(z - R g) times the window's scale, for every row; `out` is (B, W, r, 2)."""
-    space = _space(form)
-    count = len(windows.weight)
-    real, imag = np.empty(len(form.theta)), np.empty(len(form.theta))
-    re, im = np.empty(count), np.empty(count)
-    for row in range(len(out)):
-        _respond(form, row, space, real, imag)
-        for number in range(out.shape[2]):
-            _deviate(windows, number, real, imag, re, im)
-            for window in range(len(scale)):
-                out[row, window, number, 0] = scale[window] * re[window]
-                out[row, window, number, 1] = scale[window] * im[window]
-
-
-@kernel
-def log_likelihood(form: RationalArrays, windows: WindowArrays, out: Floats) -> None:
-    """- sum over windows of (n - 1) log(s0 + |z - R g|^2), for every row; `out` is (B,)."""
-    space = _space(form)
-    count = len(windows.weight)
-    real, imag = np.empty(len(form.theta)), np.empty(len(form.theta))
-    re, im, power = np.empty(count), np.empty(count), np.empty(count)
-    mantissa = np.empty(count, np.int64)
-    for row in range(len(out)):
-        _respond(form, row, space, real, imag)
-        _powers(windows, real, imag, power, re, im)
-        out[row] = -weighted_logs(power, windows.weight, mantissa, re)
+    space = space_of(form)
+    first = 0
+    while first < len(out):
+        last = rows_from(first, form.turns)
+        respond_together(form, first, last, space)
+        for row in range(first, last):
+            for node in range(len(form.theta)):
+                out[row, 0, node] = space.response[row - first, 0, node]
+                out[row, 1, node] = space.response[row - first, 1, node]
+        first = last
