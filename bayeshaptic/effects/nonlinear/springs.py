@@ -129,5 +129,6 @@ def _gap(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untype
     """What the linear connection takes inside the gap, given back."""
     half, stiffness, damping = constants[0], constants[1], constants[2]
     taken = min(max(x, -half), half)
-    # Without a branch: which side a step is on is not to be foreseen.
-    return stiffness * taken + (damping * v if taken == x else 0.0)
+    # Without a branch: which side a step is on is not to be foreseen.  And not `taken == x`, which
+    # would wait for it.
+    return stiffness * taken + (damping * v if abs(x) <= half else 0.0)
