@@ -205,12 +205,16 @@ def _dips(response: Response, row: Ints, low: Floats, high: Floats) -> tuple[Int
 
 def _padded(row: Ints, stiffness: Floats, frequency: Floats, batch: int) -> tuple[Floats, Floats]:
     """Flat lists as arrays (B, C) of frequency and stiffness, lowest stiffness first."""
-    order = np.lexsort((stiffness, row))
-    row, stiffness, frequency = row[order], stiffness[order], frequency[order]
+    order = np.argsort(row, kind="stable")
+    row = row[order]
     count = np.bincount(row, minlength=batch)
     column = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     shape = (batch, max(int(count.max(initial=0)), 1))
     frequency_table, stiffness_table = np.full(shape, np.nan), np.full(shape, np.nan)
-    frequency_table[row, column] = frequency
-    stiffness_table[row, column] = stiffness
-    return frequency_table, stiffness_table
+    frequency_table[row, column] = frequency[order]
+    stiffness_table[row, column] = stiffness[order]
+    ranks = np.argsort(stiffness_table, axis=1, kind="stable")  # nan comes last
+    return (
+        np.take_along_axis(frequency_table, ranks, axis=1),
+        np.take_along_axis(stiffness_table, ranks, axis=1),
+    )

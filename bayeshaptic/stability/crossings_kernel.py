@@ -115,9 +115,8 @@ def _grid(loops: Poles, row: int, grid: Floats, around: Floats) -> int:
             for tangent in TANGENTS:
                 place = angle + width * tangent
                 if low < place < TOP:  # both ends are there already
-                    around[count] = place
+                    _insert(around, count, place)
                     count += 1
-    around[:count].sort()
     linear = int(math.ceil(PER_TURN * (loops.delay[row] + 1.5) / 2))
     ratio = math.exp(math.log(TOP / low) / (loops.log_points - 1))
     a, b, c, total = 0, 0, 0, 0
@@ -138,6 +137,19 @@ def _grid(loops: Poles, row: int, grid: Floats, around: Floats) -> int:
             log = min(log * ratio, TOP)
         total += 1
     return total
+
+
+@kernel(inline=True)
+def _insert(ordered: Floats, count: int, value: float) -> None:
+    """Put a value in its place among `count` others.
+
+    Those around a pole come in order, and poles do nearly: it is seldom far from the end.
+    """
+    place = count
+    while place > 0 and ordered[place - 1] > value:
+        ordered[place] = ordered[place - 1]
+        place -= 1
+    ordered[place] = value
 
 
 @kernel(inline=True)

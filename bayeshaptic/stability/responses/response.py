@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.models.response.filters import filtered
-from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.models.response.transfer import transfer, transfer_with_link
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
@@ -152,12 +151,12 @@ def pole_response(system: LinearSystem, period_s: float, exact: bool = True) -> 
     if not exact:
         none = np.zeros_like(r)
         return PoleResponse(p, r, r, none, p, delay + 0.5, integrators, exact=False)
+    from bayeshaptic.stability.responses.response_kernel import held
+
     whole = np.floor(delay)
-    late = (delay - whole)[:, None]
-    early = 1.0 - late
-    direct = r * early * phi(p * early)
-    second = r * np.exp(p * early) * late * phi(p * late)
-    return PoleResponse(p, r, direct, second, np.expm1(p), whole, integrators, exact=True)
+    direct, late, centre = np.empty((3, *p.shape), complex)
+    held(p, r, delay - whole, direct, late, centre)
+    return PoleResponse(p, r, direct, late, centre, whole, integrators, exact=True)
 
 
 def _simple_poles(
