@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial
 from typing import ClassVar
@@ -128,7 +129,6 @@ def _gap_of(half: float, unit: str) -> Shape:
 def _gap(x, v, last, gain, before, step_s, constants):  # type: ignore[no-untyped-def]
     """What the linear connection takes inside the gap, given back."""
     half, stiffness, damping = constants[0], constants[1], constants[2]
-    taken = min(max(x, -half), half)
-    # Without a branch: which side a step is on is not to be foreseen.  And not `taken == x`, which
-    # would wait for it.
-    return stiffness * taken + (damping * v if abs(x) <= half else 0.0)
+    # Without a branch: which side a step is on is not to be foreseen.
+    inside = stiffness * x + damping * v
+    return inside if abs(x) <= half else math.copysign(stiffness * half, x)

@@ -173,6 +173,8 @@ def step_through(
     table, early, late = _tables(matrix, rows, drive)
     w, spare = np.zeros(late.shape), np.empty(late.shape[1])
     force, first, numbers = np.zeros(count), np.zeros(count), constants.ctypes
+    # A single force is kept at hand: what has just been written is waited for when it is read.
+    newest, middle, alone = 0.0, 0.0, count == 1
     six, eight = _LANES < states <= 6, len(table) == 2 * _LANES
     for sample in range(motor.shape[1]):
         for f in range(count):
@@ -195,9 +197,10 @@ def step_through(
                         v += w[g, seen + 1]
                         last += w[g, seen + 2]
                         if k > pair:
-                            x += late[g, at] * first[g]
-                            v += late[g, at + 1] * first[g]
-                            last += late[g, at + 2] * first[g]
+                            earlier = newest if alone else first[g]
+                            x += late[g, at] * earlier
+                            v += late[g, at + 1] * earlier
+                            last += late[g, at + 2] * earlier
                     for g in range(f):
                         x += gains[f, g, 0] * force[g]
                         v += gains[f, g, 1] * force[g]
@@ -208,10 +211,13 @@ def step_through(
                     else:
                         own = constants[begins[f] :].ctypes
                         force[f] = laws[f](x, v, last, gain, before, step_s, own)
+                    newest = force[f]
                     if sticks[f]:
-                        force[f] = rubbing(2 * v - last, last, gain, force[f])
+                        newest = rubbing(2 * v - last, last, gain, newest)
+                    force[f] = newest
                 if k == pair:
                     first[:] = force
+                    middle = newest
             for f in range(count):
                 if six:
                     _ahead_six(table, w[f], spare)
@@ -219,6 +225,8 @@ def step_through(
                     _ahead_eight(table, w[f], spare)
                 else:
                     _ahead(table, w[f], spare)
+                a = middle if alone else first[f]
+                b = newest if alone else force[f]
                 for j in range(len(spare)):
-                    w[f, j] = (spare[j] + early[f, j] * first[f]) + late[f, j] * force[f]
+                    w[f, j] = (spare[j] + early[f, j] * a) + late[f, j] * b
     return motor
