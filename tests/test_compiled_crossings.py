@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.models.build import build_model
+from bayeshaptic.models.response.sampled import from_poles
 from bayeshaptic.numerics.polynomial import evaluate, multiply, roots
 from bayeshaptic.numerics.polynomial_roots import find_roots
 from bayeshaptic.stability.crossings import _compiled_search, find_crossings, plain_search
@@ -36,6 +37,19 @@ def loops(device: str, structure: str, count: int = 300, seed: int = 5):
     lag = rng.uniform(0, 1e-3, count)
     system = model.system(theta)
     return system.with_filter(np.ones((1, count)), np.stack([np.ones(count), lag + 1e-6]))
+
+
+@pytest.mark.parametrize(("device", "structure"), CASES)
+def test_the_compiled_terms_of_the_poles_are_those_of_the_plain_form(device, structure) -> None:
+    system = loops(device, structure)
+    response = pole_response(system, T)
+    theta = np.geomspace(1e-3, 3.1, 40)
+    rows = np.arange(system.batch)
+    found = response.at(rows, np.tile(theta, (system.batch, 1)))
+    poles, residues = response.poles / T, response.residues / T
+    plain = from_poles(poles, residues, system.delay_s, theta / (2 * np.pi * T), T)
+    size = np.abs(response.terms(rows, np.tile(theta, (system.batch, 1)))).sum(axis=0)
+    assert np.max(np.abs(found - plain) / size) < 1e-12
 
 
 @pytest.mark.parametrize("exact", [True, False])
