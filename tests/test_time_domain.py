@@ -201,9 +201,31 @@ def test_what_two_columns_share_alone_is_open() -> None:
     columns[:, 1] = columns[:, 0]
     noise = 0.1 * rng.standard_normal(2000)
     found = ridge(columns, 2.0 * columns[:, 0] + noise, 2, 1.0, 2000)
-    spread = covariance(columns, noise, found, 2000)
+    spread = covariance(columns, noise, found, 2000, 2)
     assert found.solution[:2].sum() == pytest.approx(2.0, abs=0.02)
     # Of the sum noise alone says how well it is known; of the two nobody knows anything.
     known = np.array([1.0, 1.0])
     assert np.all(np.diag(spread)[:2] > 100.0)
     assert abs(known @ spread[:2, :2] @ known) < 1e-4 * spread[0, 0]
+
+
+def test_of_noise_both_variances_say_the_same_and_the_larger_counts() -> None:
+    """Not their sum, which intervals of dry friction were too wide by."""
+    rng = np.random.default_rng(4)
+    draws, samples, plain = 200, 1000, 2
+    inside, variances = [], []
+    for _ in range(draws):
+        columns = rng.standard_normal((samples, plain + 2 * WAVES))
+        columns[:, plain:] *= 1e-3
+        noise = rng.standard_normal(samples)
+        found = ridge(columns, noise, plain, 1.0, samples)
+        left = noise - columns @ found.solution
+        variance = np.diag(covariance(columns, left, found, samples, plain))[:plain]
+        inside.append(np.abs(found.solution[:plain]) < 1.86 * np.sqrt(variance))
+        variances.append(samples * variance)
+    # 90 % of a Student t with eight degrees of freedom are 94 % of these where their variance is
+    # known, and 97 % with 1.35 of it; with twice it 99 %.  A standard error is 0.9 %.
+    assert 0.935 < np.mean(inside) < 0.985
+    # The larger of 1 and of a chi-square with eight degrees of freedom over these is 1.2 in the
+    # mean, and where the one more in doubt of two values decides for both 1.35; the sum is 2.
+    assert 1.1 < np.mean(variances) < 1.5

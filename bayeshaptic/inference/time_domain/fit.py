@@ -154,7 +154,7 @@ def fit_motion(
     whole = first.covariance + np.outer(apart, apart)
     spread = whole[: len(NAMES), : len(NAMES)].copy()
     for index in FORCES:
-        spread[index, index] += 0.5 * mean_of_uneven(first.found)
+        spread[index, index] += mean_of_uneven(first.found)
     assert loop.follower is not None
     return MotionFit(
         values=first.values[: len(NAMES)],

@@ -9,23 +9,41 @@ from bayeshaptic.types import Floats
 
 FREEDOM = 8  # cosines, and so degrees of freedom
 SURELY = 3.83  # standard deviations (Student's t, `FREEDOM`) that chance exceeds 1 in 200 times
+# How far the mean of a half wave along the way goes with the way's ends, of its standard deviation.
+# Of 199 loops 90 % intervals hold dry friction and constant force in 90 and 82 % without it, in 98
+# and 94 % with 0.05; the constant force published of EMPS is 0.15 of one off the mean over the way
+# and three standard deviations beside.
+_ENDS = 0.2
 _SMOOTH, _FEWEST = 0.35, 6  # lines either side of one, as a share of its number, and at least
 
 
-def covariance(columns: Floats, residual: Floats, found: Ridge, effective: float) -> Floats:
+def covariance(
+    columns: Floats, residual: Floats, found: Ridge, effective: float, named: int
+) -> Floats:
     """Covariance of the solution, shape (C, C).
 
-    The sum of three parts: what slow correlation does (the scores' long-run variance from
-    their lowest cosines: E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, Journal of Business
-    and Economic Statistics 36, 2018), what a stationary residual of that spectrum does, and what
-    the priors leave open.
+    The sum of what the priors leave open and of what the residual does.  That is told twice: by the
+    scores' long-run variance, from their lowest cosines (E. Lazarus, D. J. Lewis, J. H. Stock and
+    M. W. Watson, Journal of Business and Economic Statistics 36, 2018), and by the variance that a
+    stationary residual of that spectrum would give.  Where it is one both say the same; of the
+    first `named` values none has less than the larger of them.
     """
     inner = found.inverse
     lost = effective / max(effective - found.used, 0.2 * effective)
     slow = inner @ _cosines(columns, residual).T
     still = inner @ _stationary(columns, residual) @ inner.T
     held = inner * found.share
-    return lost * (slow @ slow.T / FREEDOM + still) + (held * found.prior) @ held.T
+    return lost * _larger(slow @ slow.T / FREEDOM, still, named) + (held * found.prior) @ held.T
+
+
+def _larger(one: Floats, other: Floats, named: int) -> Floats:
+    """As much of the sum of two covariances as neither has more of any of the first variances.
+
+    All of it alike: what is known of several values together stays known.
+    """
+    both = one + other
+    most, whole = np.maximum(np.diag(one), np.diag(other))[:named], np.diag(both)[:named]
+    return both * float(np.max(np.divide(most, whole, out=np.ones(named), where=most < whole)))
 
 
 def spread_of(
@@ -49,16 +67,16 @@ def spread_of(
     slow = _cosines(own[:, None], residual)
     still = float(_stationary(own[:, None], residual)[0, 0])
     held = along @ (found.inverse * found.share)
-    return float(lost * (np.sum(slow**2) / FREEDOM + still) + held**2 @ found.prior)
+    return float(lost * max(np.sum(slow**2) / FREEDOM, still) + held**2 @ found.prior)
 
 
 def mean_of_uneven(found: Ridge) -> float:
     """Variance of the mean of a force with that prior over the way, as far as it is not known.
 
-    That of its longest half wave: how much of it lies in the constant is a matter of where the
-    way happens to begin and to end.
+    A share of that of its longest half wave: how much of it lies in the constant is a matter of
+    where the way happens to begin and to end.
     """
-    return float(found.prior[-WAVES])
+    return float(_ENDS**2 * found.prior[-WAVES])
 
 
 def _cosines(columns: Floats, residual: Floats) -> Floats:
