@@ -20,7 +20,12 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.causality.causality import NOTABLE_SHARE, Causality, causality
+from bayeshaptic.recordings.signals.causality.causality import (
+    NOTABLE_SHARE,
+    Causality,
+    Share,
+    causality,
+)
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.switching import is_switched
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
@@ -104,6 +109,20 @@ def test_virtual_walls_and_servos_are_feedback(case: str) -> None:
         found = judge(force, position)
         assert found.has_feedback
         assert not found.swapped
+
+
+def test_a_spring_that_a_hand_leads_is_not_taken_for_exchanged_columns() -> None:
+    """Its past positions tell the command, and no command the motion, which is as smooth."""
+    rng = np.random.default_rng(8)
+    position = np.round(np.cumsum(band_noise(rng, (1, SAMPLES), 5.0)[0]), 2)
+    found = judge(1.0 - 2.0 * position, position)
+    # As it is found where the hand moves the device and the command hardly does.
+    led = replace(found, feedback=(Share(0.5, 20.0),) * 3, answer=Share(0.0, 0.0))
+    assert led.has_feedback and not led.swapped
+    force, position = (signal[0] for signal in open_loops("lhifam grasped"))
+    exchanged = judge(position, force)
+    led = replace(exchanged, feedback=led.feedback, answer=led.answer)
+    assert led.swapped and not led.has_feedback
 
 
 def servo(where: str, ahead: int) -> tuple[np.ndarray, np.ndarray]:
