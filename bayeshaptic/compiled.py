@@ -35,8 +35,9 @@ def kernel(
     Parameters
     ----------
     function : callable
-        On arrays and numbers.  Kernels that it calls stand in the same file: what is kept on disk
-        is renewed when that file changes, and no other.
+        On arrays and numbers.  Kernels that it calls stand in the same file, or are parts that say
+        at the head of theirs who contains them: what is kept on disk is renewed when its own file
+        changes, and no other.
     inline : bool
         Part of the kernels that call it: nothing is kept of it by itself.
     exact : bool
