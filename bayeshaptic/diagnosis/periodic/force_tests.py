@@ -57,7 +57,7 @@ def force_tests(fit: Fit, etfe: Etfe, period: Period) -> tuple[Test, ...]:
 
     beside = _beside(fit)
     tests = []
-    for name, (inputs, rms) in columns(fit, recording, frequency_hz, at_lines).items():
+    for name, inputs, rms in columns(fit, recording, frequency_hz, at_lines):
         rows = as_rows(fit, inputs.T[:, None])
         left = beside.left_of(rows)
         instrument, column = left[:, 0], left[:, -1]

@@ -172,7 +172,7 @@ def _force_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
     at_lines = line_transform(etfe, recording)
     found = []
     moved = columns(fit, recording, frequency_hz, at_lines, in_loop=True)
-    for name, (inputs, rms) in moved.items():
+    for name, inputs, rms in moved:
         score, sd, moves = _beside_linear(fit, etfe, smooth, inputs[0])
         found.append(force_test(name, abs(score), ForceSeen(score * sd, sd, rms, moves)))
     time = np.linspace(-1.0, 1.0, recording.samples)

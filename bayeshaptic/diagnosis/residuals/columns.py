@@ -8,7 +8,7 @@ outputs; S. F. Masri and T. K. Caughey, J. Appl. Mech. 46, 1979, for the force s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.special import ndtri, stdtr
@@ -65,7 +65,7 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     at_lines, response = line_transform(etfe, recording), remembered(fit.response)
     made = columns(fit, recording, frequency_hz, at_lines, etfe.through_reference)
-    for name, (inputs, rms) in made.items():
+    for name, inputs, rms in made:
         windows = etfe.spectra.windows(response, inputs)
         strength, sd, freedom = common_coefficient(windows, len(inputs))
         score = as_normal(abs(strength / sd), freedom) if sd > 0 else 0.0
@@ -120,12 +120,11 @@ def columns(
     frequency_hz: Floats,
     at_lines: Callable[[Floats], Complexes],
     in_loop: bool = False,
-) -> dict[str, tuple[Complexes, float]]:
-    """Motions that nonlinear forces would add, at lines, (1 or 2, L); by name.
+) -> Iterator[tuple[str, Complexes, float]]:
+    """Motions that nonlinear forces would add, one after the other: those of an hour are large.
 
-    Each with the rms of the motion that the force is a function of, or is multiplied by.  Where a
-    hand moves the device, too, its own motion is in such a force and in what no response explains:
-    what the command alone would make of the force comes first, as an instrument.
+    Where a hand moves the device, too, its own motion is in such a force and in what no response
+    explains: what the command alone would make of the force comes first, as an instrument.
 
     Parameters
     ----------
@@ -137,9 +136,18 @@ def columns(
     in_loop : bool
         Damping along the way is left out: of it, alone, eight clean loops have scores two and
         three times too large.
+
+    Yields
+    ------
+    name : str
+        Of the force's shape.
+    motions : complex ndarray, shape (1 or 2, L)
+        At the lines.
+    rms : float
+        Of the motion that the force is a function of, or is multiplied by.
     """
     s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
-    found, known = {}, motions(fit, recording)
+    known = motions(fit, recording)
     fast = float(known[VELOCITY].std())
     for over, motion in known.items():
         if in_loop and over == ALONG:
@@ -152,8 +160,7 @@ def columns(
                 rms = float(motion.std())
                 made = [motion] if driven is None else [driven, motion]
                 added = [response * at_lines(times * shape.force(moved / rms)) for moved in made]
-                found[shape.name] = np.stack(added), fast if over == ALONG else rms
-    return found
+                yield shape.name, np.stack(added), fast if over == ALONG else rms
 
 
 def _by_the_command(fit: Fit, recording: Recording, over: str) -> Floats | None:

@@ -23,6 +23,8 @@ from bayeshaptic.models.response.transfer import transfer, transfer_with_link
 from bayeshaptic.numerics.polynomial import Polynomial, roots
 from bayeshaptic.types import Complexes, Floats, Ints
 
+_MOST_KEPT = 100_000  # frequencies whose tables are kept: those of all lines of an hour are 70 MB
+
 
 @dataclass(frozen=True)
 class Nodes:
@@ -192,13 +194,20 @@ def _closed_form(
 
 
 def nodes_at(frequency_hz: Floats, period_s: float) -> Nodes:
-    """The tables of these frequencies, kept from one call to the next."""
-    return _nodes(np.ascontiguousarray(frequency_hz, float).tobytes(), period_s)
+    """The tables of these frequencies, kept from one call to the next where they are windows'."""
+    frequency_hz = np.ascontiguousarray(frequency_hz, float)
+    if frequency_hz.size > _MOST_KEPT:
+        return _tables(frequency_hz, period_s)
+    return _kept(frequency_hz.tobytes(), period_s)
 
 
 @lru_cache(maxsize=64)
-def _nodes(frequency_bytes: bytes, period_s: float) -> Nodes:
-    theta = 2 * np.pi * np.frombuffer(frequency_bytes) * period_s
+def _kept(frequency_bytes: bytes, period_s: float) -> Nodes:
+    return _tables(np.frombuffer(frequency_bytes), period_s)
+
+
+def _tables(frequency_hz: Floats, period_s: float) -> Nodes:
+    theta = 2 * np.pi * frequency_hz * period_s
     hold = -np.expm1(-1j * theta)
     return Nodes(
         theta,
