@@ -47,7 +47,8 @@ def test_what_a_force_moves_is_what_a_fit_with_it_moves() -> None:
     assert test.force is not None and len(test.force.moves) == fit.model.size
     frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
     transform = line_transform(etfe, recording)
-    added = columns(fit, recording, frequency_hz, transform, in_loop=True)[name][0][0]
+    every = columns(fit, recording, frequency_hz, transform, in_loop=True)
+    added = next(motions for shape, motions, _ in every if shape == name)[0]
     # As strong as the noise leaves it open, so that the first order holds.
     strength = 0.5 * test.force.sd
     there = replace(etfe.spectra, position=etfe.spectra.position - strength * added)  # type: ignore[type-var,attr-defined]
