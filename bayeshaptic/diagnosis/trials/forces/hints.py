@@ -92,16 +92,18 @@ def _scored(
     own = simulation.added_near(found.forces, theta, added).sum(axis=0)
     if not np.isfinite(own).all():
         return []
-    usable, moved = [], []
+    usable, units, moved = [], [], []
     for effect, little, acting in tried:
         near = np.zeros((len(acting), len(own)))
         near[: len(added)] = added
         with_it = simulation.added_near(acting, theta, near).sum(axis=0)
         if np.isfinite(with_it).all():
             usable.append(effect)
+            # Of a newton to the cubed metre a unit moves nothing that slopes could see.
+            units.append(little / _FAINT)
             # Where no force is known what a hand would do without one is left to the fit: with it
             # other laws stand out where the model lacks something else, and each takes a fit.
-            moved.append(((with_it - own) / little, effect.grounded and bool(found.forces)))
+            moved.append(((with_it - own) / _FAINT, effect.grounded and bool(found.forces)))
     if not usable:
         return []
     residual, linear, forces, _ = slopes_of_all(bench, found, moved)
@@ -109,8 +111,8 @@ def _scored(
     base = np.linalg.qr(np.concatenate([linear, known], axis=1))[0]
     further = further - base @ (base.T @ further)
     size = np.maximum(np.linalg.norm(further, axis=0), 1e-300)
-    hints = []
-    for effect, score, one in zip(usable, -(residual @ further) / size, size, strict=True):
+    hints, scores = [], -(residual @ further) / size
+    for effect, unit, score, one in zip(usable, units, scores, size, strict=True):
         score = score if effect.signed else max(score, 0.0)
-        hints.append(Hint(effect, float(score / one), abs(float(score))))
+        hints.append(Hint(effect, float(unit * score / one), abs(float(score))))
     return hints
