@@ -1,15 +1,15 @@
 """Terms and values of a `PoleResponse`, compiled.
 
-In plain NumPy `sampled.from_poles` is the same, and of the values `PoleResponse.terms`.
+In plain NumPy `sampled.from_poles` is the same, and of the values `PoleResponse.terms`.  It
+contains `held_pole.py` of the sampled response, and is to be compiled anew where that is changed.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from bayeshaptic.compiled import kernel
+from bayeshaptic.models.response.kernels.held_pole import held_pole
 from bayeshaptic.numerics.cos_sin import cos_sin
 from bayeshaptic.types import Complexes, Floats, Ints
 
@@ -72,34 +72,6 @@ def held(
         Become numerators without and with a further z^-1, and what is subtracted from z - 1.
     """
     for row in range(len(poles)):
-        behind = late[row]
-        early = 1.0 - behind
         for i in range(poles.shape[1]):
-            p, r = poles[row, i], residues[row, i]
-            direct[row, i] = r * early * _phi(p * early)
-            second[row, i] = r * _exp(p * early) * behind * _phi(p * behind)
-            centre[row, i] = _expm1(p)
-
-
-@kernel(inline=True)
-def _phi(x: complex) -> complex:
-    """(e^x - 1) / x, and 1 at x = 0."""
-    return 1.0 + 0.5 * x if abs(x) < 1e-8 else _expm1(x) / x
-
-
-@kernel(inline=True)
-def _exp(x: complex) -> complex:
-    size = math.exp(x.real)
-    if x.imag == 0.0:
-        return complex(size, 0.0)
-    return complex(size * math.cos(x.imag), size * math.sin(x.imag))
-
-
-@kernel(inline=True)
-def _expm1(x: complex) -> complex:
-    """e^x - 1 without cancellation."""
-    less = math.expm1(x.real)
-    if x.imag == 0.0:
-        return complex(less, 0.0)
-    half = math.sin(0.5 * x.imag)
-    return complex(less * math.cos(x.imag) - 2.0 * half * half, (less + 1.0) * math.sin(x.imag))
+            found = held_pole(poles[row, i], residues[row, i], late[row])
+            direct[row, i], second[row, i], centre[row, i] = found

@@ -8,7 +8,8 @@ their poles q_j: with mechanism N/D and filters M/F,
 
 C the numerator of the sum over j.  The poles have the closed form, and R/D has no poles but the
 mechanism's.  The division for R begins at the lowest power, where F is 1 + small terms.
-`tests/plain_response.py` is the same in plain NumPy.
+`tests/plain_response.py` is the same in plain NumPy.  It contains `held_pole.py` beside
+it, and is to be compiled anew where that is changed.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ import math
 import numpy as np
 
 from bayeshaptic.compiled import kernel
+from bayeshaptic.models.response.kernels.held_pole import held_pole
 from bayeshaptic.types import Complexes, Floats, Ints
 
 _FAST = 1.0  # |q| T from which on the series over aliases does not bear a filter
 _NEAR, _EPS = 0.25, 2.0**-52
-_TINY = 1e-8
 # Radians a sample that two poles at zero are moved by, of a mass without damper.  The relative
 # error is (this / theta)^2 and some ten eps / this: below 1e-7 from 1/20000 of the sampling rate.
 _SLOW = 1e-7
@@ -94,27 +95,9 @@ def _add_up(q: Complexes, parts: Complexes, lead: float, term: Complexes, out: F
 
 
 @kernel(inline=True)
-def _expm1(x: complex) -> complex:
-    half = math.sin(0.5 * x.imag)
-    real = math.expm1(x.real) * math.cos(x.imag) - 2.0 * half * half
-    return complex(real, math.exp(x.real) * math.sin(x.imag))
-
-
-@kernel(inline=True)
-def _phi(x: complex) -> complex:
-    return 1.0 + 0.5 * x if abs(x) < _TINY else _over(_expm1(x), x)
-
-
-@kernel(inline=True)
 def _close(p: complex, r: complex, turns: float, out: Floats) -> None:
     """Numerators without and with a further z^-1, and the centre, (3, 2)."""
-    late = turns - math.floor(turns)
-    early = 1.0 - late
-    grown = math.exp(p.real * early)
-    turned = complex(grown * math.cos(p.imag * early), grown * math.sin(p.imag * early))
-    direct = r * early * _phi(p * early)
-    second = r * turned * late * _phi(p * late)
-    centre = _expm1(p)
+    direct, second, centre = held_pole(p, r, turns - math.floor(turns))
     out[0, 0], out[0, 1] = direct.real, direct.imag
     out[1, 0], out[1, 1] = second.real, second.imag
     out[2, 0], out[2, 1] = centre.real, centre.imag
