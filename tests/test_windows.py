@@ -228,6 +228,22 @@ def test_local_reference_changes_where_the_windows_do():
     assert local.edges_hz == pytest.approx(between, rel=1e-12)
 
 
+def test_windows_that_no_force_moves_have_the_plain_reference():
+    """Also where all windows around are such: a fit to nothing is zero, and no reference."""
+    etfe = estimate_etfe(record(Device(LHIFAM_FREE), np.random.default_rng(1), 9000))
+    windows = compress(etfe, unit_mass)
+    dead = np.arange(len(windows.lines)) < 8
+    nothing = replace(
+        windows,
+        design=windows.design * ~dead[:, None, None],
+        target=windows.target * ~dead[:, None],
+    )
+    local = fit_local_rational(nothing)
+    surely = windows.frequency_hz[:6]  # five windows are fitted together
+    assert local(surely) == pytest.approx(unit_mass(surely), rel=1e-12)
+    assert np.abs(local(windows.frequency_hz) / unit_mass(windows.frequency_hz)).min() > 0
+
+
 def test_offset_and_drift_change_nothing():
     device = Device(LHIFAM_FREE)
     recording = record(device, np.random.default_rng(3), 30000)

@@ -87,9 +87,10 @@ def target(device: str, held: bool, with_file: bool) -> Target:
     )
 
 
-def ours(known: Target) -> np.ndarray:
+def ours(known: Target, seed: int, ess: float) -> np.ndarray:
     """Natural values, shape (chains, draws, P)."""
-    return by_walker(bh.sample(known.fit.model, known.etfe, start=known.fit).chains)
+    found = bh.sample(known.fit.model, known.etfe, start=known.fit, seed=seed, ess=ess)
+    return by_walker(found.chains)
 
 
 def by_walker(chains: np.ndarray) -> np.ndarray:
@@ -214,20 +215,23 @@ OLDER = """
 import sys, time
 import numpy as np
 import bayeshaptic as bh
-made, model, device, delay, out = np.load(sys.argv[1]), *sys.argv[2:]
+made, model, device, delay, seeds, out = np.load(sys.argv[1]), *sys.argv[2:]
 fields = ("period_s", "encoder_resolution")
 recording = bh.Recording(made["force"], made["position"], **{f: float(made[f]) for f in fields})
 known = {"device": device} if device else {"delay_s": float(delay)}
 etfe = bh.estimate_etfe(recording)
 fit = bh.least_squares(getattr(bh, model)(**known), etfe)
 bh.sample(fit.model, etfe, start=fit, seed=1)  # imports, and what is compiled
-began = time.process_time()
-chains = bh.sample(fit.model, etfe, start=fit).chains
-np.savez(out, seconds=time.process_time() - began, theta=chains)
+found = {}
+for seed in range(int(seeds)):
+    began = time.process_time()
+    found[f"theta{seed}"] = bh.sample(fit.model, etfe, start=fit, seed=seed).chains
+    found[f"seconds{seed}"] = time.process_time() - began
+np.savez(out, **found)
 """
 
 
-def by_older(path: str, known: Target) -> tuple[np.ndarray, float]:
+def by_older(path: str, known: Target, seeds: int) -> list[tuple[np.ndarray, float]]:
     """Natural values, shape (chains, draws, P), and CPU seconds of the version at `path`."""
     one, model = known.recording, known.fit.model
     with tempfile.TemporaryDirectory() as place:
@@ -245,14 +249,18 @@ def by_older(path: str, known: Target) -> tuple[np.ndarray, float]:
             model.name,
             device,
             str(model.fixed.get("delay_s", 0.0)),
+            str(seeds),
             out,
         ]
         subprocess.run(words, env=os.environ | {"PYTHONPATH": path}, cwd=place, check=True)
         found = np.load(out)
-        return by_walker(found["theta"]), float(found["seconds"])
+        return [
+            (by_walker(found[f"theta{seed}"]), float(found[f"seconds{seed}"]))
+            for seed in range(seeds)
+        ]
 
 
-SAMPLERS: dict[str, tuple[str, Callable[[Target], np.ndarray]]] = {
+SAMPLERS: dict[str, tuple[str, Callable[..., np.ndarray]]] = {
     "bayeshaptic": ("bayeshaptic", ours),
     "emcee, stretch": ("emcee", partial(by_emcee, move="stretch")),
     "emcee, DE": ("emcee", partial(by_emcee, move="DE")),

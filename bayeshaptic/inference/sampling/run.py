@@ -14,10 +14,10 @@ from bayeshaptic.inference.sampling.ensembles import (
     ENSEMBLES,
     WALKERS,
     Ensembles,
-    Proposal,
     refitted,
 )
 from bayeshaptic.inference.sampling.near_zero import Redraw
+from bayeshaptic.inference.sampling.proposal import Proposal
 from bayeshaptic.inference.stopping import Rule, Verdict
 from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.numerics.straightening import Straightening

@@ -118,7 +118,9 @@ def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> Loc
         denominator[:, 1:] = coefficients[:, 3:]
     half = (windows.frequency_hz[:, 2] - centre) / NODES[2]
     edges = ((centre + half)[:-1] + (centre - half)[1:]) / 2
-    return LocalRational(edges, centre, scale, coefficients[:, :3], denominator)
+    fitted = LocalRational(edges, centre, scale, coefficients[:, :3], denominator)
+    # Windows without a force say nothing, and zero is no reference.
+    return fitted.where(np.any(fitted.numerator != 0, axis=1))
 
 
 def _powers(x: NDArray[Any]) -> NDArray[Any]:
