@@ -6,7 +6,12 @@ import arviz as az
 import numpy as np
 import pytest
 
-from bayeshaptic.numerics.rank_statistics import bulk_size, split_rhat, tail_size
+from bayeshaptic.numerics.rank_statistics import (
+    bulk_size,
+    of_ensembles,
+    split_rhat,
+    tail_size,
+)
 from bayeshaptic.types import Floats
 
 
@@ -40,9 +45,21 @@ def test_the_numbers_are_arviz(case: str) -> None:
     assert tail_size(chains) == pytest.approx(float(tail), rel=1e-9)
 
 
+@pytest.mark.parametrize("steps", [40, 41, 4])
+def test_ensembles_are_judged_by_one_order_of_their_draws(steps: int) -> None:
+    """Each in the order of time for R-hat; each walker a chain for sizes."""
+    draws = np.random.default_rng(5).standard_normal((4, steps, 16)).cumsum(axis=1)
+    rhat, bulk, tail = of_ensembles(draws)
+    even = draws[:, steps % 2 :]
+    walkers = even.swapaxes(1, 2).reshape(64, -1)
+    assert rhat == split_rhat(even.reshape(4, -1))
+    assert (bulk, tail) == (bulk_size(walkers), tail_size(walkers))
+
+
 def test_what_cannot_be_judged_is_not_praised() -> None:
     constant, broken = np.ones((4, 100)), np.full((4, 100), np.nan)
     assert np.isinf(split_rhat(broken)) and bulk_size(broken) == tail_size(broken) == 0.0
     assert np.isinf(split_rhat(constant))
     assert bulk_size(constant) == constant.size  # as ArviZ says
     assert np.isinf(split_rhat(np.ones((4, 3))))
+    assert of_ensembles(np.full((4, 40, 8), np.nan)) == (np.inf, 0.0, 0.0)

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.numerics.rank_statistics import bulk_size, split_rhat, tail_size
+from bayeshaptic.numerics.rank_statistics import of_ensembles
 from bayeshaptic.types import Floats
 
 RHAT_LIMIT = 1.01
-# Draws that a statistic is computed from: R-hat is known to a few thousandths from so many, and
-# effective draws can be counted from ten times as many as are asked for.
-_FOR_RHAT = 8000
+_FEWEST = 8000  # draws that statistics are computed from: R-hat is known to some thousandths then
 
 
 @dataclass(frozen=True)
@@ -55,18 +53,10 @@ def diagnose(chains: Floats, ess: float | None = None) -> Diagnostics:
     ess : float, optional
         So many effective draws are of interest: longer chains are thinned to ten times that.
     """
-    few = thinned(chains, _FOR_RHAT)
-    ensembles, steps, walkers, size = few.shape
-    # A whole ensemble as a chain, in the order of time.
-    as_ensembles = few.reshape(ensembles, steps * walkers, size)
     for_ess = 10.0
-    counted = chains if ess is None else thinned(chains, for_ess * ess)
-    as_walkers = counted.transpose(0, 2, 1, 3).reshape(ensembles * walkers, -1, size)
-    return Diagnostics(
-        np.array([split_rhat(as_ensembles[..., p]) for p in range(size)]),
-        np.array([bulk_size(as_walkers[..., p]) for p in range(size)]),
-        np.array([tail_size(as_walkers[..., p]) for p in range(size)]),
-    )
+    counted = chains if ess is None else thinned(chains, max(for_ess * ess, _FEWEST))
+    columns = [of_ensembles(counted[..., p]) for p in range(chains.shape[-1])]
+    return Diagnostics(*np.array(columns).T)
 
 
 def thinned(chains: Floats, draws: float) -> Floats:

@@ -7,12 +7,15 @@ which the tests compare them with; its import alone would take a tenth of the ti
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
 
 _TAILS = (0.05, 0.95)
 _FEWEST = 4  # draws of a chain
@@ -30,53 +33,121 @@ def split_rhat(chains: Floats) -> float:
     float
         Infinite where there is none.
     """
-    if chains.shape[0] < 2 or chains.shape[1] < _FEWEST or not np.isfinite(chains).all():
+    if chains.shape[0] < 2 or not _usable(chains):
         return np.inf
-    halves = _halves(chains)
-    away = np.abs(halves - np.median(halves))
-    value = max(_rhat(_normal_scores(halves)), _rhat(_normal_scores(away)))
-    return value if np.isfinite(value) else np.inf
+    ranked = _Ranked.of(_halves(chains))
+    return _larger_rhat(ranked.scores, ranked.folded)
 
 
 def bulk_size(chains: Floats) -> float:
     """Effective sample size of the ranks of chains (chain, draw); 0 where there is none."""
-    return _size(_normal_scores(_halves(chains))) if _usable(chains) else 0.0
+    return _size(_Ranked.of(_halves(chains)).scores) if _usable(chains) else 0.0
 
 
 def tail_size(chains: Floats) -> float:
     """The smaller effective sample size of being below the 5 % and below the 95 % quantile."""
-    if not _usable(chains):
-        return 0.0
-    ends = np.quantile(chains, _TAILS)
-    return min(_size(_halves((chains <= end).astype(float))) for end in ends)
+    return _tail_size(chains, _Ranked.of(chains)) if _usable(chains) else 0.0
+
+
+def of_ensembles(draws: Floats) -> tuple[float, float, float]:
+    """R-hat with an ensemble as a chain, bulk and tail size with a walker as one.
+
+    An ensemble is taken in the order of time.  The draws are sorted once for all three.
+
+    Parameters
+    ----------
+    draws : ndarray, shape (ensemble, step, walker)
+        Of an odd number of steps the first counts for nothing.
+    """
+    draws = draws[:, draws.shape[1] % 2 :]
+    ensembles, steps, _ = draws.shape
+
+    def walkers(values: NDArray[Any]) -> NDArray[Any]:
+        return values.swapaxes(1, 2).reshape(-1, steps)
+
+    def halves(values: Floats) -> Floats:
+        return _halves(values.reshape(ensembles, -1))
+
+    if not _usable(walkers(draws)):
+        return np.inf, 0.0, 0.0
+    ranked = _Ranked.of(draws)
+    rhat = _larger_rhat(halves(ranked.scores), halves(ranked.folded)) if ensembles > 1 else np.inf
+    bulk = _size(_halves(walkers(ranked.scores)))
+    return rhat, bulk, _tail_size(walkers(draws), ranked)
 
 
 def _usable(chains: Floats) -> bool:
     return chains.shape[1] >= _FEWEST and bool(np.isfinite(chains).all())
 
 
-def _halves(chains: Floats) -> Floats:
+def _halves(chains: NDArray[Any]) -> NDArray[Any]:
     half = chains.shape[1] // 2
     return np.concatenate([chains[:, :half], chains[:, -half:]])
 
 
-def _normal_scores(values: Floats) -> Floats:
-    """Normal quantiles of the ranks (Blom's), ties sharing their average rank."""
-    flat = values.ravel()
-    order = np.argsort(flat)
-    ordered = flat[order]
-    begins = np.append(True, ordered[1:] != ordered[:-1])
-    ends = np.append(np.flatnonzero(begins), len(flat))  # of runs of ties, one after the other
-    twice = ends[:-1] + ends[1:] + 1  # the average rank, from one on
-    scores = np.empty(len(flat))
-    scores[order] = np.repeat(_scores_of(len(flat))[twice], np.diff(ends))
-    return scores.reshape(values.shape)
+@dataclass(frozen=True)
+class _Ranked:
+    """Draws in rising order.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the draws.
+    order : ndarray of int, shape (N,)
+    ordered : ndarray, shape (N,)
+    """
+
+    shape: tuple[int, ...]
+    order: Ints
+    ordered: Floats
+
+    @classmethod
+    def of(cls, values: Floats) -> _Ranked:
+        flat = values.ravel()
+        order = np.argsort(flat)
+        return cls(values.shape, order, flat[order])
+
+    @property
+    def scores(self) -> Floats:
+        """Normal quantiles of the ranks (Blom's), ties sharing their average rank."""
+        return self._scores(self.order, self.ordered)
+
+    @property
+    def folded(self) -> Floats:
+        """The same of the distances from the median: two runs in order, one behind the other."""
+        middle = self.ordered[[(len(self.ordered) - 1) // 2, len(self.ordered) // 2]].mean()
+        away = np.abs(self.ordered - middle)
+        order = np.argsort(away, kind="stable")
+        return self._scores(self.order[order], away[order])
+
+    def _scores(self, order: Ints, ordered: Floats) -> Floats:
+        begins = np.append(True, ordered[1:] != ordered[:-1])
+        ends = np.append(np.flatnonzero(begins), len(ordered))  # of runs of ties
+        twice = ends[:-1] + ends[1:] + 1  # the average rank, from one on
+        scores = np.empty(len(ordered))
+        scores[order] = np.repeat(_scores_of(len(ordered))[twice], np.diff(ends))
+        return scores.reshape(self.shape)
+
+    def quantile(self, level: float) -> float:
+        """By linear interpolation, as `numpy.quantile`."""
+        at = level * (len(self.ordered) - 1)
+        return float(np.interp(at, [int(at), int(at) + 1], self.ordered[int(at) : int(at) + 2]))
 
 
 @lru_cache(maxsize=4)
 def _scores_of(count: int) -> Floats:
     """Scores of twice the ranks 0 to `count`, which a column shares with the next."""
     return np.asarray(ndtri((0.5 * np.arange(2 * count + 1) - 0.375) / (count + 0.25)))
+
+
+def _tail_size(chains: Floats, ranked: _Ranked) -> float:
+    ends = [ranked.quantile(level) for level in _TAILS]
+    return min(_size(_halves((chains <= end).astype(float))) for end in ends)
+
+
+def _larger_rhat(scores: Floats, folded: Floats) -> float:
+    value = max(_rhat(scores), _rhat(folded))
+    return value if np.isfinite(value) else np.inf
 
 
 def _rhat(chains: Floats) -> float:
