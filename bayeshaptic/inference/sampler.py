@@ -78,7 +78,7 @@ def sample(
     A Student t proposal is fitted to the peak, adapted by a warm-up, and frozen; four independent
     emcee ensembles of 64 walkers then run until R-hat between ensembles is below 1.01 and every
     parameter has `ess` effective draws, bulk and tail.  They are looked at where they have grown by
-    up to twice.
+    up to four times.
 
     Parameters
     ----------

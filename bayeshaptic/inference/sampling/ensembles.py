@@ -71,7 +71,12 @@ class Ensembles:
             moves.append((alone, redrawn))
 
         class Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
-            """Without emcee's conversion of each walker's number, a tenth of a step."""
+            """Without emcee's conversion of each walker's number, a tenth of a step.
+
+            And without its copy of the generator's state in every step, a twentieth.
+            """
+
+            random_state = None
 
             def compute_log_prob(self, coords: Floats) -> tuple[Floats, None]:
                 return self.log_prob_fn(coords), None
@@ -83,7 +88,7 @@ class Ensembles:
             moves=[(emcee.moves.MHMove(move, ndim=size), share) for move, share in moves],
             vectorize=True,
         )
-        self.sampler.random_state = self.state
+        self.sampler._random.set_state(self.state)
 
     def advance(self, steps: int, every: int = 1) -> tuple[Floats, Floats]:
         """Go on until `steps` more are kept, `every` so many one.
@@ -98,7 +103,10 @@ class Ensembles:
         start = straightening.straight(self.positions)
         # The walkers are checked for independence at the start only; later they may well meet.
         last = self.sampler.run_mcmc(start, steps, skip_initial_state_check=True, thin_by=every)
-        self.positions, self.state = straightening.bent(last.coords), self.sampler.random_state
+        self.positions, self.state = (
+            straightening.bent(last.coords),
+            self.sampler._random.get_state(),
+        )
         chain = self.sampler.get_chain()
         bent = straightening.bent(chain.reshape(-1, chain.shape[2])).reshape(chain.shape)
         return _by_ensemble(bent), _by_ensemble(self.sampler.get_log_prob())

@@ -94,7 +94,7 @@ class Run:
             self.every = 2 * every
         margin = 1.1  # a forecast of the steps that are needed, and a little further
         growth = margin / max(verdict.share, 1e-3)
-        least_growth, most_growth = 1.3, 2.0
+        least_growth, most_growth = 1.3, 4.0
         growth = float(np.clip(growth, least_growth, most_growth))
         self.more = max(min(int((growth - 1) * self.steps), affordable), 1)
 
