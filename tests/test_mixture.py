@@ -9,6 +9,7 @@ from scipy.stats import kstest, multivariate_t
 from scipy.stats import t as student_t
 
 from bayeshaptic.inference.sampling.ensembles import warmed_up
+from bayeshaptic.inference.sampling.proposal import fitted as fitted_proposal
 from bayeshaptic.numerics.mixture import StudentMixture, student
 from bayeshaptic.numerics.mixture_fit import fit_student_mixture
 from bayeshaptic.numerics.straightening import nothing_to_straighten, straighten
@@ -234,3 +235,33 @@ def test_draws_that_are_all_one_in_most_parameters_are_straight(size):
     x[:, 2] += rng.normal(size=4000)
     straightening = straighten(x)
     assert straightening.bent(straightening.straight(x)) == pytest.approx(x, rel=1e-9)
+
+
+def test_a_proposal_reaches_a_tail_that_a_redraw_shows_and_no_walker_has_seen():
+    """A hundredth of the draws lies far out: a walker that came there would stay."""
+    rng = np.random.default_rng(19)
+    bulk, tail = rng.standard_normal((2000, 3)), rng.standard_normal((200, 3))
+    tail[:, 2] = rng.uniform(-12, -5, len(tail))
+
+    def density(x):
+        across = -0.5 * np.sum(x[:, :2] ** 2, axis=1)
+        with np.errstate(divide="ignore"):
+            far = np.log(0.01 / 7 * ((x[:, 2] > -12) & (x[:, 2] < -5)))
+        near = np.log(0.99 / np.sqrt(2 * np.pi)) - 0.5 * x[:, 2] ** 2
+        return across + np.logaddexp(near, far)
+
+    def redraw(x, rng):
+        drawn = x.copy()
+        drawn[:, 2] = rng.uniform(-12, 4, len(x))
+        return drawn, np.zeros(len(x))
+
+    def missed(shown):
+        made = fitted_proposal(bulk, density(bulk), density, shown, rng)
+        excess = [
+            density(x) - made.mixture.log_density(made.straightening.straight(x))
+            for x in (tail, bulk)
+        ]
+        return np.median(excess[0]) - np.median(excess[1])
+
+    assert missed(None) > 3.0  # twenty steps for one in the bulk, and more
+    assert missed(redraw) < 1.0

@@ -6,7 +6,8 @@ loop, this is the closed-loop output error (A. Janot, P.-O. Vandanjon and M. Gau
 instrumental variable approach for industrial robot identification", IEEE Transactions on Control
 Systems Technology 22, 2014): what enters the model holds no noise, so that feedback biases nothing,
 and no reference is needed.  Another follower costs an error of second order in the remaining force;
-a second one, with a lower bandwidth, shows how large it is, and widens the result.
+a second one, with a lower bandwidth, shows how large it is, and widens the result by what their
+noise does not explain.
 
 Errors have equal weights on purpose.  Weights by the residual's own spectrum hand friction over to
 the noise where the remaining force depends on position and direction: such a force is in the model.
@@ -18,7 +19,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.descent import descend
+from bayeshaptic.inference.time_domain.descent import Descended, descend
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
 from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, NAMES, Hum, MassInLoop
@@ -150,7 +151,7 @@ def fit_motion(
     first = descend(loop, begun, recording.name)
     other = 0.4  # bandwidth of the second follower over that of the first
     second = descend(loop.led(None, begun, other), first.inside, recording.name)
-    apart = second.values - first.values
+    apart = _beyond_noise(first, second)
     whole = first.covariance + np.outer(apart, apart)
     spread = whole[: len(NAMES), : len(NAMES)].copy()
     for index in FORCES:
@@ -173,3 +174,15 @@ def fit_motion(
         whole_sd=np.sqrt(np.diag(whole)),
         hums=loop.hums_at(first.inside),
     )
+
+
+def _beyond_noise(first: Descended, second: Descended) -> Floats:
+    """How far two fits lie apart, less what they would by chance, shape (V,).
+
+    The difference of an estimate and a better one has the difference of their variances (J. A.
+    Hausman, Econometrica 46, 1978).
+    """
+    apart = second.values - first.values
+    chance = np.diag(second.covariance) - np.diag(first.covariance)
+    beyond = np.maximum(apart**2 - np.maximum(chance, 0.0), 0.0)
+    return np.asarray(np.copysign(np.sqrt(beyond), apart))
