@@ -197,7 +197,7 @@ def make(seed: int, noise: float | None = None) -> Case:
     return Case(recording, truth, what, bench.encoder_resolution, (noise or 0.0) * size)
 
 
-def limit_draws(case: Case, values: Floats, covariance: Floats, seed: int) -> Floats:
+def limit_draws(truth: Floats, values: Floats, covariance: Floats, seed: int) -> Floats:
     """K_CR of the truth, then of draws from the posterior; inf alone where there are none."""
     rng = np.random.default_rng(seed)
     sd = np.sqrt(np.diag(covariance))
@@ -207,7 +207,7 @@ def limit_draws(case: Case, values: Floats, covariance: Floats, seed: int) -> Fl
     drawn = values + sd * (rng.standard_normal((count, len(sd))) @ root.T) * stretch
     prior = np.exp(-0.5 * (drawn[:, 4] / (2 * PERIOD_S)) ** 2)
     kept = np.all(drawn[:, [0, 1, 2, 4]] > 0, axis=1) & (rng.uniform(size=count) < prior)
-    theta = np.concatenate([case.truth[None], drawn[kept][:DRAWS]])[:, [0, 1, 4]]
+    theta = np.concatenate([truth[None], drawn[kept][:DRAWS]])[:, [0, 1, 4]]
     return critical_stiffness(rigid(period_s=PERIOD_S), theta).samples
 
 
@@ -272,7 +272,7 @@ def main(count: int) -> None:
             continue
         seconds += time.process_time() - began
         inside.append(np.abs(found.values - case.truth) < reach * found.sd)
-        limits = limit_draws(case, found.values, found.covariance, seed)
+        limits = limit_draws(case.truth, found.values, found.covariance, seed)
         if len(limits) > DRAWS // 10:
             ranks.append(float(np.mean(limits[1:] < limits[0])))
             low, high = np.quantile(limits[1:], [0.05, 0.95])

@@ -27,7 +27,7 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
-from benchmarks.closed_loop import DRAWS, PERIOD_S, Case, gains, limit_draws
+from benchmarks.closed_loop import DRAWS, PERIOD_S, gains, limit_draws
 
 DAY_TO_DAY = 0.1  # of the friction, standard deviation
 
@@ -102,8 +102,7 @@ def of_steps(count: int) -> None:
         found = fit_motion(recording)
         seconds += time.process_time() - began
         inside.append(np.abs(found.values - truth) < reach * found.sd)
-        case = Case(recording, truth, "steps")
-        limits = limit_draws(case, found.values, found.covariance, seed)
+        limits = limit_draws(truth, found.values, found.covariance, seed)
         low, high = np.quantile(limits[1:], [0.05, 0.95])
         held.append(low < limits[0] < high)
         widths.append(20 * np.log10(high / low))
