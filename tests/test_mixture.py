@@ -135,6 +135,23 @@ def test_warming_up_finds_a_density_that_the_first_guess_hardly_knows():
     assert chains.mean(axis=(0, 1, 2)) == pytest.approx(np.full(4, 1.8), abs=0.2)
 
 
+def test_no_round_of_a_warm_up_begins_after_the_steps_it_may_take():
+    """Or a hard density has spent what there is before a draw is kept."""
+    first, target = student(np.zeros(6), np.eye(6)), student(np.zeros(6), 1e-4 * np.eye(6))
+    taken = []
+
+    def counted(x):
+        taken[-1] += len(x)
+        return target.log_density(x)
+
+    for most in (1, np.inf):
+        taken.append(0)
+        warmed_up(counted, first, np.random.SeedSequence(8), np.zeros(6), None, most)
+    one_round = 256 * (16 + 1 + 8 + 1)  # steps, and where each advance begins
+    others = 4 * 4 * 64 + 1000  # starts, of which all are possible, and tries of the proposal
+    assert taken[0] <= one_round + others < taken[1]
+
+
 def test_warming_up_survives_a_guess_outside_the_support():
     def target(x):
         return np.where(np.all(x > 5, axis=1), -0.5 * np.sum(x**2, axis=1), -np.inf)

@@ -16,7 +16,7 @@ from bayeshaptic.inference.fit import REACH_SDS, Fit, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
-from bayeshaptic.inference.sampling.ensembles import warmed_up
+from bayeshaptic.inference.sampling.ensembles import ENSEMBLES, WALKERS, warmed_up
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.inference.sampling.near_zero import (
     inside,
@@ -38,6 +38,7 @@ from bayeshaptic.version import __version__
 
 DEFAULT_ESS = 2000
 MOST_EVALUATIONS = 1_500_000
+_WARM_UP = 1 / 3  # of the evaluations: a warm-up of 14 parameters took all that a misfit may cost
 # Log density of the best fit over that of the best draw, beside one a parameter, from which on the
 # chains have not found it: they agree with each other in a valley that is none. It was -1.2 to 0.4
 # in eight posteriors of both devices, free and held, with and without a device file.
@@ -146,7 +147,8 @@ def sample(
         warm, refit = np.random.SeedSequence(seed).spawn(2)
         peak, proposal = laplace(density, origin)
         report(0.1, "warming up")
-        ensembles = warmed_up(counted, proposal, warm, peak, redraw)
+        most_steps = _WARM_UP * most_evaluations / (ENSEMBLES * WALKERS)
+        ensembles = warmed_up(counted, proposal, warm, peak, redraw, most_steps)
         run = Run(ensembles, np.random.default_rng(refit))
     verdict = run_until_done(
         run,

@@ -118,13 +118,14 @@ def warmed_up(
     seed: np.random.SeedSequence,
     peak: Floats,
     redraw: Redraw | None = None,
+    most_steps: float = np.inf,
 ) -> Ensembles:
     """Ensembles that have forgotten their starts, with one proposal, refitted and frozen.
 
     Each begins at its own draws of a `first` proposal, so that R-hat between them can see a second
     mode; where these miss the support, near `peak`.  After each round of warm-up the proposal is
     fitted to where the walkers have been.  Rounds follow while the walkers accept the new one too
-    rarely, until neither that nor their density improves any more.
+    rarely, until neither that nor their density improves any more; none begins after `most_steps`.
     """
     *seeds, last = seed.spawn(ENSEMBLES + 1)
     rng = np.random.default_rng(last)
@@ -133,7 +134,7 @@ def warmed_up(
     proposal = Proposal.first(first, rng)
     state = np.random.RandomState(np.random.MT19937(last)).get_state()
     ensembles = Ensembles(density, proposal, _WARM, np.concatenate(starts), state, redraw)
-    best, level, idle = 0.0, -np.inf, 0
+    best, level, idle, taken = 0.0, -np.inf, 0, 0
     fewest = 8  # steps that a proposal is fitted to
     good = 0.5  # acceptance of independent proposals from which another round gains nothing
     climb = 0.1  # rise of the mean log density, in its standard deviations, that is no accident
@@ -146,7 +147,8 @@ def warmed_up(
         accepted = acceptance(density, ensembles.proposal, found, values, rng)
         climbing = values.mean() - level > climb * values.std()
         idle = 0 if accepted > 1.1 * best or climbing else idle + 1
-        if accepted > good or idle == _IDLE:
+        taken += steps
+        if accepted > good or idle == _IDLE or taken >= most_steps:
             break
         best, level = max(best, accepted), max(level, values.mean())
     # Tails that the first proposal misses were not reached yet: of a damper that may be zero the
