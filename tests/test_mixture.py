@@ -273,7 +273,8 @@ def test_a_proposal_reaches_a_tail_that_a_redraw_shows_and_no_walker_has_seen():
         return drawn, np.zeros(len(x))
 
     def missed(shown):
-        made = fitted_proposal(bulk, density(bulk), density, shown, rng)
+        chains = bulk.reshape(4, 10, 50, 3)
+        made = fitted_proposal(chains, density(bulk).reshape(4, 10, 50), density, shown, rng)
         excess = [
             density(x) - made.mixture.log_density(made.straightening.straight(x))
             for x in (tail, bulk)

@@ -76,8 +76,15 @@ def nothing_to_straighten(size: int) -> Straightening:
     return Straightening(np.zeros(size), eye, eye, none[0, 0], none[0], none)
 
 
-def straighten(x: Floats) -> Straightening:
-    """Fit the map to draws `x` of shape (B, P), by regression."""
+def straighten(x: Floats, together: int = 1) -> Straightening:
+    """Fit the map to draws, by regression.
+
+    Parameters
+    ----------
+    x : ndarray, shape (B, P)
+    together : int
+        So many draws, one after the other, are of one walker and may be alike.
+    """
     mean = x.mean(axis=0)
     # A parameter that is the same in all draws has the rounding of its mean for a spread.
     sd = np.maximum(x.std(axis=0), 1e-12 * np.abs(mean) + 1e-300)
@@ -92,7 +99,7 @@ def straighten(x: Floats) -> Straightening:
     quadratic = np.zeros((size, size, size))
     first, second = np.triu_indices(size - 1)
     products = v[:, first] * v[:, second]
-    strength = _strength(products, v)
+    strength = _strength(products, v, together)
     ridge = 1e-3
     for k in range(1, size):
         chosen = _chosen(np.where(second < k, strength[:, k], 0.0), len(x))
@@ -107,11 +114,17 @@ def straighten(x: Floats) -> Straightening:
     return Straightening(mean, whiten, colour, constant, linear, quadratic)
 
 
-def _strength(products: Floats, v: Floats) -> Floats:
-    """How far the slope of each component over each product is from zero, in standard errors."""
+def _strength(products: Floats, v: Floats, together: int) -> Floats:
+    """How far the slope of each component over each product is from zero, in standard errors.
+
+    Those of walkers, not of draws: one that stays somewhere for long says one thing many times.
+    """
     off = products - products.mean(axis=0)
-    size = np.sqrt(np.einsum("bq,bq->q", off, off))
-    return np.asarray(np.abs(off.T @ v) / np.maximum(size, 1e-300)[:, None])
+    found = np.empty((products.shape[1], v.shape[1]))
+    for k in range(v.shape[1]):
+        own = (off * v[:, [k]]).reshape(-1, together, products.shape[1]).sum(axis=1)
+        found[:, k] = np.abs(own.sum(axis=0)) / np.sqrt(np.maximum(np.sum(own**2, axis=0), 1e-300))
+    return found
 
 
 def _chosen(strength: Floats, points: int) -> Ints:
@@ -120,7 +133,7 @@ def _chosen(strength: Floats, points: int) -> Ints:
     What is not seen would bend a straight ridge by the accidents of the draws: of eleven parameters
     there are some two hundred products.
     """
-    seen = 5.0  # standard errors of independent points; those of walkers go together
+    seen = 5.0  # standard errors
     points_a_term = 30  # fewer points than that cannot decide a coefficient
     clearest = np.argsort(-strength, kind="stable")[: points // points_a_term]
     return np.sort(clearest[strength[clearest] > seen])

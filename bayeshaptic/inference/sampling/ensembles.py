@@ -142,8 +142,9 @@ def warmed_up(
         steps = max(share * size, 2 * fewest)
         chains, log_density = ensembles.advance(steps)
         late = slice(steps // 2, None, max(steps // 24, 1))
-        found, values = chains[:, late].reshape(-1, size), log_density[:, late].ravel()
-        ensembles = _with(ensembles, fitted(found, values, density, redraw, rng))
+        chains, log_density = chains[:, late], log_density[:, late]
+        ensembles = _with(ensembles, fitted(chains, log_density, density, redraw, rng))
+        found, values = chains.reshape(-1, size), log_density.ravel()
         accepted = acceptance(density, ensembles.proposal, found, values, rng)
         climbing = values.mean() - level > climb * values.std()
         idle = 0 if accepted > 1.1 * best or climbing else idle + 1
@@ -165,11 +166,10 @@ def refitted(
 
     `values` are the log densities there, (E, S, W).
     """
-    found = chains.reshape(-1, chains.shape[-1])
     most_points = 20_000  # that a proposal is fitted to
-    every = max(2, -(-len(found) // most_points))
-    draws, there = found[::every], values.ravel()[::every]
-    return _with(ensembles, fitted(draws, there, ensembles.density, ensembles.redraw, rng))
+    every = max(2, -(-values.size // most_points))
+    own = fitted(chains[:, ::every], values[:, ::every], ensembles.density, ensembles.redraw, rng)
+    return _with(ensembles, own)
 
 
 def _with(ensembles: Ensembles, proposal: Proposal) -> Ensembles:

@@ -67,20 +67,30 @@ class Proposal:
 
 
 def fitted(
-    found: Floats,
-    values: Floats,
+    chains: Floats,
+    log_density: Floats,
     density: LogDensity,
     redraw: Redraw | None,
     rng: np.random.Generator,
 ) -> Proposal:
-    """A proposal for a density from which `found` are draws, with log densities `values`.
+    """A proposal for a density, from draws and the log densities there.
 
     Places where it misses the density get a share of their own.  Walkers that have been there show
     them, where they stay for long, and so does a `redraw` of what may be next to zero: tails that
     reach over many scales hold a hundredth of the draws, and walkers that do not know them yet
     would hang there later.
+
+    Parameters
+    ----------
+    chains : ndarray, shape (ensembles, steps, walkers, P)
+    log_density : ndarray, shape (ensembles, steps, walkers)
+    density : callable
+    redraw : callable, optional
+    rng : Generator
     """
-    straightening = straighten(found)
+    found = chains.swapaxes(1, 2).reshape(-1, chains.shape[-1])  # a walker after the other
+    values = log_density.swapaxes(1, 2).ravel()
+    straightening = straighten(found, chains.shape[1])
     y = straightening.straight(found)
     _, once = np.unique(values, return_index=True)  # a walker that stays is found many times
     size = y.shape[1]
