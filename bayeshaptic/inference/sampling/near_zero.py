@@ -1,7 +1,8 @@
 """Coordinates for parameters of which a recording says no more than that they are next to zero.
 
-The prior `NearZero` has as much probability on every scale, `MaybeZero` a spike: only a logarithm
-shows all of it.  But what the data know, sums of dampers before all, are lines in the natural
+The prior `NearZero` has as much probability on every scale, `MaybeZero` a spike, and a damper of
+which nobody knows anything may be a hundredth of what it seems: only a logarithm shows all of it.
+But what the data know, sums of dampers before all, are lines in the natural
 values, hundreds of times longer than they are thick, and a logarithm would bend them.  So the
 others are measured from where they follow the small one to.
 """
@@ -15,13 +16,14 @@ import numpy as np
 
 from bayeshaptic.inference.coordinates import Coordinates, sampling_coordinates
 from bayeshaptic.inference.fit import Fit, weighted_residuals
-from bayeshaptic.models import MaybeZero, NearZero, Prior, draw
+from bayeshaptic.models import LogNormal, MaybeZero, NearZero, Prior, draw
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.types import Floats
 
 Redraw = Callable[[Floats, np.random.Generator], tuple[Floats, Floats]]
 """From points (B, P) to proposed points, with log density of proposing the way back over there."""
 _MAY_BE_ZERO = (MaybeZero, NearZero)  # priors
+_WIDE = 1.0  # log standard deviation of a prior that does not know how large a damper is
 _SEEN = 5.0  # standard deviations from zero, from which a parameter is sampled as it is
 # Coordinate units, of a ridge that is straight: e^10 in a logarithm.  A guard: the ridges of
 # 12 simulated recordings, held and free, clean and with effects, are all shorter than 1.
@@ -34,13 +36,13 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
     How the others follow them is the direction in which the fit suffers least.  Of several whose
     sum is seen, these are measured by their ratios to the largest.
     """
-    priors = [fit.model.prior(name) for name in fit.model.names]
-    if not any(isinstance(prior, _MAY_BE_ZERO) for prior in priors):
+    found = _candidates(here, fit)
+    if not found:
         return here
     slope = _slope(here, fit)
     values = fit.theta / here.scale
     seen = values > _SEEN * _errors(slope)
-    found = {i: p for i, p in enumerate(priors) if isinstance(p, _MAY_BE_ZERO) and not seen[i]}
+    found = {index: prior for index, prior in found.items() if not seen[index]}
     small = sorted(found, key=lambda index: values[index])
     beside = _beside(slope, values, small)
     small = [index for index in small if index != beside]
@@ -50,20 +52,44 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
     if not small:
         return here
     small = sorted(small)
-    chosen = np.isin(np.arange(len(priors)), small)
+    chosen = np.isin(np.arange(len(values)), small)
     return replace(
         here,
         log=here.log | chosen,
         scale=np.where(chosen, 1.0, here.scale),
         low=np.where(chosen, 0.0, here.low),
         high=np.where(chosen, np.inf, here.high),
-        walls=here.walls & ~chosen & (np.arange(len(priors)) != beside),
+        walls=here.walls & ~chosen & (np.arange(len(values)) != beside),
         near_zero=tuple(small),
-        floor=np.array([found[index].floor for index in small]),
+        floor=np.array([_floor(found[index]) for index in small]),
         follow=_followed(slope, small) / here.scale[small],
         beside=beside,
-        beside_floor=1.0 if beside is None else found[beside].floor,
+        beside_floor=1.0 if beside is None else _floor(found[beside]),
     )
+
+
+def _candidates(here: Coordinates, fit: Fit) -> dict[int, Prior]:
+    """Parameters that may be next to zero, by their place: by their priors, and by their errors.
+
+    The latter are dampers that are sampled as they are, but whose prior lets them be as small as
+    they like: where one is two of its errors a third of the posterior may lie next to zero, a
+    needle at the wall.
+    """
+    found: dict[int, Prior] = {}
+    for index, name in enumerate(fit.model.names):
+        prior, damps = fit.model.prior(name), fit.model.parameter(name).dimension == "damping"
+        wide = isinstance(prior, LogNormal) and prior.log_sd > _WIDE
+        if isinstance(prior, _MAY_BE_ZERO) or (wide and damps and not here.log[index]):
+            found[index] = prior
+    return found
+
+
+def _floor(prior: Prior) -> float:
+    """Below that every value is alike."""
+    if isinstance(prior, _MAY_BE_ZERO):
+        return prior.floor
+    lowest = 1e-3  # of the probability
+    return float(prior.quantile(lowest))
 
 
 def resolved(fit: Fit) -> Fit:
@@ -142,12 +168,11 @@ def inside(here: Coordinates, fit: Fit, begin: float = 0.0) -> Floats:
     return phi + np.clip(own, here.low + margin, here.high - margin) - own
 
 
-def _on_every_scale(prior: Prior) -> NearZero:
+def _on_every_scale(prior: Prior) -> Prior:
     """A density that is nowhere far from `prior` next to zero, whichever scale the data see."""
-    if isinstance(prior, NearZero):
-        return prior
-    assert isinstance(prior, MaybeZero)
-    return NearZero(prior.scale, max(prior.floor, 1e-12 * prior.scale))
+    if isinstance(prior, MaybeZero):
+        return NearZero(prior.scale, max(prior.floor, 1e-12 * prior.scale))
+    return prior
 
 
 def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:
