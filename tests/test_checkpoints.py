@@ -36,7 +36,7 @@ def write_and_die(self, arrays):
 
 checkpoint.Checkpoint.write = write_and_die
 etfe = bh.estimate_etfe(bh.read_recording(recording), band_hz=(1, 25))
-posterior = bh.sample(bh.rigid(device="phantom"), etfe, ess=40000, checkpoints=folder)
+posterior = bh.sample(bh.rigid(device="phantom"), etfe, ess=150000, checkpoints=folder)
 print(hashlib.sha256(posterior.chains.tobytes() + posterior.log_likelihood.tobytes()).hexdigest())
 print(posterior.chains.shape[1], posterior.message, len(written))
 """

@@ -16,6 +16,7 @@ from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.laplace import _possible, laplace
 from bayeshaptic.inference.sampling.near_zero import (
     _errors,
+    _slope,
     inside,
     redrawing,
     resolved,
@@ -324,3 +325,25 @@ def test_sampling_takes_what_is_seen_from_the_fit():
 def test_a_motor_is_less_likely_without_damping_than_what_it_moves():
     _, fit, _ = without_file({**LIGHT, "b1": 0.1, "b2": 0.2}, 10.0)
     assert [fit.model.prior(name).weight for name in ("b1", "b2")] == [1.5, 3.0]
+
+
+def test_a_damper_of_two_errors_may_be_next_to_zero_where_nobody_knows_its_size(fitted):
+    """Its prior of many factors e, and the data, let it be a hundredth: a needle at the wall."""
+    etfe, bench, _, _, _ = fitted
+    fit = bh.least_squares(bh.free(delay_s=bench.delay_s), etfe)
+    index = fit.model.names.index("bc")
+    prior = fit.model.prior("bc")
+    assert prior.log_sd > 1  # nobody knows
+
+    def where_it_is(errors: float):
+        """With noise in which it is so many of its errors."""
+        plain = sampling_coordinates(fit.model, fit.theta, fit.sd)
+        assert not plain.log[index]
+        now = fit.theta[index] / (_errors(_slope(plain, fit))[index] * plain.scale[index])
+        louder = replace(fit.windows, scatter=(now / errors) ** 2 * fit.windows.scatter)
+        return with_near_zero(plain, summarise(fit.model, louder, fit.theta))
+
+    here = where_it_is(2.0)
+    assert index in here.near_zero and here.log[index]
+    assert here.floor[here.near_zero.index(index)] == pytest.approx(prior.quantile(1e-3))
+    assert index not in where_it_is(8.0).near_zero
