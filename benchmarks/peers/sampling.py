@@ -146,7 +146,13 @@ def main() -> None:
             if asked.old:
                 runs["the older version"] = partial(by_older, asked.old, seeds=SEEDS)
             for sampler, run in runs.items():
-                found = together(known, run(known))
+                try:
+                    found = together(known, run(known))
+                except KeyboardInterrupt:
+                    raise
+                except BaseException as failed:  # nutpie's panics are no exceptions
+                    print(f"{name} | {sampler} | does not run: {failed}", flush=True)
+                    continue
                 reference = reference or found
                 apart = abs(found.median - reference.median)
                 mark = " (apart)" if apart > 4 * np.hypot(found.error, reference.error) else ""
