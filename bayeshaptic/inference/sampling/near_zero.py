@@ -24,7 +24,9 @@ Redraw = Callable[[Floats, np.random.Generator], tuple[Floats, Floats]]
 """From points (B, P) to proposed points, with log density of proposing the way back over there."""
 _MAY_BE_ZERO = (MaybeZero, NearZero)  # priors
 _WIDE = 1.0  # log standard deviation of a prior that does not know how large a damper is
-_SEEN = 5.0  # standard deviations from zero, from which a parameter is sampled as it is
+# Standard deviations from zero, from which a parameter is sampled as it is: one that may be zero,
+# and one whose size no prior knows, of whose posterior 2 % lie next to zero then.
+_SEEN, _SEEN_WIDE = 5.0, 3.5
 # Coordinate units, of a ridge that is straight: e^10 in a logarithm.  A guard: the ridges of
 # 12 simulated recordings, held and free, clean and with effects, are all shorter than 1.
 _LONGEST = 10.0
@@ -41,8 +43,8 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
         return here
     slope = _slope(here, fit)
     values = fit.theta / here.scale
-    seen = values > _SEEN * _errors(slope)
-    found = {index: prior for index, prior in found.items() if not seen[index]}
+    errors = values / _errors(slope)
+    found = {index: prior for index, prior in found.items() if errors[index] < _enough(prior)}
     small = sorted(found, key=lambda index: values[index])
     beside = _beside(slope, values, small)
     small = [index for index in small if index != beside]
@@ -82,6 +84,11 @@ def _candidates(here: Coordinates, fit: Fit) -> dict[int, Prior]:
         if isinstance(prior, _MAY_BE_ZERO) or (wide and damps and not here.log[index]):
             found[index] = prior
     return found
+
+
+def _enough(prior: Prior) -> float:
+    """Standard deviations from zero, from which on a parameter is sampled as it is."""
+    return _SEEN if isinstance(prior, _MAY_BE_ZERO) else _SEEN_WIDE
 
 
 def _floor(prior: Prior) -> float:
