@@ -254,6 +254,19 @@ def test_draws_that_are_all_one_in_most_parameters_are_straight(size):
     assert straightening.bent(straightening.straight(x)) == pytest.approx(x, rel=1e-9)
 
 
+def test_walkers_that_stay_bend_no_ridge():
+    """Sixty draws of one place far out look like a clear bend, but are one."""
+    rng = np.random.default_rng(20)
+    walkers = rng.standard_normal((100, 60, 3)) * [3.0, 2.0, 1.0]
+    walkers[0], walkers[1] = [15.0, 0.0, 5.0], [-15.0, 0.0, 5.0]
+    x = walkers.reshape(-1, 3)
+    assert straighten(x).quadratic.any()
+    assert not straighten(x, together=60).quadratic.any()
+    bent = walkers.copy()
+    bent[..., 2] += 0.3 * walkers[..., 0] ** 2  # as all of them see
+    assert straighten(bent.reshape(-1, 3), together=60).quadratic.any()
+
+
 def test_a_proposal_reaches_a_tail_that_a_redraw_shows_and_no_walker_has_seen():
     """A hundredth of the draws lies far out: a walker that came there would stay."""
     rng = np.random.default_rng(19)

@@ -6,12 +6,7 @@ import arviz as az
 import numpy as np
 import pytest
 
-from bayeshaptic.numerics.rank_statistics import (
-    bulk_size,
-    of_ensembles,
-    split_rhat,
-    tail_size,
-)
+from bayeshaptic.numerics.rank_statistics import of_ensembles, split_rhat
 from bayeshaptic.types import Floats
 
 
@@ -36,30 +31,37 @@ CASES = {
 }
 
 
+def _sizes(chains: Floats) -> tuple[float, float]:
+    """Bulk and tail, every chain a walker of one ensemble."""
+    return of_ensembles(chains.T[None])[1:]
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_the_numbers_are_arviz(case: str) -> None:
     chains = CASES[case]
-    bulk, tail = az.ess(chains, method="bulk"), az.ess(chains, method="tail", prob=(0.05, 0.95))
     assert split_rhat(chains) == pytest.approx(float(az.rhat(chains)), rel=1e-10)
-    assert bulk_size(chains) == pytest.approx(float(bulk), rel=1e-9)
-    assert tail_size(chains) == pytest.approx(float(tail), rel=1e-9)
+    even = chains[:, chains.shape[1] % 2 :]
+    bulk, tail = az.ess(even, method="bulk"), az.ess(even, method="tail", prob=(0.05, 0.95))
+    assert _sizes(chains) == pytest.approx((float(bulk), float(tail)), rel=1e-9)
+    assert of_ensembles(chains[..., None])[0] == pytest.approx(float(az.rhat(even)), rel=1e-10)
 
 
 @pytest.mark.parametrize("steps", [40, 41, 4])
 def test_ensembles_are_judged_by_one_order_of_their_draws(steps: int) -> None:
     """Each in the order of time for R-hat; each walker a chain for sizes."""
     draws = np.random.default_rng(5).standard_normal((4, steps, 16)).cumsum(axis=1)
-    rhat, bulk, tail = of_ensembles(draws)
     even = draws[:, steps % 2 :]
     walkers = even.swapaxes(1, 2).reshape(64, -1)
-    assert rhat == split_rhat(even.reshape(4, -1))
-    assert (bulk, tail) == (bulk_size(walkers), tail_size(walkers))
+    rhat, *sizes = of_ensembles(draws)
+    assert rhat == pytest.approx(float(az.rhat(even.reshape(4, -1))), rel=1e-10)
+    found = [az.ess(walkers, method="bulk"), az.ess(walkers, method="tail", prob=(0.05, 0.95))]
+    assert sizes == pytest.approx([float(one) for one in found], rel=1e-9)
 
 
 def test_what_cannot_be_judged_is_not_praised() -> None:
     constant, broken = np.ones((4, 100)), np.full((4, 100), np.nan)
-    assert np.isinf(split_rhat(broken)) and bulk_size(broken) == tail_size(broken) == 0.0
+    assert np.isinf(split_rhat(broken)) and _sizes(broken) == (0.0, 0.0)
     assert np.isinf(split_rhat(constant))
-    assert bulk_size(constant) == constant.size  # as ArviZ says
+    assert _sizes(constant)[0] == constant.size  # as ArviZ says
     assert np.isinf(split_rhat(np.ones((4, 3))))
     assert of_ensembles(np.full((4, 40, 8), np.nan)) == (np.inf, 0.0, 0.0)

@@ -51,7 +51,8 @@ def diagnose(chains: Floats, ess: float | None = None) -> Diagnostics:
     ----------
     chains : ndarray
     ess : float, optional
-        So many effective draws are of interest: longer chains are thinned to ten times that.
+        So many effective draws are of interest: longer chains are thinned to ten times that, and
+        to what R-hat needs.
     """
     for_ess = 10.0
     counted = chains if ess is None else thinned(chains, max(for_ess * ess, _FEWEST))

@@ -39,25 +39,22 @@ def split_rhat(chains: Floats) -> float:
     return _larger_rhat(ranked.scores, ranked.folded)
 
 
-def bulk_size(chains: Floats) -> float:
-    """Effective sample size of the ranks of chains (chain, draw); 0 where there is none."""
-    return _size(_Ranked.of(_halves(chains)).scores) if _usable(chains) else 0.0
-
-
-def tail_size(chains: Floats) -> float:
-    """The smaller effective sample size of being below the 5 % and below the 95 % quantile."""
-    return _tail_size(chains, _Ranked.of(chains)) if _usable(chains) else 0.0
-
-
 def of_ensembles(draws: Floats) -> tuple[float, float, float]:
     """R-hat with an ensemble as a chain, bulk and tail size with a walker as one.
 
-    An ensemble is taken in the order of time.  The draws are sorted once for all three.
+    An ensemble is taken in the order of time.  The bulk size is that of the ranks, the tail size
+    the smaller one of being below the 5 % and below the 95 % quantile.  The draws are sorted once
+    for all three.
 
     Parameters
     ----------
     draws : ndarray, shape (ensemble, step, walker)
         Of an odd number of steps the first counts for nothing.
+
+    Returns
+    -------
+    rhat, bulk, tail : float
+        Infinite, 0 and 0 where there are none.
     """
     draws = draws[:, draws.shape[1] % 2 :]
     ensembles, steps, _ = draws.shape
@@ -72,8 +69,9 @@ def of_ensembles(draws: Floats) -> tuple[float, float, float]:
         return np.inf, 0.0, 0.0
     ranked = _Ranked.of(draws)
     rhat = _larger_rhat(halves(ranked.scores), halves(ranked.folded)) if ensembles > 1 else np.inf
-    bulk = _size(_halves(walkers(ranked.scores)))
-    return rhat, bulk, _tail_size(walkers(draws), ranked)
+    ends = [ranked.quantile(level) for level in _TAILS]
+    below = [_size(_halves(walkers((draws <= end).astype(float)))) for end in ends]
+    return rhat, _size(_halves(walkers(ranked.scores))), min(below)
 
 
 def _usable(chains: Floats) -> bool:
@@ -138,11 +136,6 @@ class _Ranked:
 def _scores_of(count: int) -> Floats:
     """Scores of twice the ranks 0 to `count`, which a column shares with the next."""
     return np.asarray(ndtri((0.5 * np.arange(2 * count + 1) - 0.375) / (count + 0.25)))
-
-
-def _tail_size(chains: Floats, ranked: _Ranked) -> float:
-    ends = [ranked.quantile(level) for level in _TAILS]
-    return min(_size(_halves((chains <= end).astype(float))) for end in ends)
 
 
 def _larger_rhat(scores: Floats, folded: Floats) -> float:

@@ -43,8 +43,8 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
         return here
     slope = _slope(here, fit)
     values = fit.theta / here.scale
-    errors = values / _errors(slope)
-    found = {index: prior for index, prior in found.items() if errors[index] < _enough(prior)}
+    far = values / _errors(slope)
+    found = {index: prior for index, prior in found.items() if far[index] < _enough(prior)}
     small = sorted(found, key=lambda index: values[index])
     beside = _beside(slope, values, small)
     small = [index for index in small if index != beside]
