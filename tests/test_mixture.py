@@ -258,12 +258,12 @@ def test_walkers_that_stay_bend_no_ridge():
     """Sixty draws of one place far out look like a clear bend, but are one."""
     rng = np.random.default_rng(20)
     walkers = rng.standard_normal((100, 60, 3)) * [3.0, 2.0, 1.0]
+    bent = walkers.copy()
+    bent[..., 2] += 0.3 * walkers[..., 0] ** 2  # as all of them see
     walkers[0], walkers[1] = [15.0, 0.0, 5.0], [-15.0, 0.0, 5.0]
     x = walkers.reshape(-1, 3)
     assert straighten(x).quadratic.any()
     assert not straighten(x, together=60).quadratic.any()
-    bent = walkers.copy()
-    bent[..., 2] += 0.3 * walkers[..., 0] ** 2  # as all of them see
     assert straighten(bent.reshape(-1, 3), together=60).quadratic.any()
 
 
