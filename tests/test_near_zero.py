@@ -12,6 +12,7 @@ import bayeshaptic as bh
 from bayeshaptic.inference import sampler
 from bayeshaptic.inference.coordinates import sampling_coordinates
 from bayeshaptic.inference.fit import summarise
+from bayeshaptic.inference.sampling import near_zero
 from bayeshaptic.inference.sampling.density import Density
 from bayeshaptic.inference.sampling.laplace import _possible, laplace
 from bayeshaptic.inference.sampling.near_zero import (
@@ -296,6 +297,31 @@ def test_two_small_dampers_whose_sum_is_known_are_sampled_over_all_of_it():
     assert posterior.converged
     low, high = np.quantile(posterior.draws[:, b1], [0.1, 0.9])
     assert low < 0.01 and high > 0.23  # 0.04 and 0.15 in logarithms of each
+
+
+def test_a_damper_that_others_are_measured_beside_has_less_for_more_of_them(light, monkeypatch):
+    """Also where one that follows too far is left out, and it follows that one then."""
+    _, fit, _ = light
+    plain = sampling_coordinates(fit.model, fit.theta, fit.sd)
+    values = fit.theta / plain.scale
+    dampers = [fit.model.names.index(name) for name in ("b1", "b2", "bc")]
+    small, left_out, largest = sorted(dampers, key=lambda index: values[index])
+    other = fit.model.names.index("kc")
+    slope = np.zeros((4, len(values)))  # of a size that a change of each by itself is seen
+    slope[:, small] = np.array([1e4, 0, 0, 0]) / values[small]
+    slope[:, left_out] = np.array([2e4, 1e4, 3, 0]) / values[left_out]
+    slope[:, largest] = np.array([2e3, 1e4, 0, 0]) / values[largest]
+    slope[2, other] = 1.0
+    prior = bh.MaybeZero(1.0)
+    monkeypatch.setattr(near_zero, "_candidates", lambda *_: dict.fromkeys(dampers, prior))
+    monkeypatch.setattr(near_zero, "_slope", lambda *_: slope)
+    both = with_near_zero(plain, fit)
+    assert both.beside == largest and set(both.near_zero) == {small, left_out}
+    monkeypatch.setattr(near_zero, "_LONGEST", 1.0)
+    here = with_near_zero(plain, fit)
+    assert left_out not in here.near_zero and small in here.near_zero
+    assert here.follow[largest, here.near_zero.index(small)] >= 0  # it has more for more of that
+    assert here.beside is None
 
 
 @pytest.mark.parametrize(

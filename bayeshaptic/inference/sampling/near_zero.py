@@ -45,12 +45,12 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
     values = fit.theta / here.scale
     far = values / _errors(slope)
     found = {index: prior for index, prior in found.items() if far[index] < _enough(prior)}
-    small = sorted(found, key=lambda index: values[index])
-    beside = _beside(slope, values, small)
-    small = [index for index in small if index != beside]
+    rising = sorted(found, key=lambda index: values[index])
+    beside, small = _split(slope, values, rising)
     # What follows further than makes sense; then the largest may be far from zero.
     while small and np.abs(_followed(slope, small) @ values[small]).max() > _LONGEST:
-        small = small[:-1]
+        rising = [index for index in rising if index != small[-1]]
+        beside, small = _split(slope, values, rising)  # what is not small follows the others anew
     if not small:
         return here
     small = sorted(small)
@@ -118,16 +118,18 @@ def _slope(here: Coordinates, fit: Fit) -> Floats:
     return slope / np.sqrt(max(1.0, fit.reduced_chi_square))
 
 
-def _beside(slope: Floats, values: Floats, small: list[int]) -> int | None:
-    """The largest of the `small` ones, in rising order, where none is seen but their sum is."""
-    if len(small) < 2:
-        return None
-    *smaller, largest = small
+def _split(slope: Floats, values: Floats, rising: list[int]) -> tuple[int | None, list[int]]:
+    """The largest of the small ones, where none is seen but their sum is, and the others."""
+    if len(rising) < 2:
+        return None, rising
+    *smaller, largest = rising
     follow = _followed(slope, smaller)[largest]
     known = slope.copy()
     known[:, smaller] = 0.0
     whole = values[largest] - follow @ values[smaller]
-    return largest if (follow < 0).all() and whole > _SEEN * _errors(known)[largest] else None
+    if (follow < 0).all() and whole > _SEEN * _errors(known)[largest]:
+        return largest, smaller
+    return None, rising
 
 
 def _errors(slope: Floats) -> Floats:
