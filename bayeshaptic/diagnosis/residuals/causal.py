@@ -2,8 +2,9 @@
 
 Around the fit of a direct likelihood (`recordings/response/estimators/direct.py`) every window may
 deviate, by as much as the controller makes of the noise.  What must vanish is the sum over all of
-them of the score of any change that is causal: of the response by a filter, or of the motion by a
-force.  Its variance is that of a regression in which the noise itself excites nothing.
+them of the score of any change that is causal: of the response by a filter, of the motion by a
+force, of a parameter in time.  Its variance is that of a regression in which the noise itself
+excites nothing.
 
 An encoder's rounding is not quite a noise that knows nothing of the motion, and the scores are
 large beside it where a device moves by few counts, or for a few seconds.  What was measured less
@@ -22,6 +23,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import columns, force_test, line_transform
+from bayeshaptic.diagnosis.residuals.drift import SHAPES
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test, chi_square_score
 from bayeshaptic.diagnosis.residuals.unforced import fitted_motion
 from bayeshaptic.inference.coordinates import believed, coordinates
@@ -70,7 +72,7 @@ class Scores:
 
 
 def causal_tests(fit: Fit, etfe: Etfe, acted: Floats | float = 0.0) -> tuple[Test, ...]:
-    """Tests for another linear response, for forces, and for a gain that changes in time.
+    """Tests for another linear response, for forces, and for a device that changes in time.
 
     Parameters
     ----------
@@ -88,10 +90,12 @@ def causal_tests(fit: Fit, etfe: Etfe, acted: Floats | float = 0.0) -> tuple[Tes
 
 
 def _tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
-    smooth = np.concatenate([_own_changes(fit), _filtered(fit)], axis=2)
+    own_changes = _own_changes(fit, fit.windows.frequency_hz)
+    smooth = np.concatenate([own_changes, _filtered(fit)], axis=2)
     own = fit.model.size
     linear = scores(fit, fit.windows, smooth).beside(own)
-    return (_linear_test(linear), *_force_tests(fit, etfe, smooth))
+    others = *_force_tests(fit, etfe, smooth), *_time_tests(fit, etfe, smooth)
+    return (_linear_test(linear), *others)
 
 
 def _closer(fit: Fit, etfe: Etfe, acted: Floats | float) -> tuple[Fit, Etfe]:
@@ -130,14 +134,14 @@ def scores(fit: Fit, windows: Windows, changes: Complexes) -> Scores:
     )
 
 
-def _own_changes(fit: Fit) -> Complexes:
-    """What each parameter does to the response at the nodes, (W, k, P)."""
-    here, nodes = coordinates(fit.model), fit.windows.frequency_hz
+def _own_changes(fit: Fit, frequency_hz: Floats) -> Complexes:
+    """What each parameter does to the response at frequencies of any shape, (..., P)."""
+    here = coordinates(fit.model)
     phi = np.repeat(here.coordinate(fit.theta[None]), fit.model.size + 1, axis=0)
     phi[1:] += _STEP * np.eye(fit.model.size)
-    response = fit.model.response(here.natural(phi), nodes.ravel())
+    response = fit.model.response(here.natural(phi), frequency_hz.ravel())
     slope = (response[1:] - response[0]) / _STEP
-    return np.moveaxis(slope.reshape(-1, *nodes.shape), 0, -1)
+    return np.moveaxis(slope.reshape(-1, *frequency_hz.shape), 0, -1)
 
 
 def _filtered(fit: Fit) -> Complexes:
@@ -155,11 +159,16 @@ def _filtered(fit: Fit) -> Complexes:
     return response[..., None] * filters
 
 
-def _linear_test(found: Scores) -> Test:
+def _together(found: Scores) -> float:
+    """All scores as one, standard normal where the model is right."""
     sizes, directions = np.linalg.eigh(found.covariance)
     kept = sizes > _LEAST * max(float(sizes.max()), _LEAST)
     along = directions[:, kept].T @ found.score
-    z = chi_square_score(float(np.sum(along**2 / sizes[kept])), int(kept.sum()))
+    return chi_square_score(float(np.sum(along**2 / sizes[kept])), int(kept.sum()))
+
+
+def _linear_test(found: Scores) -> Test:
+    z = _together(found)
     text = f"a causal change of the response would explain it ({z:.1f} standard deviations)"
     return Test("causal change", "linear", z, thresholds.SMOOTH, None, text)
 
@@ -175,12 +184,26 @@ def _force_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
     for name, inputs, rms in moved:
         score, sd, moves = _beside_linear(fit, etfe, smooth, inputs[0])
         found.append(force_test(name, abs(score), ForceSeen(score * sd, sd, rms, moves)))
-    time = np.linspace(-1.0, 1.0, recording.samples)
-    later = fit.response(frequency_hz) * at_lines(recording.force * time)
-    score, _, _ = _beside_linear(fit, etfe, smooth, later)
-    text = f"a gain that changes in time stands {abs(score):.1f} standard deviations out"
-    test = Test("gain in time", "time-varying", abs(score), thresholds.two_sided(), None, text)
-    return [*found, test]
+    return found
+
+
+def _time_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
+    """Of parameters and a gain that change in time, what any steady response can do taken off."""
+    recording = etfe.unbroken
+    assert recording is not None
+    frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
+    at_lines, time = line_transform(etfe, recording), np.linspace(-1.0, 1.0, recording.samples)
+    gain = fit.response(frequency_hz)[:, None]
+    changes = np.concatenate([_own_changes(fit, frequency_hz), gain], axis=1).T
+    found = []
+    for name, shape in SHAPES.items():
+        windows = etfe.spectra.windows(
+            fit.response, changes * at_lines(recording.force * shape(time))
+        )
+        z = _together(scores(fit, windows, smooth).beside(smooth.shape[2]))
+        text = f"{name} of the device during the recording ({z:.1f} standard deviations)"
+        found.append(Test(name, "time-varying", z, thresholds.SMOOTH, None, text))
+    return found
 
 
 def _beside_linear(
