@@ -18,6 +18,7 @@ from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.check import check_recording
+from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import (
@@ -29,6 +30,7 @@ from bayeshaptic.recordings.signals.causality.causality import (
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.recordings.signals.switching import is_switched
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
+from benchmarks.strangers.loops import make
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
@@ -357,3 +359,14 @@ def test_a_speed_is_no_position() -> None:
         check_recording(recording_from_arrays(force, speed, period_s=0.02, position_unit="rad"))
     position = np.cumsum(speed) * 0.02
     check_recording(recording_from_arrays(force, position, period_s=0.02, position_unit="rad"))
+
+
+@pytest.mark.parametrize("seed", [80056, 95055])
+def test_a_few_pulses_of_a_spring_and_a_damper_are_no_velocity(seed: int) -> None:
+    """The lower frequencies of a position look like those of a damper and a mass's velocity."""
+    case = make(seed)
+    assert case is not None
+    recording = case.recording
+    rough = rough_response(recording)
+    assert rough.is_velocity(recording.period_s)
+    what_drives_what(recording, rough, "it")  # refuses what looks like a velocity

