@@ -66,7 +66,8 @@ class Answer:
         """
         answer = self._response(added[None], frequency_hz)[0]
         fast = 1 - slow_share(frequency_hz, self.edge_hz)
-        return np.abs((1 + answer) / (1 + fast * answer))
+        with np.errstate(invalid="ignore"):  # not a number beside parameters that are none
+            return np.abs((1 + answer) / (1 + fast * answer))
 
     def growth(self, added: Complexes | None, slopes: Complexes) -> Floats:
         """Slopes of the logarithm of `louder` at the lines, shape (J, L).
@@ -82,7 +83,8 @@ class Answer:
         answer = self._response(there[None], self.frequency_hz)
         more = self._response(slopes, self.frequency_hz)
         slow = slow_share(self.frequency_hz, self.edge_hz)
-        return np.real(slow * more / ((1 + answer) * (1 + (1 - slow) * answer)))
+        with np.errstate(invalid="ignore"):  # slopes that are no numbers end a fit
+            return np.real(slow * more / ((1 + answer) * (1 + (1 - slow) * answer)))
 
     def _response(self, added: Complexes, frequency_hz: Floats) -> Complexes:
         """G N of what is added at the lines, shape (J, L), at other frequencies; (J, W)."""

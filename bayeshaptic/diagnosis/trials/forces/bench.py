@@ -206,10 +206,13 @@ class ForceBench:
         if not np.all(np.isfinite(self.model.response(theta, self._somewhere))):
             return None
         added = self.simulation.added(forces, theta, expected)
-        if np.isnan(added).any():
+        if not np.isfinite(added).all():
             return None
         changes = self.changes(forces, added)
         etfe = self.without(changes, theta)
+        louder = etfe.spectra.louder  # type: ignore[attr-defined]
+        if louder is not None and not np.isfinite(louder).all():
+            return None
         return changes, etfe, self.windows(etfe, theta)
 
     def _valued(self, forces: tuple[Acting, ...], theta: Floats, found: _Simulated | None) -> Point:

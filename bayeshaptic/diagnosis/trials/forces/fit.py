@@ -117,7 +117,7 @@ def _advanced(bench: ForceBench, form: Form, best: Point, step: _Step) -> tuple[
     # where a part of a law vanishes.
     while factor * step.size <= _MOST:
         further = along(_ON * factor)
-        if further.gain_fit < point.gain_fit + _NO_GAIN:
+        if not further.gain_fit - point.gain_fit >= _NO_GAIN:  # nor where both run away
             break
         factor, point = _ON * factor, further
     polished = _polished(bench, point)
