@@ -15,6 +15,9 @@ from bayeshaptic.recordings.response.spectra import RandomSpectra
 # A force that fell by more within an octave was cut off there: 13 dB is more than what a
 # second-order filter does, less than a third-order one.
 CUT_OFF = 20.0
+# Times the power where it fell: more farther out is no noise (6 dB; windows of 24 lines scatter by
+# one, and the highest of many by three).
+_RISEN = 4.0
 # Power, relative to the strongest or the mean, below which there is nothing but rounding.
 NO_POWER = 1e-10
 # Of the sampling rate: there what lies between the samples of a velocity is a quarter of the loop's
@@ -67,7 +70,8 @@ def driven_range(frequency_hz: NDArray[Any], power: NDArray[Any]) -> tuple[int, 
     """First and last window of the range around the strongest where the force has power.
 
     The range ends where the power falls by more than 13 dB in an octave, at either side: a steeper
-    slope than that of coloured noise that is meant to be there.
+    slope than that of coloured noise that is meant to be there.  Where it rises again farther out
+    it was a notch, as a controller cuts one out of its command beside a resonance of the loop.
 
     Parameters
     ----------
@@ -82,8 +86,11 @@ def driven_range(frequency_hz: NDArray[Any], power: NDArray[Any]) -> tuple[int, 
     below = np.interp(log_frequency - octave, log_frequency, log_power)
     above = np.interp(log_frequency + octave, log_frequency, log_power)
     peak, window = int(np.argmax(power)), np.arange(len(power))
-    cut_high = (below - log_power > np.log(CUT_OFF)) | (power <= floor)
-    cut_low = (above - log_power > np.log(CUT_OFF)) | (power <= floor)
+    fallen, risen = np.log(CUT_OFF), log_power + np.log(_RISEN)
+    higher_up = np.maximum.accumulate(log_power[::-1])[::-1] > risen
+    lower_down = np.maximum.accumulate(log_power) > risen
+    cut_high = ((below - log_power > fallen) & ~higher_up) | (power <= floor)
+    cut_low = ((above - log_power > fallen) & ~lower_down) | (power <= floor)
     low = int(np.max(window[cut_low & (window < peak)], initial=-1)) + 1
     high = int(np.min(window[cut_high & (window > peak)], initial=len(power))) - 1
     return low, high
