@@ -122,7 +122,8 @@ class Causality:
     def opposite(self) -> bool:
         """The position moves against the force: one of them has the opposite sign.
 
-        Not said of a force that repeats: nothing is new in it, and its response tells.
+        Not said of a force that repeats: nothing is new in it, and its response tells; nor where
+        the first of the later answers is clearly along the force: the device swings back.
         """
         if self.repeats:
             return False
@@ -131,7 +132,8 @@ class Causality:
         answers = abs(now.value) / _AT_ONCE, abs(soon.value) / _SOON
         at_once = max(answers) > abs(later.value)
         clear_answer = 8.0
-        clear = later.z < -clear_answer and self._force_drives
+        along = late[0].z > clear_answer
+        clear = later.z < -clear_answer and not along and self._force_drives
         return clear and not at_once and not self._past_drives(SIGNIFICANT)
 
     @property
