@@ -1,13 +1,14 @@
 """Devices of two masses and hands in closed loop: how often the intervals hold what the bench was.
 
-    python -m benchmarks.through_reference [COUNT] [FILE] [--without-reference]
+    python -m benchmarks.through_reference [COUNT] [FILE] [--without-reference | --dithered]
 
 LHIfAM- and PHANToM-like devices, free and held, under five controllers that follow steps, ramps or
 noise, 2 to 30 s, every other one with dry friction.  References of noise are written down beside
 the force; where they step or ramp, the controller is read off the recording.  Each recording takes
 the whole way to a recommendation.  Without their references, those that follow noise alone: the
-direct method.  FILE keeps what is done, a line a recording: a run that was
-stopped goes on from there.
+direct method.  Dithered, noise that nobody wrote down is added to the command of a controller that
+holds a place, and hands wander with 0.03 to 1 of the device's usual force.  FILE keeps what is
+done, a line a recording: a run that was stopped goes on from there.
 """
 
 from __future__ import annotations
@@ -46,16 +47,21 @@ class Case:
     what: str
 
 
-def make(seed: int) -> Case:
+def make(seed: int, dithered: bool = False) -> Case:
     """One recording; controllers and references in turn."""
     rng = np.random.default_rng((12, seed))
     kind, reference = CONTROLLERS[seed % 5], REFERENCES[seed // 5 % 3]
+    if dithered:
+        reference = "wall with dither"
     while True:
         name, held = str(rng.choice(["lhifam", "phantom"])), bool(rng.random() < 0.5)
         bench = Bench.from_device(name, held, "grasped" if held else "free")
         values = {key: v * float(np.exp(rng.normal(0, 0.3))) for key, v in bench.values.items()}
         delay_s = float(rng.uniform(0, 2)) * bench.period_s
         bench = replace(bench, values=values, delay_s=delay_s)
+        if dithered and held:
+            wander = float(10 ** rng.uniform(-1.5, 0.0))
+            bench = replace(bench, wander_rms=wander * bench.force_rms)
         friction = bench.force_rms * float(10 ** rng.uniform(-1.5, -0.5)) * (seed % 2)
         rubbing = bench.with_effect("coulomb_friction", force=friction) if friction else bench
         seconds = float(np.exp(rng.uniform(np.log(2), np.log(30))))
@@ -93,9 +99,9 @@ def bound_db(case: Case, model: Model) -> float:
     return float(np.sqrt(gradient @ np.linalg.pinv(information, rcond=1e-14) @ gradient))
 
 
-def one(seed: int, without: bool = False) -> dict[str, Any]:
+def one(seed: int, without: bool = False, dithered: bool = False) -> dict[str, Any]:
     """What became of one recording, without its reference or with it."""
-    case = make(seed)
+    case = make(seed, dithered)
     if without:
         case = replace(case, recording=replace(case.recording, reference=None))
     found: dict[str, Any] = {"seed": seed, "what": case.what, "friction": case.friction}
@@ -112,6 +118,7 @@ def one(seed: int, without: bool = False) -> dict[str, Any]:
         "outcome": "refused" if told.status == "untrusted" else "recommended",
         "why": told.sentence,
         "through": analysis.etfe.through_reference or analysis.etfe.direct,
+        "throughout": analysis.etfe.moved_throughout,
         "stiffness": told.stiffness and told.stiffness / truth,
         "model": analysis.model.name,
         "verdict": closed.verdict,
@@ -165,7 +172,7 @@ def summary(found: list[dict[str, Any]]) -> None:
         )
 
 
-def main(count: int, path: Path, without: bool) -> None:
+def main(count: int, path: Path, without: bool, dithered: bool) -> None:
     """Run what is not in the file yet, and print what all say."""
     kept = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     done = {one["seed"] for one in kept}
@@ -173,7 +180,7 @@ def main(count: int, path: Path, without: bool) -> None:
         follows_noise = REFERENCES[seed // 5 % 3] == "noise"
         if seed in done or (without and not follows_noise):
             continue
-        kept.append(one(seed, without))
+        kept.append(one(seed, without, dithered))
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(kept[-1]) + "\n")
         print(seed, kept[-1]["what"], kept[-1]["outcome"], kept[-1].get("limit_db"), flush=True)
@@ -184,6 +191,8 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=200)
     parser.add_argument("file", nargs="?", type=Path, default=Path("through-reference.jsonl"))
-    parser.add_argument("--without-reference", action="store_true", help="as if nobody knew it")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--without-reference", action="store_true", help="as if nobody knew it")
+    which.add_argument("--dithered", action="store_true", help="noise in the command of a hold")
     asked = parser.parse_args()
-    main(asked.count, asked.file, asked.without_reference)
+    main(asked.count, asked.file, asked.without_reference, asked.dithered)

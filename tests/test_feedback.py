@@ -17,7 +17,7 @@ from test_measured import PERIOD_S, servo
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.feedback.explain import explain_force
-from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings import recording_from_arrays, through_reference
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
@@ -125,10 +125,14 @@ def test_steps_of_two_masses_under_a_controller_say_their_limit() -> None:
     assert low < bench.true_critical_stiffness() < high < 1.5 * low
 
 
-def test_two_masses_under_a_controller_are_refused_before_sampling(tmp_path: Path) -> None:
+def test_two_masses_under_a_controller_are_refused_before_sampling(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if nothing of the command were new: through what was added to it their limit is seen."""
     rng = np.random.default_rng(2)
     goals = np.repeat(rng.uniform(-1e-3, 1e-3, 20), 150)
     recording, _ = two_masses(goals, 0.3 * rng.standard_normal(3000))  # no law is exact
+    monkeypatch.setattr(through_reference, "command_innovations", lambda recording: None)
     # In a band, where the lines do not add up to nothing.
     closed = bh.close_loop(recording, "free", ess=100, band_hz=(1.0, 300.0))
     assert closed.force is None and closed.effects == () and closed.traced.candidates == ()

@@ -12,11 +12,15 @@ from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import causality
 from bayeshaptic.recordings.signals.controller import controller_reference
+from bayeshaptic.recordings.signals.innovations import command_innovations
 from bayeshaptic.types import Floats
 
 _COLUMN = "the reference that was written down beside it"
 _DECLARED = "the controller that [feedback] declares"
 _READ_OFF = "the controller's law, which was read off the recording (exact between its targets),"
+_UNFORETOLD = (
+    "what neither its own past nor the motion up to then foretells of it (its innovations)"
+)
 
 
 def through_reference(
@@ -24,9 +28,9 @@ def through_reference(
 ) -> tuple[Recording, tuple[Notice, ...]]:
     """A recording with feedback, with the reference that it is to be read through, if one is known.
 
-    A column that was written down, what a declared controller leaves of the command, or what one
-    does that shows its law to the last digit.  Neither of the first two is taken where it answers
-    to the motion itself.
+    A column that was written down, what a declared controller leaves of the command, what one does
+    that shows its law to the last digit, or the command's innovations.  Neither of the first two is
+    taken where it answers to the motion itself.
 
     Parameters
     ----------
@@ -50,13 +54,15 @@ def through_reference(
         found, what = _left_by(recording.feedback, recording), _DECLARED
     elif (left := controller_reference(recording)) is not None:
         found, what = left, _READ_OFF
+    elif (left := command_innovations(recording)) is not None:
+        found, what = left, _UNFORETOLD
     else:
         return alone, notices
     if np.ptp(found) == 0:
         return alone, (*notices, unusable(f"{what} never moves the command"))
     tried = replace(recording, reference=found)
     judged = causality(replace(unbroken(tried), force=found))
-    if what != _READ_OFF and judged.has_feedback:
+    if what in (_COLUMN, _DECLARED) and judged.has_feedback:
         why = f"{what} answers to the motion itself ({judged.evidence})"
         return alone, (*notices, unusable(f"{why}: check its gains, its filter and its sign"))
     text = (

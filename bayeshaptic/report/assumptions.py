@@ -89,8 +89,9 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
         )
     if etfe.through_reference:
         scatter = (
-            "What the controller followed does not depend on the motion; the response is read "
-            f"through it alone. {scatter}"
+            "What the response is read through (what the controller followed, or what of the "
+            "command neither its past nor the motion up to then foretells) owes nothing to the "
+            f"noise. {scatter}"
         )
     if etfe.direct:
         scatter = (

@@ -6,18 +6,17 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.base.alignment import MOVED
-from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
-from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
-from bayeshaptic.quantities import percent, pure, quantity
+from bayeshaptic.quantities import percent, pure
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
+from bayeshaptic.report.in_closed_loop import in_closed_loop
 from bayeshaptic.report.numbers.held_still import held_still
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
@@ -46,7 +45,6 @@ _CHANGES = 0.25
 # 11 % too small and whose limits were 10 times too high.  None of 14 recordings of strangers in
 # which a force was taken off is refused by it, nor of 86 others; five looked at have 1.0 to 1.5.
 _MOSTLY = 10.0
-_WIDE = "the recording leaves the limit open within more than a factor of two"
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 
 
@@ -136,10 +134,7 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             f"the force {how} computed from the motion (feedback), which biases the response that "
             "everything here is read from"
         )
-    if analysis.etfe.through_reference:
-        found += _in_closed_loop(analysis, verdict)
-    if analysis.etfe.direct and _is_wide(analysis):
-        found.append(_WIDE)
+    found += in_closed_loop(analysis, verdict)
     sensed = any(notice.topic == NO_LOOP for notice in analysis.notices)
     if analysis.sampled and analysis.fit.impossible and not sensed:
         found.append(
@@ -265,36 +260,3 @@ def is_the_rest(closed: Closed) -> bool:
         return False
     before, after = (one.limit.quantile(0.5) for one in (closed.base, closed.analysis))
     return bool(math.isfinite(before) and before > _MOSTLY * after)
-
-
-def _in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
-    """What is asked of a limit that was read through a controller's reference beyond the usual."""
-    found = []
-    if verdict == "unexplained":
-        found.append(
-            "something is left that is not noise, and in closed loop the response does not show "
-            "how far that may take the limit"
-        )
-    if analysis.model.held:
-        found.append(
-            "somebody holds the device, and in closed loop another hand on another device explains "
-            "the motion as well"
-        )
-    elif may_be_held(analysis):
-        found.append("nobody said whether somebody holds the device, which closed loops hide")
-    if analysis.choice is not None and analysis.model.name == "rigid":
-        found.append(
-            f"nothing moves the force above {quantity(analysis.etfe.band_hz[1], 'Hz')} but noise, "
-            "and a vibration mode there may set a lower limit than that of one mass"
-        )
-    if any(notice.topic == VALLEY for notice in analysis.notices):
-        found.append("a vibration mode elsewhere explains what the reference moves as well")
-    if _is_wide(analysis):
-        found.append(_WIDE)
-    return found
-
-
-def _is_wide(analysis: Analysis) -> bool:
-    """Whether the limit's 90 % interval is wider than a factor of two."""
-    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
-    return not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB)

@@ -190,7 +190,7 @@ def _excitation(analysis: Analysis) -> str:
     if has_feedback(analysis.notices):
         return "computed from the motion"
     if analysis.etfe.through_reference:
-        return "of a controller, read through what it followed"
+        return "of a controller, read through what of it the motion does not make"
     if analysis.etfe.direct:
         return "of a controller, whichever it is"
     if told_too_little(analysis.notices):

@@ -43,7 +43,8 @@ def mode_above_band(fit: Fit, etfe: Etfe, limit: CriticalStiffness) -> tuple[Not
         return ()
     top, mass = etfe.band_hz[1], own["m1"] + own["m2"]
     least = fit.likelihood(theta[None])[0] - 0.5 * float(chdtri(model.size, 1 - _CHANCE))
-    low, high = (float(limit.quantile(p)) for p in (0.05, 0.95))
+    aside = 0.5 * (1 - _CHANCE)
+    low, high = (float(limit.quantile(p)) for p in (aside, 1 - aside))
     for share in _LOADS:
         for factor in _ABOVE:
             between = share * (1 - share) * mass

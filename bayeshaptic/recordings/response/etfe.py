@@ -12,6 +12,11 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import interval, pretty_unit, pure
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimators.direct import DirectSpectra
+from bayeshaptic.recordings.response.estimators.instrument import (
+    HIGHEST_THROUGH_REFERENCE,
+    STRONG,
+    InstrumentSpectra,
+)
 from bayeshaptic.recordings.response.spectra import (
     JoinedSpectra,
     PeriodicSpectra,
@@ -86,8 +91,24 @@ class Etfe(Shown):
 
     @property
     def through_reference(self) -> bool:
-        """Whether it was made in closed loop, and is read through what the controller followed."""
+        """Whether it was made in closed loop, and is read through an instrument.
+
+        What the controller followed, or the innovations of its command.
+        """
         return self.recording is not None and self.recording.reference is not None
+
+    @property
+    def moved_throughout(self) -> bool:
+        """Whether what it is read through moves the force at nearly all frequencies, as noise does.
+
+        From the lowest window on that it moves, up to 0.4 of the sampling rate.
+        """
+        spectra = self.spectra
+        if not isinstance(spectra, InstrumentSpectra):
+            return False
+        nearly = 0.9
+        whole = self.band_hz[1] > nearly * HIGHEST_THROUGH_REFERENCE / self.period_s
+        return whole and float(np.mean(spectra.strength > STRONG)) > nearly
 
     @property
     def of_a_structure(self) -> bool:

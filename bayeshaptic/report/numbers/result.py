@@ -29,6 +29,15 @@ def may_be_held(analysis: Analysis) -> bool:
     return analysis.model.held or any(one.held for one in tried.values())
 
 
+def hides_hand(analysis: Analysis) -> bool:
+    """Whether the device is read through a reference that a hand, if there is one, hides behind.
+
+    Not where that moves the force at nearly all frequencies, as noise that was added to it does.
+    """
+    etfe = analysis.etfe
+    return etfe.through_reference and not etfe.moved_throughout and may_be_held(analysis)
+
+
 def tip_limit(analysis: Analysis) -> CriticalStiffness | None:
     """The limit at the tip in N/m; None without a lever arm or without a torque in N m."""
     if analysis.lever_m is None or analysis.limit.unit != "N m/rad":

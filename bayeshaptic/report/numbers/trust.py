@@ -5,7 +5,7 @@ from __future__ import annotations
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.report.numbers.misfit import misfit_is_clear, residual_is_noticed
-from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
+from bayeshaptic.report.numbers.result import hides_hand, is_unexplained
 
 
 def doubtful_parameters(result: Result) -> dict[str, str]:
@@ -24,6 +24,6 @@ def doubtful_parameters(result: Result) -> dict[str, str]:
         return dict.fromkeys(names, "the residual is not noise")
     if is_unexplained(result) or misfit_is_clear(analysis):
         return dict.fromkeys(names, "part of the recording is unexplained")
-    if analysis.etfe.through_reference and may_be_held(analysis):
+    if hides_hand(analysis):
         return dict.fromkeys(names, "in closed loop another hand on another device does as well")
     return {}

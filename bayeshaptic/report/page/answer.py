@@ -30,6 +30,11 @@ FARED_IN_LOOP = (
     "fared: of 9 simulated devices that nobody held, 7 of the 90 % intervals held the true limit, "
     "and 2 missed it by less than 0.01 dB."
 )
+FARED_THROUGHOUT = (
+    "Recorded in closed loop, and read through noise in the command that the motion does not make. "
+    "How such intervals fared: of 24 simulated loops that were read so and had a stiffness, most "
+    "of them held, 23 of the 90 % intervals held the true limit, and one lay 0.35 dB above it."
+)
 FARED_DIRECT = (
     "Recorded in closed loop. How such intervals fared: of 227 simulated loops that were read so, "
     "206 of the 90 % intervals held the true limit, and four stiffnesses lay above it (by 0.01, "
@@ -65,6 +70,8 @@ def fared(result: Result) -> str:
     closed = result.closed
     if closed is None or closed.force is not None or headline(result).status == "untrusted":
         return ""
+    if result.analysis.etfe.moved_throughout:
+        return FARED_THROUGHOUT
     if result.analysis.etfe.through_reference:
         return FARED_IN_LOOP
     if result.analysis.etfe.direct:

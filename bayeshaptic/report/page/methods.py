@@ -97,7 +97,10 @@ def _measured(etfe: Etfe) -> tuple[str, ...]:
         else f"at the {etfe.period_lines} excited lines of its steady periods"
     )
     if etfe.through_reference:
-        how += ", through the reference of the controller that computed the force as an instrument"
+        how += (
+            ", with what of the force the motion does not make (its controller's reference, or its "
+            "own innovations) as an instrument"
+        )
     if etfe.direct:
         how += (
             ", every line up to the Nyquist frequency counting alike, so that feedback does not "

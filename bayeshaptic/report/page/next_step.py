@@ -169,13 +169,18 @@ def _after_reference(result: Result, command: str, new: str) -> tuple[Step, ...]
     """Where the response was read through what a controller followed."""
     analysis = result.analysis
     if analysis.model.held:
-        return (Step("Record in open loop: a force that comes from a table. Then:", new),)
+        text = (
+            "Record in open loop (a force that comes from a table) or, where the loop must stay "
+            "closed, with white noise added to the controller's command. Then:"
+        )
+        return (Step(text, new),)
     free = Step("Where nobody holds the device, say so:", f"{command} --held no")
     return (
         *((free,) if may_be_held(analysis) else ()),
         Step(
-            "Record again with a reference of white noise that keeps the device moving, or in "
-            "open loop, where friction can be told from the rest. Then:",
+            "Record again with a reference of white noise that keeps the device moving, with white "
+            "noise added to the command, or in open loop, where friction can be told from the "
+            "rest. Then:",
             new,
         ),
     )
@@ -183,8 +188,9 @@ def _after_reference(result: Result, command: str, new: str) -> tuple[Step, ...]
 
 def _in_open_loop(new: str) -> Step:
     return Step(
-        "Record again with a force that does not depend on the motion: white noise, or a "
-        "multisine. Then report on that recording:",
+        "Record again with a force that does not depend on the motion (white noise, or a "
+        "multisine) or, where the loop must stay closed, with white noise added to the command. "
+        "Then report on that recording:",
         new,
     )
 

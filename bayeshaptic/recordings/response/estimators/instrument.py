@@ -35,6 +35,8 @@ from bayeshaptic.recordings.response.windows import Reference, Windows
 # F of the force's regression on the reference in a window, from which on what noise in the force
 # does to the estimate is below a tenth (D. Staiger and J. H. Stock, Econometrica 65(3), 1997).
 STRONG = 10.0
+# Of the sampling rate: above, a command that is held moves next to nothing.
+HIGHEST_THROUGH_REFERENCE = 0.4
 _COLUMNS = 3  # of the instrument in a window: a parabola
 
 

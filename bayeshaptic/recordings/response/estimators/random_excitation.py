@@ -12,7 +12,11 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import NO_POWER, choose_band, tells_until
 from bayeshaptic.recordings.response.estimators.direct import DirectSpectra
-from bayeshaptic.recordings.response.estimators.instrument import STRONG, InstrumentSpectra
+from bayeshaptic.recordings.response.estimators.instrument import (
+    HIGHEST_THROUGH_REFERENCE,
+    STRONG,
+    InstrumentSpectra,
+)
 from bayeshaptic.recordings.response.estimators.lines import LOW_END_WINDOWS, Lines
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.estimators.ringing import ringing_poles
@@ -30,8 +34,6 @@ from bayeshaptic.recordings.signals.sweeps import FEWEST_COUNTS, moves_until
 
 # Slower than this a hand wanders more than it answers; the paper's lowest frequency too.
 LOWEST_HZ = 0.3
-# Of the sampling rate: above, a command that is held moves next to nothing.
-HIGHEST_THROUGH_REFERENCE = 0.4
 # Windows in which the reference must move the force.
 FEWEST_STRONG = 16
 # A rational reference must explain a window better than chance does with its two more terms.

@@ -1,0 +1,66 @@
+"""What is asked of a limit that was read in closed loop, beyond the usual."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
+from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
+from bayeshaptic.quantities import quantity
+from bayeshaptic.report.numbers.result import hides_hand
+
+if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
+
+_WIDE = "the recording leaves the limit open within more than a factor of two"
+
+
+def in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
+    """Why no stiffness can be recommended of a closed loop; empty where one can, and in open loop.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    verdict : str or None
+        Of closing the loop with what was measured.
+    """
+    found = []
+    if analysis.etfe.through_reference:
+        found = _through_reference(analysis, verdict)
+    elif not analysis.etfe.direct:
+        return []
+    if _is_wide(analysis):
+        found.append(_WIDE)
+    return found
+
+
+def _through_reference(analysis: Analysis, verdict: str | None) -> list[str]:
+    found = []
+    if verdict == "unexplained":
+        found.append(
+            "something is left that is not noise, and in closed loop the response does not show "
+            "how far that may take the limit"
+        )
+    if hides_hand(analysis):
+        found.append(
+            "somebody holds the device, and in closed loop another hand on another device explains "
+            "the motion as well"
+            if analysis.model.held
+            else "nobody said whether somebody holds the device, which closed loops hide"
+        )
+    etfe, chosen = analysis.etfe, analysis.choice is not None
+    if chosen and analysis.model.name == "rigid" and not etfe.moved_throughout:
+        found.append(
+            f"nothing moves the force above {quantity(etfe.band_hz[1], 'Hz')} but noise, "
+            "and a vibration mode there may set a lower limit than that of one mass"
+        )
+    if any(notice.topic == VALLEY for notice in analysis.notices):
+        found.append("a vibration mode elsewhere explains what the reference moves as well")
+    return found
+
+
+def _is_wide(analysis: Analysis) -> bool:
+    """Whether the limit's 90 % interval is wider than a factor of two."""
+    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
+    return not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB)
