@@ -370,3 +370,15 @@ def test_a_few_pulses_of_a_spring_and_a_damper_are_no_velocity(seed: int) -> Non
     rough = rough_response(recording)
     assert rough.is_velocity(recording.period_s)
     what_drives_what(recording, rough, "it")  # refuses what looks like a velocity
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_device_that_swings_back_does_not_move_against_the_force(held: bool) -> None:
+    """Without the slow motion its late answer is the backward swing, and the largest."""
+    bench = Bench.from_device("lhifam", held, "grasped" if held else "free")
+    made = simulate(bench, WhiteNoise(bench.force_rms, 300.0, 53.0, 15.0), seed=1)
+    recording = recording_from_arrays(made.force, made.position, bench.period_s)
+    found = causality(recording)
+    assert found.answers[-1].value < -max(share.value for share in found.answers[:-1])
+    assert not found.opposite
+    what_drives_what(recording, rough_response(recording), "it")  # refuses what is turned round
