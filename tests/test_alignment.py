@@ -152,6 +152,16 @@ def test_a_whole_period_more_than_was_told_may_be_the_logger(
     assert headline(closed).status == "safe"
 
 
+@pytest.mark.parametrize("told_s", [1.2e-3, 0.4e-3])
+def test_less_delay_than_was_told_gets_no_stiffness(told_s: float) -> None:
+    """A sample early, of a loop of more than one: it had 2.4 times the limit, "explained"."""
+    bench = replace(Bench.from_device("phantom"), delay_s=1.2e-3)
+    closed = close_loop(recorded(bench, 1), "free", hidden=False, delay_s=told_s)
+    told = headline(closed)
+    early = "less delay than was told" in told.sentence
+    assert early == (told_s == bench.delay_s) and (told.stiffness is None) == early
+
+
 def test_every_piece_is_moved_by_itself() -> None:
     counts = np.arange(600.0)
     one = recording_from_arrays(counts, 2 * counts, 1e-3, force_unit="N", position_unit="m")

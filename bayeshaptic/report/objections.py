@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.diagnosis.base.alignment import MOVED
+import numpy as np
+
+from bayeshaptic.diagnosis.base.alignment import LATER, MOVED
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
-from bayeshaptic.quantities import percent, pure
+from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
@@ -149,6 +151,12 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             "the position was written down before its command acts, and by how many samples only "
             "the loop's delay would tell: say it with --delay-s, or record again"
         )
+    if (less_s := _less_delay_s(analysis)) is not None:
+        found.append(
+            f"the recording shows {quantity(less_s, 's')} less delay than was told, as where a "
+            "position is written down before its command acts, and with the delay that was told "
+            "the limit is lower: correct the columns, or --delay-s"
+        )
     recording = analysis.recording
     if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
         found.append(
@@ -207,6 +215,15 @@ def _is_moved(analysis: Analysis) -> bool:
     if recording is None or analysis.in_loop is not None or has_feedback(analysis.notices):
         return False
     return analysis.moved_besides > _BESIDES
+
+
+def _less_delay_s(analysis: Analysis) -> float | None:
+    """How much less delay than was told is found; None for less than half a sampling period."""
+    model, half = analysis.model, 0.5 * analysis.etfe.period_s
+    if not analysis.sampled or LATER not in model.names:
+        return None
+    draws = analysis.posterior.draws[:, model.names.index(LATER)]
+    return -float(np.median(draws)) if np.quantile(draws, 0.95) < -half else None
 
 
 def is_open(analysis: Analysis) -> bool:

@@ -28,7 +28,7 @@ MOVED = "rows moved"  # topic of the notice
 # those are moved nevertheless: docs/door.md.
 _FALLS = 0.9
 _WHOLE = 0.05  # of a period: so near to whole ones is one delay in ten
-_LATER = "extra_delay_s"
+LATER = "extra_delay_s"
 # Delays to begin at, and starting points beside: with one and none four of 60 fits to positions
 # that are early stay where they were, with four and none three do, with four and sixteen none: on
 # these they were chosen. What is moved though it is in time was counted before (docs/door.md).
@@ -135,9 +135,9 @@ def perhaps_late(fit: Fit) -> tuple[Notice, ...]:
     fit : Fit
         With what was found.
     """
-    if _LATER not in fit.model.names or fit.model.period_s is None:
+    if LATER not in fit.model.names or fit.model.period_s is None:
         return ()
-    place = fit.model.names.index(_LATER)
+    place = fit.model.names.index(LATER)
     periods, sd = fit.theta[place] / fit.model.period_s, fit.sd[place] / fit.model.period_s
     late = round(periods)
     if late < 1 or not abs(periods - late) + sd < _WHOLE:
@@ -161,7 +161,7 @@ def _tells(found: Opened, recording: Recording) -> bool:
 def _with_any_delay(model: Model) -> Model:
     """The model with a delay that is inferred, whatever was known of it or added to it."""
     for effect in model.effects:
-        if any(parameter.name == _LATER for parameter in effect.parameters):
+        if any(parameter.name == LATER for parameter in effect.parameters):
             model = model.without_effect(effect)
     return with_unknown_delay(model)
 
@@ -192,7 +192,7 @@ def _from(known: Fit, model: Model, etfe: Etfe, later_s: float = 0.0) -> Fit:
     Up to `later_s` later, and then at a few starting points of its own as well.
     """
     values = {**known.model.fixed, **dict(zip(known.model.names, known.theta, strict=True))}
-    delay_s = values.get("delay_s", 0.0) + values.get(_LATER, 0.0)
+    delay_s = values.get("delay_s", 0.0) + values.get(LATER, 0.0)
     delays_s = delay_s + later_s * np.linspace(0.0, 1.0, _WAYS if later_s else 1)
     start = np.array([[{**values, "delay_s": at}[name] for name in model.names] for at in delays_s])
     if later_s:
