@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.errors import Notice
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.models import build_model
@@ -18,6 +19,7 @@ from bayeshaptic.recordings.response.band import driven_range
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.recordings.signals.innovations import command_innovations
+from bayeshaptic.recordings.through_reference import through_reference, too_weak
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
 from bayeshaptic.types import Floats
@@ -106,6 +108,17 @@ def test_a_held_device_has_its_limit() -> None:
     truth = bench.true_critical_stiffness()
     told = headline(closed)
     assert low < truth < high and told.stiffness is not None and told.stiffness < truth
+
+
+def test_innovations_that_are_too_weak_leave_all_as_it_was() -> None:
+    """A reference that somebody wrote down, and that does not help, is spoken of."""
+    recording, noise = dithered(bench_of("lhifam", 1.0), 1)
+    before = (Notice("warning", "feedback", "The force was computed from the motion."),)
+    read, after = through_reference(recording, before)
+    assert read.reference is not None and after != before
+    assert too_weak(before, after, "few windows") == before
+    _, after = through_reference(replace(recording, reference=noise), before)
+    assert [notice.topic for notice in too_weak(before, after, "few")] == ["feedback", "reference"]
 
 
 def test_a_reference_that_moves_the_slow_alone_is_not_everywhere() -> None:

@@ -113,7 +113,7 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
     limit, traced = with_rivals(analysis.limit, traced, seed)
     limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, seed)
     notices = analysis.notices + traced.notices + perhaps_late(state.fit)
-    if state.etfe.through_reference:
+    if state.etfe.through_reference and not state.etfe.moved_throughout:
         notices += mode_above_band(state.fit, state.etfe, analysis.limit)
     if (noise := noise_besides(state.fit, state.etfe)) is not None:
         notices += (noise.notice(state.etfe),)

@@ -15,6 +15,7 @@ from bayeshaptic.recordings.signals.controller import controller_reference
 from bayeshaptic.recordings.signals.innovations import command_innovations
 from bayeshaptic.types import Floats
 
+_INNOVATIONS = "innovations"  # what a note is about where these are the reference
 _COLUMN = "the reference that was written down beside it"
 _DECLARED = "the controller that [feedback] declares"
 _READ_OFF = "the controller's law, which was read off the recording (exact between its targets),"
@@ -69,19 +70,25 @@ def through_reference(
         f"The force was computed from the motion; {what} tells what of it was not, and the "
         "response is read through that alone, so that feedback does not bias it."
     )
-    told = Notice("note", "feedback", text)
+    told = Notice("note", "feedback", text, (_INNOVATIONS,) if what == _UNFORETOLD else ())
     kept = (n for n in notices if (n.level, n.topic) != ("warning", "feedback"))
     return tried, (*kept, told)
 
 
-def too_weak(notices: tuple[Notice, ...], why: str) -> tuple[Notice, ...]:
-    """`notices` of a recording whose reference says too little, with the warnings of feedback."""
-    text = (
-        "The force was computed from the motion: the recording was made in closed loop, so the "
-        "ETFE, the fit and K_CR are biased."
-    )
-    kept = tuple(n for n in notices if (n.level, n.topic) != ("note", "feedback"))
-    return (*kept, Notice("warning", "feedback", text), unusable(f"it does not help: {why}"))
+def too_weak(before: tuple[Notice, ...], read: tuple[Notice, ...], why: str) -> tuple[Notice, ...]:
+    """The notices of a recording whose reference says too little, and that it does.
+
+    Of innovations that are too weak nothing is said: nobody knew of a reference.
+
+    Parameters
+    ----------
+    before, read : tuple of Notice
+        Without the reference, and with it: see `through_reference`.
+    why : str
+    """
+    if any(_INNOVATIONS in notice.about for notice in read):
+        return before
+    return (*before, unusable(f"it does not help: {why}"))
 
 
 def unusable(why: str) -> Notice:

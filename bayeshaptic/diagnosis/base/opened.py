@@ -85,6 +85,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             options.report(0.0, "checking the recording")
             whole = without_lone(unbroken(measurement))
             notices += told(measurement.feedback, check_recording(whole, device))
+            unread = notices
             if one_mass:  # followed in time instead
                 if measurement.reference is not None and has_feedback(notices):
                     notices += (_NEEDS_NONE,)
@@ -97,7 +98,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
                     refuse_where_told(whole, notices)
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
-            etfe, notices = _response(measurement, options.band_hz, notices)
+            etfe, notices = _response(measurement, options.band_hz, notices, unread)
             notices += _not_looked_for(measurement, notices)
     else:
         etfe = measurement
@@ -163,14 +164,20 @@ def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[
 
 
 def _response(
-    recording: Recording, band_hz: tuple[float, float] | None, notices: tuple[Notice, ...]
+    recording: Recording,
+    band_hz: tuple[float, float] | None,
+    notices: tuple[Notice, ...],
+    unread: tuple[Notice, ...],
 ) -> tuple[Etfe, tuple[Notice, ...]]:
-    """The response; one that nothing is read from is for comparison only, in any band."""
+    """The response; one that nothing is read from is for comparison only, in any band.
+
+    `unread` are the notices before a reference was looked for.
+    """
     try:
         return estimate_etfe(recording, band_hz), notices
     except InputError as error:
         if recording.reference is not None:
-            notices = too_weak(notices, str(error))
+            notices = too_weak(unread, notices, str(error))
         elif not (has_feedback(notices) or told_too_little(notices)) or band_hz is not None:
             raise
     longest = max(piece.duration_s for piece in recording.pieces)

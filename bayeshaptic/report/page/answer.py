@@ -32,8 +32,9 @@ FARED_IN_LOOP = (
 )
 FARED_THROUGHOUT = (
     "Recorded in closed loop, and read through noise in the command that the motion does not make. "
-    "How such intervals fared: of 24 simulated loops that were read so and had a stiffness, most "
-    "of them held, 23 of the 90 % intervals held the true limit, and one lay 0.35 dB above it."
+    "How such intervals fared: of 82 simulated loops with such noise that had a stiffness, in "
+    "whichever way they were read, 76 of the 90 % intervals held the true limit, and three lay "
+    "above it, by less than 0.05 dB."
 )
 FARED_DIRECT = (
     "Recorded in closed loop. How such intervals fared: of 227 simulated loops that were read so, "
