@@ -14,6 +14,7 @@ from bayeshaptic.diagnosis.base.opened import with_delay_of_the_loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.samples.mend import measurement_tests
 from bayeshaptic.errors import InputError
+from bayeshaptic.models.build import with_force_sensor
 from bayeshaptic.models.response.between_samples import with_images
 from bayeshaptic.recordings.response.differences import with_differences
 from bayeshaptic.recordings.signals.causality.causality import causality
@@ -61,6 +62,58 @@ def test_a_continuous_experiment_gives_the_response_of_a_held_command(device, ou
     model, theta = device
     expected = model.response(theta, RATES_HZ)
     assert np.max(np.abs(found / expected - 1)) < 6e-3
+
+
+def test_a_sensor_of_the_force_that_lags_is_none_of_the_loop(device, tmp_path):
+    """One that lets pass 200 Hz: found as a lag, the limit is that of the loop without it."""
+    model, theta = device
+    lag_s, loop_delay_s = 1 / (2 * np.pi * 200), 5e-4
+    rng = np.random.default_rng(7)
+    s = 2j * np.pi * RATES_HZ
+    tones = np.exp(2j * np.pi * rng.uniform(size=len(s)))
+    time = np.arange(SAMPLES) * PERIOD_S
+    waves = np.exp(np.outer(time, s))
+    force = np.real(waves @ (tones / (1 + lag_s * s)))
+    position = np.real(waves @ (tones * model.system(theta).continuous_response(s)[0]))
+    position += 3e-4 * position.std() * rng.standard_normal(SAMPLES)
+    path = tmp_path / "slow.npz"
+    np.savez(path, t=time, u=force, x=position)
+    recording = bh.read_recording(path, columns="time=t,measured_force=u[N],position=x[m]")
+    told = Options(delay_s=loop_delay_s)
+    found = begin(recording, "free", told).fit
+    assert found.model.names[-1] == "force_lag_s" and not found.misfits
+    value = dict(zip(found.model.names, found.theta, strict=True))
+    sd = dict(zip(found.model.names, found.sd, strict=True))
+    assert abs(value["force_lag_s"] - lag_s) < 4 * sd["force_lag_s"] < 0.4 * lag_s
+    loop = bh.free(delay_s=loop_delay_s, period_s=PERIOD_S)
+    true = bh.critical_stiffness(loop, theta).value
+    assert bh.critical_stiffness(found.model, found.theta).value == pytest.approx(true, rel=0.05)
+    without = begin(recording, loop, told).fit
+    assert without.reduced_chi_square > 100
+
+
+def test_the_lag_of_a_sensor_is_seen_and_not_in_the_loop(device):
+    """(1 + s lag) of the response is measured; the loop and its limit know nothing of it."""
+    model, theta = device
+    lagging = with_force_sensor(model)
+    whole = np.insert(theta, lagging.names.index("force_lag_s"), 1e-3)
+    s = 2j * np.pi * RATES_HZ
+    seen = lagging.measured_system(whole).continuous_response(s)[0]
+    assert seen == pytest.approx(model.system(theta).continuous_response(s)[0] * (1 + 1e-3 * s))
+    assert np.array_equal(lagging.response(whole, RATES_HZ), model.response(theta, RATES_HZ))
+    none = np.where(np.array(lagging.names) == "force_lag_s", 0.0, whole)
+    assert lagging.measured_response(none, RATES_HZ) == pytest.approx(
+        model.response(theta, RATES_HZ)
+    )
+    limits = [bh.critical_stiffness(lagging, v).value for v in (whole, none)]
+    assert limits[0] == limits[1] == bh.critical_stiffness(model, theta).value
+
+
+def test_a_delay_that_nobody_told_is_none_of_a_measured_force():
+    unknown = bh.free(period_s=PERIOD_S)
+    assert with_force_sensor(unknown).fixed["delay_s"] == 0.0
+    told = with_force_sensor(bh.free(delay_s=3e-4, delay_sd_s=1e-4, period_s=PERIOD_S))
+    assert told.names[-2:] == ("force_lag_s", "delay_s")
 
 
 def test_a_velocity_beside_a_command(device, tmp_path):

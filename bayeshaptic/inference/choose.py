@@ -20,6 +20,7 @@ from bayeshaptic.inference.fit import MISFIT, Fit
 from bayeshaptic.inference.least_squares import SETS, least_squares
 from bayeshaptic.inference.loop_response import fitted_to_the_loop
 from bayeshaptic.models import Prior, build_model
+from bayeshaptic.models.build import with_force_sensor
 from bayeshaptic.models.prior_table import refuse_unknown
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -169,6 +170,8 @@ def choose_model(
 
     def fit_to(name: str, shorter: Fit | None = None, most_sets: int = SETS) -> None:
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
+        if etfe.of_measured_force:
+            model = with_force_sensor(model)
         own = {key: value for key, value in (prior or {}).items() if key in model.names}
 
         def fitting(response: Etfe, start: Floats | None = None) -> Fit:

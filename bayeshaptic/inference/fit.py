@@ -119,7 +119,7 @@ class Fit(Shown):
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
         """The fitted sampled response at `frequency_hz`, shape (L,)."""
-        return self.model.response(self.theta, frequency_hz)
+        return self.model.measured_response(self.theta, frequency_hz)
 
     def to_dataframe(self) -> Any:
         """A ``pandas.DataFrame``, a row a parameter: value, sd, unit, outcome."""

@@ -86,7 +86,7 @@ class Likelihood:
         chunk = 128  # vectors at a time, of what is done in plain NumPy
         for start in range(0, len(theta), chunk):
             part = theta[start : start + chunk]
-            g = self.model.response(part, frequency_hz).reshape(len(part), count, nodes)
+            g = self.model.measured_response(part, frequency_hz).reshape(len(part), count, nodes)
             if nodes == 1:
                 fitted = self.windows.design[:, :, 0] * g
             else:  # one small matrix product a window, the batch last
@@ -96,7 +96,7 @@ class Likelihood:
 
     def _rational_form(self, theta: Floats) -> RationalArrays | None:
         """The loops at the windows' nodes; None where they have no finite set of poles."""
-        system = self.model.system(theta)
+        system = self.model.measured_system(theta)
         if not system.has_rational_form or self.model.period_s is None:
             return None
         return system.rational_form(self._node_frequencies, self.model.period_s)

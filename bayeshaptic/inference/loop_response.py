@@ -14,6 +14,8 @@ import numpy as np
 
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.between_samples import hidden_by_structure, with_images
+from bayeshaptic.models.response.mechanism import Mechanism
+from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
@@ -21,6 +23,8 @@ from bayeshaptic.types import Floats
 _SAME = 0.1  # the chi-square that is no difference
 _MOST_ROUNDS = 8  # fits to what the last one makes of the samples
 _AS_DEEP = 1.01  # of the reduced chi-square: valleys no deeper than that are one
+_RUNS_AWAY = 2.0  # times the reduced chi-square: what a fit made of the samples was not there
+_TOP = 0.2  # of the lines, where the motor's mass is nearly alone
 
 
 class Fitting(Protocol):
@@ -45,9 +49,12 @@ def as_of_the_loop(etfe: Etfe, fit: Fit) -> Etfe:
     fit : Fit
         Of it, or of what an earlier fit made of it.
     """
+    return _beside(etfe, fit.model.measured_system(fit.theta))
+
+
+def _beside(etfe: Etfe, system: LinearSystem) -> Etfe:
     if not depends_on_fit(etfe):
         return etfe
-    system = fit.model.system(fit.theta)
     if etfe.recording is None:
         return etfe.beside_images(hidden_by_structure(system, etfe.frequency_hz, etfe.period_s))
     recording = with_images(etfe.recording, system)
@@ -80,12 +87,26 @@ def fitted_to_the_loop(fitting: Fitting, measured: Etfe, first: Etfe) -> tuple[F
     fit, etfe = fitting(first), first
     if not depends_on_fit(measured):
         return fit, etfe
+    if fit.misfits:  # what is missing may have bent it into a valley where no device is
+        nearer = _beside(measured, _motor_alone(measured, fit))
+        other = fitting(nearer)
+        if other.reduced_chi_square < fit.reduced_chi_square:
+            fit, etfe = other, nearer
     fit, etfe = _settled(fitting, measured, fit, etfe)
-    if fit.misfits:  # what was missing may have bent the first fit into another valley
+    if fit.misfits:
         other = fitting(etfe)
         if other.reduced_chi_square < fit.reduced_chi_square * _AS_DEEP:
             fit, etfe = _settled(fitting, measured, other, etfe)
     return fit, etfe
+
+
+def _motor_alone(etfe: Etfe, fit: Fit) -> LinearSystem:
+    """The motor's mass, nearly all that moves between the samples, with the delay of a fit."""
+    top = slice(-max(int(_TOP * len(etfe.value)), 1), None)
+    omega = 2 * np.pi * etfe.frequency_hz[top]
+    mass = float(np.median(1 / (np.abs(etfe.value[top]) * omega**2)))
+    delay_s = fit.model.system(fit.theta).delay_s
+    return LinearSystem(Mechanism((np.array([mass]),), ()), delay_s)
 
 
 def _settled(fitting: Fitting, measured: Etfe, fit: Fit, etfe: Etfe) -> tuple[Fit, Etfe]:
@@ -94,5 +115,8 @@ def _settled(fitting: Fitting, measured: Etfe, fit: Fit, etfe: Etfe) -> tuple[Fi
         again = as_of_the_loop(measured, fit)
         if hardly_differ(again, etfe):
             break
-        fit, etfe = fitting(again, fit.theta), again
+        other = fitting(again, fit.theta)
+        if other.reduced_chi_square > _RUNS_AWAY * max(fit.reduced_chi_square, 1.0):
+            break
+        fit, etfe = other, again
     return fit, etfe

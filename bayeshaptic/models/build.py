@@ -37,6 +37,8 @@ DAMPER_FLOOR = 1e-6
 SMALL_DAMPER, SMALL_DAMPER_RISE = 0.1, 0.5
 # A free delay lies within a few periods.
 FREE_DELAY_PERIODS = 2.0
+# Strain gauges' amplifiers let pass 100 Hz to some kHz.
+FORCE_LAG_S = 1e-3
 
 
 @at_the_door
@@ -184,6 +186,24 @@ def with_unknown_delay(model: Model) -> Model:
     others = tuple(p for p in model.parameters if p.name != "delay_s")
     fixed = {name: value for name, value in model.fixed.items() if name != "delay_s"}
     return replace(model, parameters=(*others, delay), fixed=fixed)
+
+
+def with_force_sensor(model: Model) -> Model:
+    """A model beside a measured force, whose sensor may follow it with a lag of first order.
+
+    What lags there is missing in the response, which then leads as if a damper were at the motor
+    in the place of its mass: of 29 simulated recordings with a sensor of 100 to 900 Hz eleven had a
+    limit of 1.2 to 229 times the truth in green while the lag was no parameter.  A delay that
+    nobody told is none: it is before what the sensor sees, and beside a lag it would hide there.
+    """
+    if "delay_s" in model.names and "delay_s" not in model.reference:
+        model = model.with_known({"delay_s": 0.0})
+    belief = HalfNormal(FORCE_LAG_S)
+    lag = Parameter("force_lag_s", *QUANTITIES["force_lag_s"], prior=belief)
+    own = tuple(p for p in model.parameters if p.name != "delay_s")
+    delay = tuple(p for p in model.parameters if p.name == "delay_s")
+    reference = model.reference and {**model.reference, "force_lag_s": 0.1 * FORCE_LAG_S}
+    return replace(model, parameters=(*own, lag, *delay), reference=reference)
 
 
 def _build(

@@ -142,6 +142,15 @@ class Model(Shown):
             system = effect.apply(system, values)
         return system
 
+    def measured_system(self, theta: ArrayLike) -> LinearSystem:
+        """The same as a sensor of the force shows them, which may lag: the loop itself has none."""
+        system = self.system(theta)
+        if "force_lag_s" not in self.names:
+            return system
+        lag = np.atleast_2d(np.asarray(theta, float))[:, self.names.index("force_lag_s")]
+        one = np.ones_like(lag)
+        return system.with_filter(np.stack([one, lag]), one[None])
+
     def response(
         self, theta: ArrayLike, frequency_hz: ArrayLike, approximation: str = "exact"
     ) -> Complexes:
@@ -170,6 +179,20 @@ class Model(Shown):
             response = system.continuous_approximation(frequency_hz, self.period_s)
         else:
             raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
+        return response[0] if np.ndim(theta) == 1 else response
+
+    def measured_response(self, theta: ArrayLike, frequency_hz: ArrayLike) -> Complexes:
+        """The sampled response as `measured_system` has it: what a fit is compared with.
+
+        Parameters
+        ----------
+        theta : array_like, shape (B, P) or (P,)
+        frequency_hz : array_like, shape (L,)
+        """
+        if self.period_s is None:
+            raise InputError("the model has no sampling period: give period_s, or a device.")
+        system = self.measured_system(theta)
+        response = system.sampled_response(np.asarray(frequency_hz, float), self.period_s)
         return response[0] if np.ndim(theta) == 1 else response
 
     def to_control(self, theta: ArrayLike | None = None) -> Any:

@@ -67,7 +67,11 @@ def refuse_unknown(prior: Iterable[str], models: Iterable[str]) -> None:
         With the nearest name.
     """
     structures = [structure_named(model) for model in models]
-    known = [*dict.fromkeys(name for one in structures for name in one.names), "delay_s"]
+    known = [
+        *dict.fromkeys(name for one in structures for name in one.names),
+        "delay_s",
+        "force_lag_s",
+    ]
     for name in prior:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)

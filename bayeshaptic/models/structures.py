@@ -31,6 +31,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "bh": ("damping", "damper from the hand to the ground"),
     "kh": ("stiffness", "spring from the hand to the ground"),
     "delay_s": ("time", "loop delay"),
+    "force_lag_s": ("time", "lag of the force's sensor"),
 }
 MOST_MODES = 8
 for _number in range(3, MOST_MODES + 2):

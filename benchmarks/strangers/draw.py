@@ -13,6 +13,7 @@ import numpy as np
 from scipy.signal import butter, lfilter
 
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
 from benchmarks.strangers.device import Array, Masses, States
 from benchmarks.strangers.motion import STEPS, Forces, Motion
 
@@ -45,12 +46,12 @@ COUNT = {"lhifam": 3.14e-6, "phantom": 2 * np.pi / 40000}
 
 @dataclass(frozen=True)
 class Case:
-    """A recording, what is told of it, what is in it, and what it should show.
+    """A recording or a table, what is told of it, what is in it, and what it should show.
 
     `parameters` are those of the base model `base`, by the package's names.
     """
 
-    recording: Recording
+    recording: Recording | Etfe
     told: dict[str, Any]
     what: str
     effects: tuple[str, ...]

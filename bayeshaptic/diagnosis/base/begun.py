@@ -14,6 +14,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.loop_response import fitted_to_the_loop
 from bayeshaptic.models import Model, build_model
+from bayeshaptic.models.build import with_force_sensor
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks.sufficiency import refuse_where_told
 from bayeshaptic.recordings.recording import Recording
@@ -90,7 +91,10 @@ def _fit(
     if isinstance(model, Model):
         built = model.with_prior(prior)
     else:
-        built = build_model(model, device, *delay, etfe.period_s, prior)
+        built = build_model(model, device, *delay, etfe.period_s)
+        if etfe.of_measured_force:
+            built = with_force_sensor(built)
+        built = built.with_prior(prior)
 
     def fitting(response: Etfe, start: Floats | None = None) -> Fit:
         return least_squares(built, response, seed, start)

@@ -116,6 +116,12 @@ class Etfe(Shown):
         return isinstance(self.spectra, TableSpectra) and self.spectra.own_variance is not None
 
     @property
+    def of_measured_force(self) -> bool:
+        """Whether a sensor told the force, which may lag behind it."""
+        sensed = None if self.recording is None else self.recording.sensed
+        return self.of_a_structure or (sensed is not None and sensed.measured_force)
+
+    @property
     def direct(self) -> bool:
         """Whether it may be biased by feedback, and is fitted so that this does not matter."""
         return isinstance(self.spectra, DirectSpectra)

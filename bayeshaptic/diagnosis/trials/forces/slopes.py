@@ -236,7 +236,9 @@ def _with_a_hand(
     if not (bench.held and grounded.any()):
         return slopes
     spectra: Any = bench.without(changes, theta).spectra
-    left = spectra.position - bench.model.response(theta, bench.frequency_hz) * spectra.force
+    left = (
+        spectra.position - bench.model.measured_response(theta, bench.frequency_hz) * spectra.force
+    )
     found = np.array(slopes)
     found[grounded] += left * bench.answer(theta).growth(answered(changes), found[grounded])
     return list(found)
