@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.residuals.columns import moved_besides
+from bayeshaptic.diagnosis.residuals.moved import moved_besides
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.diagnosis.traced import Candidate, Traced

@@ -131,7 +131,7 @@ WRONG: dict[str, dict[str, np.ndarray | float]] = {
     "averages is 1 at 2 Hz; it must be at least 2": base(coherence=0.5, averages=1),
     "frequency 600 Hz is not above 0 and up to the Nyquist frequency, 500 Hz": base(sd=1)
     | {"frequency_hz": changed(FREQUENCY, 5, 600.0)},
-    "frequency 0 Hz is not above 0": base(sd=1) | {"frequency_hz": changed(FREQUENCY, 0, 0.0)},
+    "frequency -1 Hz is not above 0": base(sd=1) | {"frequency_hz": changed(FREQUENCY, 0, -1.0)},
     "frequency 2 Hz is there twice": base(sd=1) | {"frequency_hz": changed(FREQUENCY, 1, 2.0)},
     "no column for the phase_deg": {"frequency_hz": FREQUENCY, "gain_db": GAIN_DB, "sd": 1.0},
 }
@@ -143,6 +143,20 @@ def test_tables_that_cannot_be_used(tmp_path: Path, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
         read_frf(path, period_s=1e-3)
     assert "\n" not in str(caught.value)
+
+
+def test_rows_that_tell_nothing_of_the_loop_are_left_out(tmp_path: Path) -> None:
+    """A line at 0 Hz, whatever is in it; of a structure also what is above half the rate."""
+    still = {"frequency_hz": np.r_[0.0, FREQUENCY], "sd": 1.0}
+    columns = {"gain_db": np.r_[-np.inf, GAIN_DB], "phase_deg": np.r_[np.nan, PHASE_DEG]}
+    etfe = read_frf(write(tmp_path / "a.csv", **still, **columns), 1e-3, kind="rotational")
+    np.testing.assert_allclose(etfe.value, RESPONSE)
+    assert any("1 at 0 Hz" in notice.text for notice in etfe.notices)
+    beyond = base(sd=1.0) | {"frequency_hz": np.r_[FREQUENCY[:-2], 700.0, 900.0]}
+    beyond["receptance_db"] = beyond.pop("gain_db")
+    found = read_frf(write(tmp_path / "b.csv", **beyond), 1e-3, kind="rotational")
+    assert len(found.value) == len(FREQUENCY) - 2
+    assert any("2 above half the sampling rate, 500 Hz" in n.text for n in found.notices)
 
 
 def test_a_table_needs_a_period(tmp_path: Path) -> None:

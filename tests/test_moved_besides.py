@@ -10,13 +10,17 @@ import pytest
 from fake_analysis import fake_analysis
 from scipy.signal import butter, sosfilt
 
-from bayeshaptic.diagnosis.residuals.columns import moved_besides
+from bayeshaptic.diagnosis.base.begun import begin
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.residuals.moved import moved_besides
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from benchmarks.strangers.sensed import make
 
 
 def share(bench: Bench, pushed: float, seed: int = 1) -> float:
@@ -37,6 +41,22 @@ def test_what_moves_a_device_beside_its_command_is_measured(device: str) -> None
     bench = Bench.from_device(device)
     assert share(bench, 0.0) < 0.03
     assert share(bench, 1.0) > 0.25
+
+
+def test_the_noise_of_an_accelerometer_is_no_motion() -> None:
+    """Integrated twice it wanders off by 0.9 of the command's speed; a shaken floor is seen."""
+    case = make(94)
+    recording = case.recording
+    assert "acceleration" in case.what and isinstance(recording, Recording)
+    begun = begin(recording, "free", Options(**case.told))
+    sensed, period_s = recording.sensed, recording.period_s
+    seen = begun.etfe.unbroken
+    assert sensed is not None and seen is not None
+    assert moved_besides(begun.fit, seen) < 0.15
+    rate, time = 2 * np.pi * 3.0, np.arange(seen.samples) * period_s
+    speed = np.std(np.gradient(seen.position, period_s))
+    shaken = seen.position + speed * np.sqrt(2) / rate * np.sin(rate * time)
+    assert moved_besides(begun.fit, replace(seen, position=shaken)) > 0.25
 
 
 def test_no_stiffness_follows_where_something_else_moves_the_device() -> None:

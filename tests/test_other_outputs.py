@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,10 +15,12 @@ from bayeshaptic.diagnosis.base.opened import with_delay_of_the_loop
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.samples.mend import measurement_tests
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference import loop_response
 from bayeshaptic.models.build import with_force_sensor
 from bayeshaptic.models.response.between_samples import with_images
 from bayeshaptic.recordings.response.differences import with_differences
 from bayeshaptic.recordings.signals.causality.causality import causality
+from benchmarks.strangers.sensed import make
 
 PERIOD_S, SAMPLES = 1e-3, 4000
 RATES_HZ = np.arange(1.0, 151.0)  # one period a second
@@ -107,6 +110,28 @@ def test_the_lag_of_a_sensor_is_seen_and_not_in_the_loop(device):
     )
     limits = [bh.critical_stiffness(lagging, v).value for v in (whole, none)]
     assert limits[0] == limits[1] == bh.critical_stiffness(model, theta).value
+
+
+def test_what_is_between_the_samples_is_added_in_the_band_alone():
+    """At the Nyquist frequency a measured force has no command: divided by, noise was 1e5 times."""
+    case = make(137)
+    begun = begin(case.recording, "free", Options(**case.told))
+    put_right, measured = begun.etfe.recording, begun.measured.recording
+    assert 0 < np.std(put_right.position - measured.position) < 0.01 * np.std(measured.position)
+
+
+def test_a_fit_does_not_run_away_with_what_is_between_the_samples(monkeypatch):
+    """Of a first fit in another valley; with each round its misfit grew, to 1e10 of the noise."""
+    fits = iter([40.0, 150.0, 7e3])
+
+    def fitting(etfe, start=None):
+        return SimpleNamespace(reduced_chi_square=next(fits), theta=0.0)
+
+    monkeypatch.setattr(loop_response, "as_of_the_loop", lambda etfe, fit: object())
+    monkeypatch.setattr(loop_response, "hardly_differ", lambda one, other: False)
+    first = fitting(None)
+    fit, etfe = loop_response._settled(fitting, "measured", first, "first")
+    assert fit is first and etfe == "first"
 
 
 def test_a_delay_that_nobody_told_is_none_of_a_measured_force():

@@ -153,7 +153,7 @@ WRONG = {
     f"{DEVICE}delay=1\n{RECORDING}": r"\[device\] has an unknown key 'delay' \(did you mean 'dela",
     f"{DEVICE}kind='rotational'\n{RECORDING}": "but the device lhifam is translational",
     f"[device]\nname='wheel'\n{RECORDING}": "no device 'wheel' is known: there are lhifam, phantom",
-    f"[device]\nkind='rotational'\n{RECORDING}": r"\[device\] needs a name",
+    f"[device]\ndelay_s=1e-4\n{RECORDING}": r"\[device\] needs a kind",
     f"[device]\nfile='none.toml'\n{RECORDING}": "no such file: .*none.toml",
     f"device=3\n{RECORDING}": r"\[device\] must be a table",
     f"{DEVICE}[prior]\nm1=3\n{RECORDING}": r"\[prior\], m1 must be a table",
@@ -162,6 +162,11 @@ WRONG = {
     f"{DEVICE}[prior]\nm1={{low=1,high=2,log=1}}\n{RECORDING}": "log must be true or false, not 1",
     "[device\n": "not valid TOML",
 }
+
+
+def test_a_device_without_a_name_has_the_study_s(folder: Path) -> None:
+    path = write(folder, f"[device]\nkind='rotational'\n{RECORDING}")
+    assert read_study(path).device.name == path.stem
 
 
 @pytest.mark.parametrize("content", WRONG)

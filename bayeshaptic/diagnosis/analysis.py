@@ -9,7 +9,7 @@ from functools import cached_property
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.feedback.in_loop import InLoop
 from bayeshaptic.diagnosis.hidden.hidden import Hidden
-from bayeshaptic.diagnosis.residuals.columns import moved_besides
+from bayeshaptic.diagnosis.residuals.moved import moved_besides
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.choose import Choice
 from bayeshaptic.inference.fit import Fit
@@ -93,7 +93,7 @@ class Analysis(Shown):
 
     @cached_property
     def moved_besides(self) -> float:
-        """See `bayeshaptic.diagnosis.residuals.columns`; kept: every headline of a page asks."""
+        """See `bayeshaptic.diagnosis.residuals.moved`; kept: every headline of a page asks."""
         assert self.etfe.unbroken is not None
         return moved_besides(self.fit, self.etfe.unbroken)
 

@@ -146,7 +146,7 @@ def _device(
     elif name is not None and nearest(name, names):
         text = f"No device '{name}' is known{nearest(name, names)}; only the study's facts hold."
         notices = (Notice("note", "device", text),)
-    device = device_from_table(table.content, where, base=base, other_keys=("file", "columns"))
+    device = device_from_table(table.content, where, base, path.stem, ("file", "columns"))
     return device, _columns(table.content.get("columns"), where), notices
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.special import ndtri, stdtr
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.moved import drift, slow_velocity
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
-from bayeshaptic.diagnosis.residuals.unforced import drifts, parts, slow_motion
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import (
     ALONG,
@@ -27,14 +27,12 @@ from bayeshaptic.effects.nonlinear.shapes import (
 )
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows, remembered
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Complexes, Floats
 
 # Share of a column that is left beside the response where it is the response itself: a power of a
@@ -43,8 +41,6 @@ ROUNDING = 1e-6
 # Share of an instrument that its input has at least: less says nothing of how strong a force is.
 # It bounds a strength's standard deviation, and no score, so it raises no alarm.
 WEAK = 0.05
-# Below it a hand moves the device, and the encoder sees it well.
-_SLOW_HZ, _OF_THE_RATE = 20.0, 0.4
 
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
@@ -215,62 +211,10 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
     x, v = linear_motion(system, force, recording.period_s)
     if fit.model.held or recording.reference is not None:
         rest = recording.position - recording.position.mean() - x
-        v = v + _slow_velocity(rest, recording.period_s)
+        v = v + slow_velocity(rest, recording.period_s)
     else:
-        v = v + drift_velocity(system, recording.position - x, recording.period_s)
+        v = v + drift(system, recording.position - x, recording.period_s)[1]
     return x, v
-
-
-def drift_velocity(system: LinearSystem, besides: Floats, period_s: float) -> Floats:
-    """Velocity of a free device from how it began and from a constant force.
-
-    Nobody knows either, and the spectra do not; the position besides what the command does tells.
-
-    Parameters
-    ----------
-    system : LinearSystem
-        A batch of one.
-    besides : ndarray, shape (N,)
-        The measured position less that of the command.
-    period_s : float
-    """
-    return _drift(system, besides, period_s)[1]
-
-
-def _drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Floats, Floats]:
-    """Position and velocity of what `drift_velocity` tells."""
-    columns = drifts(system, len(besides), period_s)
-    weights = parts(columns, besides)
-    _, x, v = columns.T
-    return columns @ weights, np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
-
-
-def moved_besides(fit: Fit, recording: Recording) -> float:
-    """How fast a device that nobody holds moves beside what its command does, as a share of that.
-
-    Root mean squares of slow velocities, the encoder's rounding taken off.  Where a hand or the
-    floor moves a device dry friction looks like damping, and no test can tell; or a force that no
-    test saw makes the difference itself.
-
-    Parameters
-    ----------
-    fit : Fit
-    recording : Recording
-    """
-    period_s, system = recording.period_s, fit.model.system(fit.theta)
-    x, v = linear_motion(system, recording.force - recording.force.mean(), period_s)
-    besides = recording.position - x
-    drift, along = _drift(system, besides, period_s)
-    count = increment_unit(recording.position) or 0.0
-    slow_hz = min(_SLOW_HZ, _OF_THE_RATE / period_s)
-    rounding = count**2 / 12 * 2 * period_s * (2 * np.pi) ** 2 * slow_hz**3 / 3
-    power = float(np.var(_slow_velocity(besides - drift, period_s))) - rounding
-    return float(np.sqrt(max(power, 0.0)) / np.std(v + along))
-
-
-def _slow_velocity(position: Floats, period_s: float) -> Floats:
-    edge_hz = min(_SLOW_HZ, _OF_THE_RATE / period_s)
-    return np.gradient(slow_motion(position, period_s, edge_hz), period_s)
 
 
 def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped-def]

@@ -21,7 +21,9 @@ from bayeshaptic.recordings.response.frf_kinds import of_a_hold
 from bayeshaptic.types import Complexes, Floats
 
 _POINTS = 400  # of the smooth function
-_LOWEST = 1e-3  # of the Nyquist frequency: below, the function is what it is there
+# Of the Nyquist frequency.  Below the lowest the function is what it is there; above the highest it
+# is left out: the command that stands for a measured force vanishes at that frequency itself.
+_LOWEST, _HIGHEST = 1e-3, 0.95
 
 
 def with_images(recording: Recording, system: LinearSystem) -> Recording:
@@ -39,11 +41,12 @@ def with_images(recording: Recording, system: LinearSystem) -> Recording:
     from scipy.interpolate import make_interp_spline
 
     length = 2 * recording.samples
-    theta = np.pi * np.linspace(_LOWEST, 1.0, _POINTS)
+    theta = np.pi * np.linspace(_LOWEST, _HIGHEST, _POINTS)
     smooth = make_interp_spline(theta, images(recording, system, theta), 3)
     lines = np.maximum(2 * np.pi * np.fft.rfftfreq(length), theta[0])
     command = np.fft.rfft(recording.force - recording.force.mean(), length)
-    shown = np.fft.irfft(smooth(lines) * command, length)[: recording.samples]
+    shown = np.where(lines < theta[-1], smooth(lines) * command, 0.0)
+    shown = np.fft.irfft(shown, length)[: recording.samples]
     return replace(recording, position=recording.position + shown)
 
 

@@ -104,11 +104,11 @@ def frf_from_arrays(
         )
     if not (np.isfinite(period_s) and period_s > 0):
         raise InputError(f"{path}: the period must be a number of seconds above 0, not {period_s}")
-    columns = _columns(path, arrays, mapping)
+    columns, left_out = _columns(path, arrays, mapping, 0.5 / period_s)
+    (of,) = (role for role in FRF_KINDS if role in columns)
     frequency = columns["frequency"]
     _check_frequencies(path, frequency, period_s)
     factor = 1.0
-    (of,) = (role for role in FRF_KINDS if role in columns)
     derivatives = STRUCTURAL.get(of, 0)
     written = mapping[of].unit if of in mapping else None
     if written is not None:
@@ -118,6 +118,7 @@ def frf_from_arrays(
     if force_unit is None and position_unit is None:
         text = f"No units were given: the gain is taken to be in {units[1]}/{units[0]}."
         notices = (Notice("note", "units", text, ("force", "position")),)
+    notices += left_out
     phase = np.exp(1j * np.radians(columns["phase_deg"]))
     value: Complexes = np.asarray(10 ** (columns[of] / 20) * phase)
     variance, averages = _variance(path, columns, value)
@@ -142,11 +143,11 @@ def frf_from_arrays(
 
 
 def _columns(
-    path: Path, arrays: Arrays, mapping: Mapping[str, Column]
-) -> dict[str, NDArray[np.float64]]:
+    path: Path, arrays: Arrays, mapping: Mapping[str, Column], nyquist_hz: float
+) -> tuple[dict[str, NDArray[np.float64]], tuple[Notice, ...]]:
     """The table's columns by role, finite and equally long, in the order of the frequencies.
 
-    A single number fills its column.
+    A single number fills its column.  And what is said of rows that are not used.
     """
     for role in set(mapping) - set(FRF_ROLES):
         raise InputError(f"{path}: '{role}' belongs to a recording, not to a frequency response")
@@ -168,19 +169,36 @@ def _columns(
             f"{path}: the response needs its uncertainty, a column sd or the columns coherence and "
             f"averages; there is {there}"
         )
-    rows = len(columns["frequency"])
+    frequency = columns["frequency"]
+    used, notices = _used(frequency, kinds[0] in STRUCTURAL, nyquist_hz)
     for role, values in columns.items():
-        if len(values) not in (1, rows):
-            raise InputError(f"{path}: {role} has {len(values)} rows, frequency has {rows}")
-        values = np.broadcast_to(values, rows).copy()
-        bad = np.flatnonzero(~np.isfinite(values))
+        if len(values) not in (1, len(used)):
+            raise InputError(f"{path}: {role} has {len(values)} rows, frequency has {len(used)}")
+        values = np.broadcast_to(values, len(used))
+        bad = np.flatnonzero(used & ~np.isfinite(values))
         if len(bad):
             raise InputError(f"{path}: {role} is {values[bad[0]]} in row {bad[0] + 1}")
-        columns[role] = values
-    if rows < FEWEST_ROWS:
+        columns[role] = values[used]
+    if (rows := int(used.sum())) < FEWEST_ROWS:
         raise InputError(f"{path}: {rows} rows; a model needs at least {FEWEST_ROWS} frequencies")
     order = np.argsort(columns["frequency"], kind="stable")
-    return {role: values[order] for role, values in columns.items()}
+    return {role: values[order] for role, values in columns.items()}, notices
+
+
+def _used(
+    frequency: NDArray[np.float64], of_a_structure: bool, nyquist_hz: float
+) -> tuple[NDArray[np.bool_], tuple[Notice, ...]]:
+    """Which rows tell something of the loop, and what is said of the others.
+
+    Analysers write a line at 0 Hz, and a structure is measured as far up as it vibrates.
+    """
+    still = frequency == 0
+    beyond = of_a_structure & (frequency > nyquist_hz * (1 + 1e-9))
+    found = [f"{still.sum()} at 0 Hz"] if still.any() else []
+    if beyond.any():
+        found.append(f"{beyond.sum()} above half the sampling rate, {nyquist_hz:g} Hz")
+    text = f"Rows of the table that are not used: {' and '.join(found)}."
+    return ~(still | beyond), (Notice("note", "band", text),) if found else ()
 
 
 def _check_frequencies(path: Path, frequency: NDArray[np.float64], period_s: float) -> None:
