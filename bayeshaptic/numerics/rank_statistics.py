@@ -8,7 +8,7 @@ which the tests compare them with; its import alone would take a tenth of the ti
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from bayeshaptic.types import Floats, Ints
 
 _TAILS = (0.05, 0.95)
 _FEWEST = 4  # draws of a chain
+_LAGS_BY_ONE = 64  # a transform takes as long as some 30
 
 
 def split_rhat(chains: Floats) -> float:
@@ -154,8 +155,8 @@ def _rhat(chains: Floats) -> float:
 def _size(chains: Floats) -> float:
     """Effective sample size; the autocorrelation is summed by Geyer's initial monotone sequence.
 
-    Lag by lag, from the first on: of chains that mix a few say everything, and a transform would
-    take all of them.
+    Lag by lag, from the first on: of chains that mix a few say everything, and a transform takes
+    all of them; it follows where a few did not.
     """
     count, draws = chains.shape
     if np.ptp(chains) < np.finfo(float).resolution:
@@ -166,10 +167,20 @@ def _size(chains: Floats) -> float:
     within = variance * draws / (draws - 1.0)
     total = variance + (means.var(ddof=1) if count > 1 else 0.0)
 
+    @cache
+    def transformed() -> Floats:
+        power = np.zeros(draws + 1)
+        for one in by_time.T:
+            power += np.abs(np.fft.rfft(one, 2 * draws)) ** 2
+        return np.asarray(np.fft.irfft(power)[:draws])
+
     def correlation(lag: int) -> float:
         if lag == 0:
             return 1.0
-        covariance = np.vdot(by_time[:-lag], by_time[lag:]) / chains.size
+        if lag < _LAGS_BY_ONE:
+            covariance = np.vdot(by_time[:-lag], by_time[lag:]) / chains.size
+        else:
+            covariance = transformed()[lag] / chains.size
         return float(1.0 - (within - covariance) / total)
 
     time, pair = -1.0, np.inf

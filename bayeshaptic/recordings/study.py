@@ -116,18 +116,22 @@ class Study(Shown):
         found, lost = [], []
         for one in (entry, *entry.more):
             try:
-                found.append(self._read_one(one))
+                measured = self._read_one(one)
             except InputError as error:
                 lost.append(error)
+                continue
+            if isinstance(measured, Recording):
+                found.append(measured)
+            else:
+                lost.append(
+                    InputError(
+                        f"{self.path}: {one.path.name} is a table of a response, which cannot be "
+                        "joined; with pool = false at the top of the study each has a report"
+                    )
+                )
         if not found:
             raise lost[0]
-        recordings = [one for one in found if isinstance(one, Recording)]
-        if len(recordings) < len(found):
-            raise InputError(
-                f"{self.path}: {entry.path.name} and what counts together with it are tables of a "
-                "response, which cannot be joined; write pool = false at the top of the study"
-            )
-        joined = join_recordings(recordings)
+        joined = join_recordings(found)
         if not lost:
             return joined
         why = "; ".join(str(error) for error in lost)

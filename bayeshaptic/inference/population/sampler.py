@@ -124,16 +124,21 @@ def sample_level(
 def run_ensembles(ensembles: Ensembles, rng: np.random.Generator, ess: float) -> LevelChains:
     """Draws of a few parameters on ridges, from ensembles that are warmed up.
 
-    Their proposal is fitted again until one that is frozen gives `ess` effective draws.
+    Their proposal is fitted again until one that is frozen gives `ess` effective draws; or until
+    several times the steps give hardly more of them, where walkers hang that no longer run frees.
     """
     first_steps = 100
     steps = first_steps
     refits = 4  # at most
+    hardly, before = 1.2, 0.0  # times the effective draws of a run that was half as long or shorter
     for _ in range(refits):
         chains, values = ensembles.advance(steps)
         diagnostics = diagnose(chains)
         if diagnostics.ess >= ess and diagnostics.rhat.max() < RHAT_LIMIT:
             break
+        if diagnostics.ess < hardly * before:
+            break
+        before = diagnostics.ess
         ensembles = refitted(ensembles, chains, values, rng)
         steps = int(np.clip(1.2 * steps * ess / diagnostics.ess, 2 * steps, 4 * steps))
     return LevelChains(chains, diagnostics)
