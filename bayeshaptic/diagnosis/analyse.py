@@ -119,7 +119,7 @@ def finish(
     with clock.stage("critical stiffness"):
         options.report(0.8, "critical stiffness")
         limit = watch.limit_of(posterior)
-        etfe_limit = witness or etfe_critical_stiffness(etfe, seed=options.seed)
+        etfe_limit = witness or etfe_critical_stiffness(etfe, seed=options.seed, sensor=fit.sensor)
     options.report(0.9, "writing the report")
     notices = begun.notices
     if etfe.direct or etfe.through_reference:

@@ -118,8 +118,14 @@ class Fit(Shown):
         return summarise(self.model, self.windows, theta, self.starts)
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
-        """The fitted sampled response at `frequency_hz`, shape (L,)."""
+        """The fitted sampled response at `frequency_hz`, as it is measured, shape (L,)."""
         return self.model.measured_response(self.theta, frequency_hz)
+
+    def sensor(self, frequency_hz: Floats) -> NDArray[np.complex128]:
+        """That over the loop's own, shape (L,): one unless a force's sensor lags."""
+        if "force_lag_s" not in self.model.names:
+            return np.ones(len(frequency_hz), complex)
+        return self.response(frequency_hz) / self.model.response(self.theta, frequency_hz)
 
     def to_dataframe(self) -> Any:
         """A ``pandas.DataFrame``, a row a parameter: value, sd, unit, outcome."""

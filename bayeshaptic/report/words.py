@@ -144,6 +144,8 @@ def agreement(result: Result) -> str:
     if not (math.isfinite(middle) and middle > 0 and own.middle > 0):
         return "The model and the measurement cannot be compared: one of them has no limit."
     how = correction(result) if own is not raw else "alone, without a model"
+    if "force_lag_s" in analysis.model.names:
+        how += " but for the lag of the force's sensor"
     text = (
         f"Read from the measured response {how}, the limit is "
         f"{estimate(own.middle, own.low, own.high, limit.unit)}. {_apart(analysis, own)}"

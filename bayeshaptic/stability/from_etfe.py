@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.local_fit import LocalFit, ResponseData, local_fit, response_data
 from bayeshaptic.threads import single_threaded
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Complexes, Floats
 
 DRAWS = 4000
 # Standard deviations from -180 degrees from which a stretch counts, in equal shares of the draws:
@@ -81,7 +82,12 @@ class _Run(NamedTuple):
 
 
 @single_threaded
-def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> EtfeCriticalStiffness:
+def etfe_critical_stiffness(
+    etfe: Etfe,
+    seed: int = 0,
+    draws: int = DRAWS,
+    sensor: Callable[[Floats], Complexes] | None = None,
+) -> EtfeCriticalStiffness:
     """Smallest -Re(1/G) over the frequencies of the band where the measured G is real and negative.
 
     The response is fitted by quintics, each over a span of windows where a cubic is as good.
@@ -96,6 +102,9 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
     seed : int
         Of the random numbers.
     draws : int
+    sensor : callable, optional
+        Of frequencies (L,): what the sensor of a measured force multiplies the loop's response by
+        (`Fit.sensor`).
 
     Returns
     -------
@@ -104,7 +113,7 @@ def etfe_critical_stiffness(etfe: Etfe, seed: int = 0, draws: int = DRAWS) -> Et
         the band.  Crossings outside the band (and the one at the Nyquist frequency) are not seen:
         the true limit may be lower.
     """
-    data = response_data(etfe)
+    data = response_data(etfe, sensor)
     low, high = etfe.band_hz
     step = 0.03  # relative distance of the places where the phase is looked at
     count = max(int(np.log(high / low) / step), 2)

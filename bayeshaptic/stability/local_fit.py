@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,18 +41,24 @@ class ResponseData:
     linear: NDArray[np.bool_]
 
 
-def response_data(etfe: Etfe) -> ResponseData:
+def response_data(etfe: Etfe, sensor: Callable[[Floats], Complexes] | None = None) -> ResponseData:
     """Estimates of G from the windows of the likelihood, without those that are mostly noise.
 
     Parameters
     ----------
     etfe : Etfe
+    sensor : callable, optional
+        Of frequencies (L,): what the sensor of a measured force multiplies the response by.
     """
     windows = compress(etfe)
     k = windows.frequency_hz.shape[1]
     noise = _noise(windows.scatter, np.maximum(windows.lines - k, 1.0))
-    response = np.linalg.solve(windows.design, windows.target[..., None])[..., 0]
-    design = windows.design / np.sqrt(noise)[:, None, None]
+    design = windows.design
+    if sensor is not None:
+        nodes = windows.frequency_hz
+        design = design * sensor(nodes.ravel()).reshape(nodes.shape)[:, None, :]
+    response = np.linalg.solve(design, windows.target[..., None])[..., 0]
+    design = design / np.sqrt(noise)[:, None, None]
     strength = np.linalg.norm(design * response[:, None, :], axis=(1, 2)) / np.sqrt(k)
     noisiest = 0.3  # relative sd above which 1/G is not linear in the noise
     good = strength > 1 / noisiest

@@ -42,6 +42,7 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     start = min([low_hz, *(hz for hz, _ in found)]) / 1.3
     frequency = np.unique(np.r_[np.geomspace(start, half, POINTS), etfe.frequency_hz])
     response = analysis.model.response(thinned(analysis.posterior.draws, CURVES), frequency)
+    seen = etfe.value / analysis.fit.sensor(etfe.frequency_hz)
     row = scale(limit.quantile(0.5), limit.unit)
     style.panel(top, y=f"1/|G|, {row.unit}")
     style.panel(bottom, y="phase + 180°, degrees")
@@ -49,15 +50,13 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     _curves(bottom, frequency, _unbroken(np.degrees(np.angle(-response))))
     top.plot(
         etfe.frequency_hz,
-        row.factor / np.abs(etfe.value),
+        row.factor / np.abs(seen),
         ".",
         color=style.DATA,
         markersize=3,
         label="measured",
     )
-    bottom.plot(
-        etfe.frequency_hz, np.degrees(np.angle(-etfe.value)), ".", color=style.DATA, markersize=3
-    )
+    bottom.plot(etfe.frequency_hz, np.degrees(np.angle(-seen)), ".", color=style.DATA, markersize=3)
     _marks(top, bottom, analysis, row, found)
     for axes in (top, bottom):
         style.frequency_axis(axes, start, half * 1.02)
