@@ -3,8 +3,8 @@
 What a reference moves may be a few windows of slow motion.  A mode among them can follow their
 noise better than the device does, whose own mode lies above the band; draws around the one never
 see the other.  It is not asked where nearly all frequencies are moved, as in open loop.  Of 96 free
-devices in closed loop 57 are read through the reference; three are doubted for it, whose intervals
-all lay wholly above the truth.
+devices in closed loop 57 were read through the reference; three were doubted for it, whose
+intervals all lay wholly above the truth.  Of 66 that are now, seven, whose intervals all hold.
 """
 
 from __future__ import annotations
