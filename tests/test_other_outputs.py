@@ -105,7 +105,7 @@ def test_the_lag_of_a_sensor_is_seen_and_not_in_the_loop(device):
     assert seen == pytest.approx(model.system(theta).continuous_response(s)[0] * (1 + 1e-3 * s))
     assert np.array_equal(lagging.response(whole, RATES_HZ), model.response(theta, RATES_HZ))
     none = np.where(np.array(lagging.names) == "force_lag_s", 0.0, whole)
-    assert lagging.measured_response(none, RATES_HZ) == pytest.approx(
+    assert lagging.response(none, RATES_HZ, measured=True) == pytest.approx(
         model.response(theta, RATES_HZ)
     )
     limits = [bh.critical_stiffness(lagging, v).value for v in (whole, none)]

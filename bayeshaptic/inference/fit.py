@@ -119,10 +119,15 @@ class Fit(Shown):
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
         """The fitted sampled response at `frequency_hz`, as it is measured, shape (L,)."""
-        return self.model.measured_response(self.theta, frequency_hz)
+        return self.model.response(self.theta, frequency_hz, measured=True)
 
     def sensor(self, frequency_hz: Floats) -> NDArray[np.complex128]:
-        """That over the loop's own, shape (L,): one unless a force's sensor lags."""
+        """That over the loop's own, shape (L,): one unless a force's sensor lags.
+
+        Parameters
+        ----------
+        frequency_hz : ndarray, shape (L,)
+        """
         if "force_lag_s" not in self.model.names:
             return np.ones(len(frequency_hz), complex)
         return self.response(frequency_hz) / self.model.response(self.theta, frequency_hz)

@@ -114,7 +114,7 @@ def _fit(model: Model, etfe: Etfe, start: Floats) -> Fit:
     theta = found.theta
     rewindowings = 2
     for _ in range(rewindowings):
-        windows = compress(blurred, partial(model.measured_response, theta))
+        windows = compress(blurred, partial(model.response, theta, measured=True))
         theta = polish(model, windows, theta)
     if blurred is not etfe:
         theta, windows = _sharpened(model, etfe, polish(model, compress(etfe), theta), rewindowings)
@@ -137,7 +137,7 @@ def _sharpened(
     """
     tried: list[tuple[float, Floats, Windows]] = []
     for step in range(rewindowings + 1):
-        windows = compress(etfe, partial(model.measured_response, theta))
+        windows = compress(etfe, partial(model.response, theta, measured=True))
         tried.append((float(Likelihood(model, windows)(theta[None])[0]), theta, windows))
         if step > 2 and abs(tried[-1][0] - tried[-2][0]) < _SETTLED:
             break

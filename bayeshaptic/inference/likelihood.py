@@ -86,7 +86,9 @@ class Likelihood:
         chunk = 128  # vectors at a time, of what is done in plain NumPy
         for start in range(0, len(theta), chunk):
             part = theta[start : start + chunk]
-            g = self.model.measured_response(part, frequency_hz).reshape(len(part), count, nodes)
+            g = self.model.response(part, frequency_hz, measured=True).reshape(
+                len(part), count, nodes
+            )
             if nodes == 1:
                 fitted = self.windows.design[:, :, 0] * g
             else:  # one small matrix product a window, the batch last

@@ -143,7 +143,12 @@ class Model(Shown):
         return system
 
     def measured_system(self, theta: ArrayLike) -> LinearSystem:
-        """The same as a sensor of the force shows them, which may lag: the loop itself has none."""
+        """The same as a sensor of the force shows them, which may lag: the loop itself has none.
+
+        Parameters
+        ----------
+        theta : array_like, shape (B, P) or (P,)
+        """
         system = self.system(theta)
         if "force_lag_s" not in self.names:
             return system
@@ -152,7 +157,11 @@ class Model(Shown):
         return system.with_filter(np.stack([one, lag]), one[None])
 
     def response(
-        self, theta: ArrayLike, frequency_hz: ArrayLike, approximation: str = "exact"
+        self,
+        theta: ArrayLike,
+        frequency_hz: ArrayLike,
+        approximation: str = "exact",
+        measured: bool = False,
     ) -> Complexes:
         """Sampled response from force to position.
 
@@ -163,6 +172,8 @@ class Model(Shown):
         frequency_hz : array_like, shape (L,)
         approximation : {"exact", "continuous"}
             "continuous" is the paper's P(s) e^{-s (td + T/2)}.
+        measured : bool
+            As `measured_system` has it, which a fit is compared with.
 
         Returns
         -------
@@ -171,7 +182,7 @@ class Model(Shown):
         """
         if self.period_s is None:
             raise InputError("the model has no sampling period: give period_s, or a device.")
-        system = self.system(theta)
+        system = self.measured_system(theta) if measured else self.system(theta)
         frequency_hz = np.asarray(frequency_hz, float)
         if approximation == "exact":
             response = system.sampled_response(frequency_hz, self.period_s)
@@ -179,20 +190,6 @@ class Model(Shown):
             response = system.continuous_approximation(frequency_hz, self.period_s)
         else:
             raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
-        return response[0] if np.ndim(theta) == 1 else response
-
-    def measured_response(self, theta: ArrayLike, frequency_hz: ArrayLike) -> Complexes:
-        """The sampled response as `measured_system` has it: what a fit is compared with.
-
-        Parameters
-        ----------
-        theta : array_like, shape (B, P) or (P,)
-        frequency_hz : array_like, shape (L,)
-        """
-        if self.period_s is None:
-            raise InputError("the model has no sampling period: give period_s, or a device.")
-        system = self.measured_system(theta)
-        response = system.sampled_response(np.asarray(frequency_hz, float), self.period_s)
         return response[0] if np.ndim(theta) == 1 else response
 
     def to_control(self, theta: ArrayLike | None = None) -> Any:

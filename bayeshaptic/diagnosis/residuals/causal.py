@@ -139,7 +139,7 @@ def _own_changes(fit: Fit, frequency_hz: Floats) -> Complexes:
     here = coordinates(fit.model)
     phi = np.repeat(here.coordinate(fit.theta[None]), fit.model.size + 1, axis=0)
     phi[1:] += _STEP * np.eye(fit.model.size)
-    response = fit.model.measured_response(here.natural(phi), frequency_hz.ravel())
+    response = fit.model.response(here.natural(phi), frequency_hz.ravel(), measured=True)
     slope = (response[1:] - response[0]) / _STEP
     return np.moveaxis(slope.reshape(-1, *frequency_hz.shape), 0, -1)
 

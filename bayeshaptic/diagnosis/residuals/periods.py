@@ -160,7 +160,7 @@ def _slopes(fit: Fit, frequency_hz: Floats) -> Complexes:
     here = coordinates(fit.model)
 
     def response(phi: Floats) -> Floats:
-        found = fit.model.measured_response(here.natural(phi), frequency_hz)
+        found = fit.model.response(here.natural(phi), frequency_hz, measured=True)
         return np.concatenate([found.real, found.imag], axis=1)
 
     both = jacobian(response, here.coordinate(fit.theta[None]))[0]

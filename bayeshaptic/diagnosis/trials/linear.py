@@ -257,5 +257,5 @@ def _try(state: State, windows: Windows, one: Sieved, base: Floats, first: Optim
 
 def _around(model: Model, etfe: Etfe, first: Optimum) -> tuple[Floats, Windows]:
     """The fit to the windows to fit by once more, compressed around the first one."""
-    windows = compress(etfe, partial(model.measured_response, first.theta))
+    windows = compress(etfe, partial(model.response, first.theta, measured=True))
     return fit_part(model, windows, first.theta), windows

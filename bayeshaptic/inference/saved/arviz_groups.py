@@ -215,8 +215,8 @@ def _predictive(posterior: Sampled, prior: Floats, rng: np.random.Generator) -> 
     where = {"frequency": Variable(("frequency",), etfe.frequency_hz)}
 
     def predicted(theta: Floats) -> Group:
-        response = posterior.model.measured_response(
-            theta.reshape(-1, theta.shape[2]), etfe.frequency_hz
+        response = posterior.model.response(
+            theta.reshape(-1, theta.shape[2]), etfe.frequency_hz, measured=True
         )
         noise = rng.standard_normal((2, *response.shape)) * np.sqrt(etfe.variance / 2)
         shape, dims = (*theta.shape[:2], -1), ("chain", "draw", "frequency")

@@ -102,7 +102,7 @@ def in_loop_fit(model: Model, etfe: Etfe, motion: MotionFit, misfit: float) -> I
     theta = motion.inside[kept]
     support = np.array([model.prior(name).support for name in model.names])
     theta = np.clip(theta, support[:, 0], support[:, 1])
-    windows = compress(etfe, partial(model.measured_response, theta))
+    windows = compress(etfe, partial(model.response, theta, measured=True))
     low = (motion.values[kept] < motion.inside[kept]) & (theta <= support[:, 0])
     outcome = {n: AT_BOUND if b else CONVERGED for n, b in zip(model.names, low, strict=True)}
     return InLoopFit(

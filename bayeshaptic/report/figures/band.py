@@ -34,7 +34,9 @@ def response_band(analysis: Analysis) -> ResponseBand:
     measured_hz = analysis.etfe.frequency_hz
     grid = np.geomspace(measured_hz[0], measured_hz[-1], POINTS)
     frequency_hz = np.unique(np.r_[grid, measured_hz])
-    response = analysis.model.measured_response(thinned(analysis.posterior.draws), frequency_hz)
+    response = analysis.model.response(
+        thinned(analysis.posterior.draws), frequency_hz, measured=True
+    )
     return ResponseBand(
         frequency_hz,
         _quantiles(20 * np.log10(np.abs(response))),

@@ -193,7 +193,7 @@ class ForceBench:
     def windows(self, etfe: Etfe, theta: Floats, columns: list[Complexes] | None = None) -> Windows:
         """Windows of a measurement, with motions, at its lines, as further inputs."""
         inputs = np.stack(columns) if columns else None
-        return compress(etfe, partial(self.model.measured_response, theta), inputs)
+        return compress(etfe, partial(self.model.response, theta, measured=True), inputs)
 
     def _simulated(
         self, forces: tuple[Acting, ...], theta: Floats, expected: Floats | None
@@ -203,7 +203,7 @@ class ForceBench:
         None where it runs away, or where the linear parameters are such that no response is a
         number (a damper at zero behind a spring a thousand times too stiff).
         """
-        if not np.all(np.isfinite(self.model.measured_response(theta, self._somewhere))):
+        if not np.all(np.isfinite(self.model.response(theta, self._somewhere, measured=True))):
             return None
         added = self.simulation.added(forces, theta, expected)
         if not np.isfinite(added).all():

@@ -237,7 +237,8 @@ def _with_a_hand(
         return slopes
     spectra: Any = bench.without(changes, theta).spectra
     left = (
-        spectra.position - bench.model.measured_response(theta, bench.frequency_hz) * spectra.force
+        spectra.position
+        - bench.model.response(theta, bench.frequency_hz, measured=True) * spectra.force
     )
     found = np.array(slopes)
     found[grounded] += left * bench.answer(theta).growth(answered(changes), found[grounded])
