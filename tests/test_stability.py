@@ -26,7 +26,7 @@ from bayeshaptic.stability.binding import MODE, NEVER, RIGID, group_crossings
 from bayeshaptic.stability.crossings import search
 from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.responses.evaluated import EvaluatedResponse
-from bayeshaptic.stability.responses.response import pole_response
+from bayeshaptic.stability.responses.response import PoleResponse, pole_response
 
 T = 1e-3
 CASES = [
@@ -424,3 +424,12 @@ def test_groups_part_at_wide_gaps_only():
     assert np.bincount(group).tolist() == [591, 400, 9]
     one_kind, _ = group_crossings(np.full(990, MODE), frequency[:990])
     assert [round(c.probability, 3) for c in one_kind] == [0.596, 0.404]
+
+
+def test_a_pole_that_runs_away_beside_a_far_one_is_no_marginal_one() -> None:
+    """Of draws of a person who has not been seen: with a warning of NumPy on the terminal."""
+    poles = np.array([[-1e13 + 0j, -700.0 + 2j], [-1e13 + 0j, 700.0 + 2j], [-1.0 + 0j, 1j]])
+    ones = np.ones_like(poles)
+    nothing = np.zeros(3), np.zeros(3, int)
+    found = PoleResponse(poles, ones, ones, 0 * ones, poles, *nothing, exact=True)
+    assert found.stable_at_rest().tolist() == [True, False, True]

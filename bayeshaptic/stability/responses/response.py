@@ -132,8 +132,9 @@ class PoleResponse:
         inwards where Re(conj(z0) R) > 0.
         """
         scale = np.abs(self.poles).max(axis=1, keepdims=True)
-        marginal = np.abs(self.poles.real) <= 1e-10 * scale
-        z0 = np.exp(np.where(marginal, self.poles, 0.0))
+        # Beside a pole that a far-away draw puts at 1e13 rates one that runs away is none of these.
+        marginal = np.abs(self.poles.real) <= np.minimum(1e-10 * scale, 1e-6)
+        z0 = np.exp(1j * np.where(marginal, self.poles.imag, 0.0))
         residue = (self.direct + self.late / z0) * z0 ** -self.delay[:, None]
         outwards = (np.conj(z0) * residue).real < 0
         unstable = np.where(marginal, outwards, self.poles.real > 0).any(axis=1)
