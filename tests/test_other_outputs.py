@@ -212,6 +212,8 @@ def test_the_delay_of_the_loop_is_put_in_where_it_is_known(device, table, tmp_pa
         seen = bh.read_recording(path, columns="time=t,measured_force=u[N],position=x[m]")
     (warned,) = with_delay_of_the_loop(seen, None, Options())[1]
     assert "--delay-s" in warned.text
+    with pytest.raises(InputError, match="shows nothing of the loop's delay"):
+        with_delay_of_the_loop(seen, None, Options(prior={"delay_s": bh.HalfNormal(1e-3)}))
     late, none = with_delay_of_the_loop(seen, None, Options(delay_s=1.3e-3))
     assert none == ()
     if table:

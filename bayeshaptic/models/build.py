@@ -195,6 +195,10 @@ def with_force_sensor(model: Model) -> Model:
     in the place of its mass: of 29 simulated recordings with a sensor of 100 to 900 Hz eleven had a
     limit of 1.2 to 229 times the truth in green while the lag was no parameter.  A delay that
     nobody told is none: it is before what the sensor sees, and beside a lag it would hide there.
+
+    Parameters
+    ----------
+    model : Model
     """
     if "delay_s" in model.names and "delay_s" not in model.reference:
         model = model.with_known({"delay_s": 0.0})

@@ -134,6 +134,11 @@ def with_delay_of_the_loop(
     """The measurement as of the loop: what a sensor of the force, or a hammer, saw has no delay.
 
     Where the delay is known it is put in; otherwise whoever reads the limit is warned.
+
+    Raises
+    ------
+    InputError
+        For a prior of a delay that no such measurement shows.
     """
     if not any(notice.topic == NO_LOOP for notice in measurement.notices):
         return measurement, ()
@@ -141,6 +146,11 @@ def with_delay_of_the_loop(
     if delay_s is None and device is not None:
         delay_s = device.delay_s
     if delay_s is None:
+        if "delay_s" in options.prior:
+            raise InputError(
+                "prior: a measured force shows nothing of the loop's delay; give it by --delay-s "
+                "or the delay_s of [device], with delay_sd_s where it is uncertain"
+            )
         text = (
             "The force was measured behind the loop's delay, and the delay is not known: the limit "
             "is that of a loop without any, and the real one is lower. Give it with --delay-s."
