@@ -168,12 +168,17 @@ def kept(seeds: Sequence[int], path: Path | None, found: Callable[[int], Row]) -
     summary([rows[seed] for seed in seeds])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+def parser_of(what: str | None) -> argparse.ArgumentParser:
+    """How many recordings, from which seed on, and the file that keeps them."""
+    parser = argparse.ArgumentParser(description=what)
     parser.add_argument("count", nargs="?", type=int, default=40)
     parser.add_argument("first", nargs="?", type=int, default=0)
     parser.add_argument("file", nargs="?", type=Path)
-    asked = parser.parse_args()
+    return parser
+
+
+def main() -> None:
+    asked = parser_of(__doc__).parse_args()
     kept(range(asked.first, asked.first + asked.count), asked.file, one)
 
 

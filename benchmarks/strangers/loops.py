@@ -17,9 +17,7 @@ so: which parameters are told, and how often their 90 % intervals hold the truth
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +25,7 @@ from scipy.signal import butter, sosfilt
 
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording
-from benchmarks.strangers.__main__ import Row, analysed, kept
+from benchmarks.strangers.__main__ import Row, analysed, kept, parser_of
 from benchmarks.strangers.device import Array, States
 from benchmarks.strangers.draw import (
     COUNT,
@@ -220,10 +218,7 @@ def open_loop(seed: int) -> Row:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("count", nargs="?", type=int, default=40)
-    parser.add_argument("first", nargs="?", type=int, default=0)
-    parser.add_argument("file", nargs="?", type=Path)
+    parser = parser_of(__doc__)
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--one-mass", dest="one", action="store_const", const=one_mass, default=one)
     which.add_argument("--open-loop", dest="one", action="store_const", const=open_loop)

@@ -1,4 +1,4 @@
-"""The same for what else is recorded: velocities, accelerations, measured forces, tables.
+"""Velocities, accelerations, measured forces and tables of another simulation.
 
     python -m benchmarks.strangers.sensed [COUNT] [FIRST] [FILE]
 
@@ -11,7 +11,6 @@ good loggers do. Some are told their delay, some whether somebody holds them.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.frf_table import read_frf
 from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
-from benchmarks.strangers.__main__ import Row, analysed, kept
+from benchmarks.strangers.__main__ import Row, analysed, kept, parser_of
 from benchmarks.strangers.device import Array, States
 from benchmarks.strangers.draw import (
     BAND_HZ,
@@ -189,11 +188,7 @@ def _noise(draw: Draw, signal: Array, most: float) -> Array:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("count", nargs="?", type=int, default=45)
-    parser.add_argument("first", nargs="?", type=int, default=0)
-    parser.add_argument("file", nargs="?", type=Path)
-    asked = parser.parse_args()
+    asked = parser_of(__doc__).parse_args()
     kept(range(asked.first, asked.first + asked.count), asked.file, one)
 
 

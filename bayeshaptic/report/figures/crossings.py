@@ -42,7 +42,9 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     start = min([low_hz, *(hz for hz, _ in found)]) / 1.3
     frequency = np.unique(np.r_[np.geomspace(start, half, POINTS), etfe.frequency_hz])
     response = analysis.model.response(thinned(analysis.posterior.draws, CURVES), frequency)
-    seen = etfe.value / analysis.fit.sensor(etfe.frequency_hz)
+    seen = etfe.value
+    if etfe.of_measured_force:
+        seen = seen / analysis.fit.sensor(etfe.frequency_hz)
     row = scale(limit.quantile(0.5), limit.unit)
     style.panel(top, y=f"1/|G|, {row.unit}")
     style.panel(bottom, y="phase + 180°, degrees")
@@ -54,7 +56,7 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
         ".",
         color=style.DATA,
         markersize=3,
-        label="measured",
+        label="measured" if seen is etfe.value else "measured, lag taken off",
     )
     bottom.plot(etfe.frequency_hz, np.degrees(np.angle(-seen)), ".", color=style.DATA, markersize=3)
     _marks(top, bottom, analysis, row, found)

@@ -122,8 +122,7 @@ class Causality:
     def opposite(self) -> bool:
         """The position moves against the force: one of them has the opposite sign.
 
-        Not said of a force that repeats: nothing is new in it, and its response tells; nor where
-        the first of the later answers is clearly along the force: the device swings back.
+        Not of a force that repeats, nor where the first later answer goes along: it swings back.
         """
         if self.repeats:
             return False
@@ -132,8 +131,7 @@ class Causality:
         answers = abs(now.value) / _AT_ONCE, abs(soon.value) / _SOON
         at_once = max(answers) > abs(later.value)
         clear_answer = 8.0
-        along = late[0].z > clear_answer
-        clear = later.z < -clear_answer and not along and self._force_drives
+        clear = later.z < -clear_answer and late[0].z <= clear_answer and self._force_drives
         return clear and not at_once and not self._past_drives(SIGNIFICANT)
 
     @property
