@@ -74,7 +74,7 @@ TIE, LAW_TIE = 6.0, 0.05
 """Difference of scores that one recording does not decide; of laws of one force, which differ by
 less than either does from the truth, this share of the score besides.
 
-Without the first 30 of 34 effects are named, or stand as a tie; with it all 34.  Without the second
+Without the first 30 of 34 effects are named, or stand as a tie; with it 33.  Without the second
 nothing changes."""
 LAW_SD = 0.03
 """How well a law of a force is known at best, relative; nor is its strength known better.
