@@ -41,7 +41,7 @@ class Ensembles:
     state : tuple
         State of a `numpy.random.RandomState`: emcee would copy the global one.
     redraw : callable, optional
-        A proposal of a few coordinates alone, for a fifth of the moves.
+        A proposal of a few coordinates alone, for an eighth of the moves.
     """
 
     density: LogDensity
