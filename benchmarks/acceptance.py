@@ -1,6 +1,6 @@
 """What the rules of acceptance cost and find: each of them left out, and what then changes.
 
-    python -m benchmarks.acceptance --clean 24 --each 2 --seconds 20
+    python -m benchmarks.acceptance --clean 24 --each 2
     python -m benchmarks.acceptance --reach --each 8 --seconds 20
 
 Of every recording all candidates of all classes are fitted, whether or not a test raises them: so a
