@@ -11,6 +11,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+# Files that appear in the folders of reports and batches, each with what stands in it.
+_MARKS = {
+    "report.html": b"bayeshaptic",
+    "summary.json": b'"critical_stiffness"',
+    "population.json": b'"device_limit"',
+    "limits.json": b'"bayeshaptic limits',
+    "limits.csv": b"damping_filter,cutoff_hz,smoothing,",
+    "index.html": b"bayeshaptic",
+    "index.csv": b"name,device,user,configuration,status,",
+    "failed.csv": b"name,folder,error",
+}
 _DRAFT = re.compile(
     r"\.(?:report|part)-(?P<host>[\w-]*)-(?P<pid>\d+)-[0-9a-f]{12}(?:-.*)?", re.DOTALL
 )
@@ -38,6 +49,18 @@ def write_whole(path: Path, text: str) -> None:
     """Write a text file; it is complete, or what was there before."""
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="\n")
+
+
+def is_of_a_report(path: Path) -> bool | None:
+    """Whether a file has the name and the content of one that reports and batches write.
+
+    None where the name is no such, or, as of a picture, the content need not be looked at.
+    """
+    if path.name not in _MARKS or not path.is_file():
+        return None
+    most = 1_000_000  # bytes, in which a file says what it is
+    with path.open("rb") as file:
+        return _MARKS[path.name] in file.read(most)
 
 
 def flush(path: Path) -> None:

@@ -73,11 +73,14 @@ def test_what_is_in_a_folder(folder: Path) -> None:
     (folder / "device.toml").write_text("kind='rotational'\n")
     (folder / ".hidden.csv").write_text("1")
     (folder / "old").mkdir()
-    for name in ("summary.json", "limits.csv", "x.npz"):
-        (folder / "old" / name).write_text("1")
+    for name in ("summary.json", "limits.csv"):
+        (folder / "old" / name).write_text("damping_filter,cutoff_hz,smoothing,1")
     assert [path.name for path in find_sources([folder])] == ["s.toml", "a.csv", "b.csv"]
     with pytest.raises(InputError, match="no studies and no recordings"):
         find_sources([folder / "old"])
+    # Of a folder that is named the recordings count, whatever else is in it.
+    (folder / "old" / "x.npz").write_text("1")
+    assert [path.name for path in find_sources([folder / "old"])] == ["x.npz"]
 
 
 def test_a_batch_goes_on_and_is_resumed(folder: Path, tmp_path: Path, reports: Reports) -> None:
@@ -107,6 +110,47 @@ def test_a_batch_goes_on_and_is_resumed(folder: Path, tmp_path: Path, reports: R
     page = (out / "index.html").read_text()
     assert 'href="a/report.html"' in page and "&lt;Ada&gt;" in page and "://" not in page
     assert json.loads((out / "manifest.json").read_text())["versions"]["bayeshaptic"]
+
+
+def test_a_batch_in_the_folder_of_its_recordings_is_resumed(folder: Path, reports: Reports) -> None:
+    for asked in (["a.csv", "b.csv", "c.csv", "c.csv"], ["b.csv"]):
+        reports.asked.clear()
+        bh.run_batch([folder], folder, executor=executors.serial)
+        assert reports.asked == asked
+
+
+def test_recordings_of_one_name_are_reported_where_they_stand(
+    tmp_path: Path, reports: Reports
+) -> None:
+    place = tmp_path / "recordings"
+    for day in ("day1", "day2"):
+        (place / day).mkdir(parents=True)
+        (place / day / "plain.csv").write_text(day)
+    (place / "day1" / "other.csv").write_text("1")
+    bh.run_batch([place], tmp_path / "out", executor=executors.serial)
+    rows = list(csv.DictReader((tmp_path / "out" / "index.csv").read_text().splitlines()))
+    assert [row["name"] for row in rows] == ["other.csv", "day1/plain.csv", "day2/plain.csv"]
+    for name in ("other", "day1/plain", "day2/plain"):
+        assert (tmp_path / "out" / name / "summary.json").exists()
+    assert len(bh.run_batch([place], tmp_path / "out", executor=executors.serial)) == 3
+    assert len(reports.asked) == 3
+    (place / "day1" / "plain.txt").write_text("1")
+    with pytest.raises(InputError, match="both be reported in .*plain; rename one"):
+        bh.run_batch([place], tmp_path / "out", executor=executors.serial)
+
+
+def test_recordings_named_as_files_of_a_report_are_recordings(
+    tmp_path: Path, reports: Reports
+) -> None:
+    for name in ("limits.csv", "index.csv"):
+        (tmp_path / name).write_text("time_s,force_n,position_m\n")
+    assert [path.name for path in find_sources([tmp_path])] == ["index.csv", "limits.csv"]
+    with pytest.raises(InputError, match=r"index\.csv: the report has a file of this name"):
+        bh.run_batch([tmp_path], tmp_path, executor=executors.serial)
+    assert (tmp_path / "index.csv").read_text() == "time_s,force_n,position_m\n"
+    (tmp_path / "index.csv").unlink()
+    bh.run_batch([tmp_path], tmp_path, executor=executors.serial)
+    assert reports.asked == ["limits.csv"]
 
 
 def test_a_thousand_recordings(tmp_path: Path, reports: Reports) -> None:

@@ -74,7 +74,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     def write(result: Any, folder: Path, origin: Any = None) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "summary.json").write_text(summary_json(result, origin))
-        (folder / "report.html").write_text("<!DOCTYPE html>")
+        (folder / "report.html").write_text("<!DOCTYPE html>bayeshaptic")
         return folder / "report.html"
 
     monkeypatch.setattr(recording_job, "analyse", partial(analyse, ess=50))
@@ -277,7 +277,7 @@ def test_units_wrong_by_a_thousand_are_a_warning(
         (["simulate", "phantom", "-o", "."], "folder"),
         (["simulate", "phantom", "-o", "a.csv", "--effect", "magic"], "coulomb_friction"),
         (["simulate", "phantom", "-o", "a.csv", "--effect", "extra_delay=x"], "FIELD:VALUE"),
-        (["batch", "a/same.csv", "b/same.csv"], "rename one"),
+        (["batch", "a/same.csv", "a/same.mat"], "rename one"),
     ],
 )
 def test_wrong_input_is_one_line(
@@ -424,6 +424,22 @@ def test_report_writes_everything_and_says_what_to_do(
     first, *others = out.splitlines()
     assert first.startswith("phantom: ") and "N m/rad" in first
     assert others[-1] == f"  report: {folder / 'report.html'}" and len(others) <= 4
+
+
+def test_no_recording_is_replaced_by_its_report(run: Run, phantom: Path, tmp_path: Path) -> None:
+    recording = tmp_path / "limits.csv"
+    content = phantom.read_bytes()
+    recording.write_bytes(content)
+    (tmp_path / "study.toml").write_text(
+        '[device]\nname = "phantom"\n[[recording]]\nfile = "limits.csv"\n'
+    )
+    for source in ("limits.csv", "study.toml"):
+        status, out, err = run("report", source, *RIGID, "-o", ".")
+        assert status == 2 and not out
+        assert "limits.csv: the report has a file of this name" in only_line(err)
+    assert recording.read_bytes() == content
+    status, _, err = run("report", "limits.csv", "-o", "")
+    assert status == 2 and "the name is empty" in err
 
 
 @pytest.mark.usefixtures("quick")

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from bayeshaptic.errors import InputError
 from bayeshaptic.files import remove_dead_drafts, write_whole
-from bayeshaptic.report.draft import draft_in, move_all
+from bayeshaptic.report.draft import draft_in, move_all, report_in
 
 
 def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
@@ -31,6 +32,38 @@ def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
     assert (out / "a").read_text() == "new"
     write_whole(out / "b", "x")
     assert sorted(os.listdir(out)) == ["a", "b", "last", "z"]
+
+
+@pytest.mark.parametrize("name", ["limits.csv", "summary.json", "posterior.nc"])
+def test_a_report_does_not_replace_what_it_is_made_from(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("time_s,force_n,position_m\n")
+
+    def report() -> None:
+        with report_in(tmp_path, "summary.json", ["posterior.nc"], [tmp_path / name]) as draft:
+            for each in {"summary.json", name}:
+                (draft / each).write_text("new")
+
+    with pytest.raises(InputError, match=f"{name}: the report has a file of this name"):
+        report()
+    assert os.listdir(tmp_path) == [name]
+    assert (tmp_path / name).read_text() == "time_s,force_n,position_m\n"
+
+
+def test_a_report_replaces_a_report_and_nothing_else(tmp_path: Path) -> None:
+    def report() -> None:
+        with report_in(tmp_path, "summary.json", []) as draft:
+            (draft / "limits.csv").write_text("damping_filter,cutoff_hz,smoothing,b\n")
+            (draft / "summary.json").write_text('{"critical_stiffness": null}')
+
+    report()
+    report()
+    (tmp_path / "limits.csv").write_text("time_s,force_n,position_m\n")
+    with pytest.raises(InputError, match=r"limits\.csv: .*, and this one is of no report; move it"):
+        report()
+    assert (tmp_path / "limits.csv").read_text() == "time_s,force_n,position_m\n"
+    assert sorted(os.listdir(tmp_path)) == ["limits.csv", "summary.json"]
+    with pytest.raises(InputError, match="empty name"), report_in("", "summary.json", []):
+        pass
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be asked whether it lives")

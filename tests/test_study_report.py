@@ -244,7 +244,7 @@ def test_a_measurement_that_puts_the_limit_lower_lowers_that_of_the_study() -> N
 
 def test_an_older_report_leaves_nothing_that_contradicts(whole: Path, tmp_path: Path) -> None:
     for name in ("study_people.png", "limits.json", "index.html", "notes.txt"):
-        (tmp_path / name).write_text("old")
+        (tmp_path / name).write_text('"format": "bayeshaptic limits 1"')
     write_study_report(study("nobody"), tmp_path, walls=False)
     left = {path.name for path in tmp_path.iterdir()}
     assert left == {"report.html", "population.json", "study_limit.png", "notes.txt"}

@@ -11,6 +11,7 @@ from bayeshaptic.commands.options import (
     add_quiet,
     command_line,
     count,
+    place,
     settings_from,
 )
 
@@ -45,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o",
         "--output",
-        type=Path,
+        type=place,
         default=Path("reports"),
         metavar="DIR",
         help="folder in which every study gets a folder of its own name (default: ./reports)",

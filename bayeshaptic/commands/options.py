@@ -7,6 +7,7 @@ import inspect
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from bayeshaptic.diagnosis.options import Options
@@ -43,6 +44,13 @@ def whole(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} must be a whole number, zero or above")
     return int(text)
+
+
+def place(text: str) -> Path:
+    """A path; an empty text, as of a variable that is not set, is none."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name is empty; name a folder or file")
+    return Path(text)
 
 
 def band(text: str) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from bayeshaptic.commands.options import (
     add_analysis_options,
     add_quiet,
     add_workers,
+    place,
     settings_from,
     workers_from,
 )
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o",
         "--output",
-        type=Path,
+        type=place,
         metavar="DIR",
         help="folder for the result, made if need be; an older one in it is replaced (default: "
         "./NAME-population, NAME being the study's name without its ending)",

@@ -10,6 +10,7 @@ from bayeshaptic.commands.options import (
     add_quiet,
     add_workers,
     command_line,
+    place,
     settings_from,
     workers_from,
 )
@@ -46,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o",
         "--output",
-        type=Path,
+        type=place,
         metavar="DIR",
         help="folder for the report, made if need be; an older report in it is replaced "
         "(default: ./NAME-report, NAME being the source's name without its endings)",

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.commands.options import add_quiet, band, non_negative, positive, whole
+from bayeshaptic.commands.options import add_quiet, band, non_negative, place, positive, whole
 from bayeshaptic.errors import InputError
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o",
         "--output",
-        type=Path,
+        type=place,
         required=True,
         metavar="FILE",
         help="the recording: .csv, .csv.gz, .npz, .h5 or .mat",

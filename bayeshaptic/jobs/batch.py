@@ -9,7 +9,9 @@ from __future__ import annotations
 import concurrent.futures
 import math
 import multiprocessing
+import os
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -20,11 +22,14 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.files import remove_dead_drafts
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Outcome
+from bayeshaptic.jobs.index import FILES as INDEX_FILES
 from bayeshaptic.jobs.index import row_of, write_index
 from bayeshaptic.jobs.job import Job, Settings, refuse_file
+from bayeshaptic.jobs.manifest import NAME as MANIFEST
 from bayeshaptic.jobs.manifest import ManifestEntry, manifest_entry, read_manifest, write_manifest
 from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.report.draft import refuse_to_replace
 from bayeshaptic.types import Executor, Progress
 
 if TYPE_CHECKING:
@@ -75,6 +80,8 @@ def jobs(
 ) -> tuple[Job, ...]:
     """A job for each source, each with a folder of its own in `parent`.
 
+    Of sources with the same name it stands where the source stands among all of them.
+
     Parameters
     ----------
     sources : iterable of Path
@@ -86,18 +93,23 @@ def jobs(
     Raises
     ------
     InputError
-        Where two sources have the same name, or a folder has none.
+        Where two sources of one folder have the same name, or a folder has none.
     """
-    by_name: dict[str, Job] = {}
-    for source in find_sources(sources):
+    found = find_sources(sources)
+    names = Counter(map(recording_name, found))
+    root = os.path.commonpath([source.parent for source in found]) if found else ""
+    by_folder: dict[Path, Job] = {}
+    for source in found:
         name = recording_name(source)
-        if name in by_name:
+        place = parent / source.parent.relative_to(root) if names[name] > 1 else parent
+        job = Job(source, place / name, settings, command)
+        other = by_folder.setdefault(job.folder, job)
+        if other is not job:
             raise InputError(
-                f"{by_name[name].source} and {source} would both be reported in {parent / name}; "
+                f"{other.source} and {source} would both be reported in {job.folder}; "
                 "rename one, or run them apart"
             )
-        by_name[name] = Job(source, parent / name, settings, command)
-    return tuple(by_name.values())
+    return tuple(by_folder.values())
 
 
 @at_the_door
@@ -143,7 +155,7 @@ def run_batch(
     Raises
     ------
     InputError
-        Where there is nothing to do, or no place to write.
+        Where there is nothing to do, or no place to write, or a recording would be written over.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # A worker that this very call is starting: it must end, and nobody catches anything there.
@@ -155,6 +167,7 @@ def run_batch(
     refuse_file(folder)
     settings = settings or Settings()
     work = jobs([Path(source).absolute() for source in sources], folder, settings, command)
+    refuse_to_replace(folder, (*INDEX_FILES, MANIFEST), [job.source for job in work])
     folder.mkdir(parents=True, exist_ok=True)
     for place in (folder, *(job.folder for job in work)):
         remove_dead_drafts(place)
@@ -214,9 +227,10 @@ class _Batch:
         reports, seconds = outcome.result or ((), None)
         failures = [one.error for one in reports if one.error is not None]
         error = outcome.error or (failures[0] if failures else None)
+        where = job.folder.relative_to(self.folder).parent
         rows = [
             row_of(
-                one.name,
+                (where / one.name).as_posix(),
                 job.folder if one.page is None else one.page.parent,
                 one.headline.status if one.headline else None,
                 one.error,
@@ -224,7 +238,8 @@ class _Batch:
             for one in reports
         ]
         if outcome.error is not None:
-            rows = [row_of(recording_name(job.source), job.folder, None, outcome.error)]
+            name = (where / recording_name(job.source)).as_posix()
+            rows = [row_of(name, job.folder, None, outcome.error)]
         entry = replace(
             self.entries[str(job.source)],
             state="done" if error is None else "failed",

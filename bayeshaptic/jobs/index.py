@@ -30,6 +30,7 @@ COLUMNS = {
     "verdict": "Verdict",
     "error": "Error",
 }
+FILES = ("index.html", "index.csv", "failed.csv")
 _NUMBERS = ("safe", "q05", "q50", "q95", "frequency_hz")
 # A sign for where there is no colour, and the class of the page's style.
 _LIGHTS = {

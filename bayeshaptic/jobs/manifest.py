@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -52,11 +53,8 @@ def manifest_entry(job: Job) -> ManifestEntry:
     """The entry of a job that is still to be done."""
     files = [job.source]
     if job.source.suffix.lower() == ".toml":
-        try:
-            study = read_study(job.source, job.settings.allow_outside)
-            files += [entry.path for entry in study.entries]
-        except InputError:  # said when it is its turn
-            pass
+        with contextlib.suppress(InputError):  # said when it is its turn
+            files += read_study(job.source, job.settings.allow_outside).files
     device = job.settings.device
     if isinstance(device, str | Path) and Path(device).is_file():
         files.append(Path(device))

@@ -20,15 +20,17 @@ from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.report import write_report
+from bayeshaptic.report.draft import refuse_to_replace
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.reported import Reported
+from bayeshaptic.report.write import NAMES, write_report
 from bayeshaptic.types import Progress
 
 
 def report_recording(job: Job, progress: Progress | None) -> Reported:
     """Read, analyse and report; see `bayeshaptic.jobs.batch.report_source`."""
+    refuse_to_replace(job.folder, NAMES, [job.source])
     settings = job.settings
     began = time.perf_counter()
     device = None if settings.device is None else load_device(settings.device)

@@ -7,18 +7,20 @@ from pathlib import Path
 
 from bayeshaptic.devices.table import read_toml
 from bayeshaptic.errors import InputError
+from bayeshaptic.files import is_of_a_report
 from bayeshaptic.recordings.readers import known_suffixes
 
-# Text files and tables that programs leave beside recordings.
-_NO_RECORDINGS = ("readme.txt", "index.csv", "failed.csv", "limits.csv", "requirements.txt")
+# Text files that programs leave beside recordings.
+_NO_RECORDINGS = ("readme.txt", "requirements.txt")
 _REPORTS = ("summary.json", "population.json", "manifest.json")
 
 
 def find_sources(paths: Iterable[Path]) -> tuple[Path, ...]:
     """Studies and recordings, folders replaced by those in them.
 
-    A recording that a study of the same folder names is left to the study. Hidden folders and
-    those with reports are passed over.
+    A recording that a study of the same folder names is left to the study. Hidden folders, those
+    with reports, and what reports and batches write are passed over; of a folder that is named, its
+    content counts whatever else is in it.
 
     Raises
     ------
@@ -30,28 +32,29 @@ def find_sources(paths: Iterable[Path]) -> tuple[Path, ...]:
         if not path.is_dir():
             found[path] = None
             continue
-        inside = tuple(_in_folder(path))
+        inside = tuple(_in_folder(path, named=True))
         if not inside:
             raise InputError(f"{path}: no studies and no recordings in this folder")
         found |= dict.fromkeys(inside)
     return tuple(found)
 
 
-def _in_folder(folder: Path) -> Iterator[Path]:
-    if any((folder / name).exists() for name in _REPORTS):
+def _in_folder(folder: Path, named: bool = False) -> Iterator[Path]:
+    if not named and any((folder / name).exists() for name in _REPORTS):
         return
     content = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     tables = {path: _files_of(path) for path in content if path.suffix.lower() == ".toml"}
     studies = {path: files for path, files in tables.items() if files}
     yield from studies
-    named = {file for files in studies.values() for file in files}
+    of_studies = {file for files in studies.values() for file in files}
     for path in content:
         if path.is_dir():
-            yield from (file for file in _in_folder(path) if file.resolve() not in named)
+            yield from (file for file in _in_folder(path) if file.resolve() not in of_studies)
         elif (
             path.name.lower().endswith(known_suffixes())
             and path.name.lower() not in _NO_RECORDINGS
-            and path.resolve() not in named
+            and is_of_a_report(path) is not True
+            and path.resolve() not in of_studies
         ):
             yield path
 

@@ -20,9 +20,10 @@ from bayeshaptic.provenance import provenance
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.study import Study
 from bayeshaptic.recordings.study_file import read_study
+from bayeshaptic.report.draft import refuse_to_replace
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
-from bayeshaptic.report.study.write import write_study_report
+from bayeshaptic.report.study.write import NAMES, write_study_report
 from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
 from bayeshaptic.types import Executor, Progress
 
@@ -174,7 +175,9 @@ def _read(job: Job) -> Study:
                 f"--{option.replace('_', '-')} is for a single recording; for a study write it in "
                 f"{job.source}, in the table [device]"
             )
-    return read_study(job.source, job.settings.allow_outside)
+    study = read_study(job.source, job.settings.allow_outside)
+    refuse_to_replace(job.folder, NAMES, study.files)
+    return study
 
 
 def _analysed(

@@ -100,6 +100,11 @@ class Study(Shown):
         """Users in the order in which they first appear."""
         return tuple(dict.fromkeys(entry.user for entry in self.entries if entry.user is not None))
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that its entries name."""
+        return tuple(one.path for entry in self.entries for one in (entry, *entry.more))
+
     def read(self, entry: StudyEntry) -> Recording | Etfe:
         """The measurement of one `entry`, with what the study declares about it.
 

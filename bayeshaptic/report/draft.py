@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.files import flush, owner, remove_dead_drafts
+from bayeshaptic.files import flush, is_of_a_report, owner, remove_dead_drafts
 
 
 @contextmanager
@@ -27,8 +27,41 @@ def draft_in(folder: Path) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
+def refuse_to_replace(folder: Path, names: Iterable[str], sources: Iterable[str | Path]) -> None:
+    """Refuse to write over what is read, and over what no report has written.
+
+    Parameters
+    ----------
+    folder : Path
+    names : iterable of str
+        Of the files that are to be written there, or removed.
+    sources : iterable of path
+        Files that the report is made from.
+
+    Raises
+    ------
+    InputError
+        With the file, and what to do.
+    """
+    read = {Path(source).resolve() for source in sources}
+    for name in sorted(names):
+        path = folder / name
+        if path.resolve() in read:
+            raise InputError(
+                f"{path}: the report has a file of this name, which would replace the recording; "
+                "rename the recording, or name another folder for the report"
+            )
+        if is_of_a_report(path) is False:
+            raise InputError(
+                f"{path}: the report has a file of this name, and this one is of no report; move "
+                "it, or name another folder for the report"
+            )
+
+
 @contextmanager
-def report_in(out_dir: str | Path, last: str, stale: Iterable[str]) -> Iterator[Path]:
+def report_in(
+    out_dir: str | Path, last: str, stale: Iterable[str], sources: Iterable[str | Path] = ()
+) -> Iterator[Path]:
     """A folder to write a report into; moved to `out_dir` when the block ends without an error.
 
     An interrupted run leaves what was there before. Other files in `out_dir` stay.
@@ -41,17 +74,23 @@ def report_in(out_dir: str | Path, last: str, stale: Iterable[str]) -> Iterator[
         The file that others wait for.
     stale : iterable of str
         Files of an older report that would contradict this one, unless this one has them too.
+    sources : iterable of path
+        Files that the report is made from, which it must not replace.
 
     Raises
     ------
     InputError
-        If `out_dir` is a file.
+        If `out_dir` is a file, has no name, or holds files that a report must not replace.
     """
+    if not str(out_dir).strip():
+        raise InputError("the report's folder has an empty name; give one")
+    stale = tuple(stale)
     out = Path(out_dir).resolve()
     if out.exists() and not out.is_dir():
         raise InputError(f"{out_dir}: is a file; name a folder for the report.")
     with draft_in(out if out.exists() else out.parent) as draft:
         yield draft
+        refuse_to_replace(out, {*stale, *(path.name for path in draft.iterdir())}, sources)
         for name in stale:
             if not (draft / name).exists():
                 (out / name).unlink(missing_ok=True)

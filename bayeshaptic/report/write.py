@@ -36,6 +36,8 @@ _MAY_BE_MISSING = (
     "posterior.nc",
     *(f"{name}.png" for name in (*_PICTURES, *WALLS, *ADVICE, "hidden")),
 )
+NAMES = (_LAST, "report.html", "limits.json", "limits.csv", *_MAY_BE_MISSING)
+"""Of all files that a report may have."""
 
 
 @at_the_door
@@ -64,9 +66,13 @@ def write_report(
     Raises
     ------
     InputError
-        If `out_dir` is a file.
+        If `out_dir` is a file, or holds the recording, or what is of no report, under the name of
+        one of these files.
     """
-    with report_in(out_dir, _LAST, _MAY_BE_MISSING) as folder:
+    recording = result.analysis.recording
+    of = (None if recording is None else recording.source, (origin or {}).get("file"))
+    sources = [path for path in of if path is not None]
+    with report_in(out_dir, _LAST, _MAY_BE_MISSING, sources) as folder:
         _write_all(result, folder, origin)
     return Path(out_dir).resolve() / "report.html"
 

@@ -32,6 +32,8 @@ _MAY_BE_MISSING = (
     "index.html",
     *(f"{name}.png" for name in (*(p.name for p in STUDY_PICTURES), *WALLS, *ADVICE)),
 )
+NAMES = (_LAST, "report.html", *_MAY_BE_MISSING)
+"""Of all files that the page of a study may have."""
 
 
 @at_the_door
@@ -64,11 +66,12 @@ def write_study_report(
     Raises
     ------
     InputError
-        If `out_dir` is a file.
+        If `out_dir` is a file, or holds a recording, or what is of no report, under the name of one
+        of these files.
     """
     out = Path(out_dir).resolve()
     links = {name: _link(Path(page), out) for name, page in (pages or {}).items()}
-    with report_in(out_dir, _LAST, _MAY_BE_MISSING) as folder:
+    with report_in(out_dir, _LAST, _MAY_BE_MISSING, study.study.files) as folder:
         _write_all(study, folder, links, walls)
     return out / "report.html"
 
