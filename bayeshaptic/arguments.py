@@ -14,6 +14,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
+from fractions import Fraction
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -42,6 +43,10 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "risk": (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01"),
     "risks": (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01"),
     "p": (0, 1, "between 0 and 1, as in 0.05"),
+    "theta": (-1e300, 1e300, "that are finite"),
+    "start": (-1e300, 1e300, "that are finite"),
+    "stiffness": (-math.inf, math.inf, "that are not NaN"),
+    "damping": (-math.inf, math.inf, "that are not NaN"),
 }
 """Lowest and highest value of numbers by their name, and how to say it."""
 
@@ -80,9 +85,11 @@ def at_the_door(function: F) -> F:
         try:
             for name, value in bound.arguments.items():
                 parameter = signature.parameters[name]
+                if isinstance(value, Fraction):
+                    value = bound.arguments[name] = float(value)
                 if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                     _check(name, value, str(parameter.annotation), names)
-            return function(*args, **kwargs)
+            return function(*bound.args, **bound.kwargs)
         except InputError as error:  # a traceback shows its notes
             more = entry_of(error)
             if more is not None and not getattr(error, "__notes__", ()):
@@ -150,7 +157,7 @@ def _check(name: str, value: Any, annotation: str, names: Names) -> None:
         and name not in _MAY_BE_INFINITE
     )
     if any(_is(value, part, names) for part in parts) and not endless:
-        if name in BOUNDS and value is not None:
+        if name in BOUNDS and _numbers(value):
             _check_bounds(name, value)
         return
     hints = [hint for part in parts if (hint := _hint(part))]
@@ -167,20 +174,14 @@ def _check(name: str, value: Any, annotation: str, names: Names) -> None:
 
 
 def _check_bounds(name: str, value: Any) -> None:
+    import numpy as np
+
     low, high, words = BOUNDS[name]
-    many = isinstance(value, Iterable)
-    if not all(low <= one <= high for one in _flat(value)):
+    many, numbers = isinstance(value, Iterable), np.asarray(value, float)
+    if not np.all((low <= numbers) & (numbers <= high)):
         raise InputError(
             f"{name} is {shown(value)}; give {'numbers' if many else 'a number'} {words}"
         )
-
-
-def _flat(value: Any) -> Iterable[Any]:
-    if not isinstance(value, Iterable):
-        return (value,)
-    import numpy as np
-
-    return np.asarray(value, float).ravel()
 
 
 def _is(value: Any, part: str, names: Names) -> bool:
@@ -214,7 +215,7 @@ def _is(value: Any, part: str, names: Names) -> bool:
     first, *others = kind.split(".")
     found = functools.reduce(lambda part, name: getattr(part, name, None), others, names.get(first))
     if found is None or isinstance(found, type):
-        return found is None or isinstance(value, found)
+        return found is None or isinstance(value, found) and not isinstance(value, type)
     return _any(value, _ALIAS.sub("", str(found)), names)  # a name for a union or a tuple
 
 

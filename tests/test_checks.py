@@ -15,6 +15,7 @@ import pytest
 from scipy.signal import lfilter
 from tiny_bench import PERIOD, SCALE, band_noise, record
 
+import bayeshaptic as bh
 from bayeshaptic.devices import Device, load_device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
@@ -72,6 +73,8 @@ REFUSED = {
     "the position is inf in row 1": changed(position=with_value(held().position, 0, np.inf)),
     "the force is constant": changed(force=np.full(8000, 2.0)),
     "the position never changes": changed(position=np.zeros(8000)),
+    "force is in N and the position in rad; give both": changed(position_unit="rad"),
+    "force is in Nm and the position in m; give both": changed(force_unit="Nm"),
     "8000 samples of force and 7999 of position": changed(position=held().position[1:]),
     "look swapped.*exchange them with --columns": changed(
         force=held().position, position=held().force
@@ -92,6 +95,14 @@ def test_the_other_kind_of_device() -> None:
         check_recording(held(), load_device("phantom"))
 
 
+def test_a_period_that_no_loop_has_is_said_before_anything_that_follows_from_it() -> None:
+    for period_s in (1e3, 1e-6):
+        with pytest.raises(InputError, match="sampling period is .* s, which no haptic loop has"):
+            bh.analyse(changed(period_s=period_s), "free")
+    with pytest.raises(InputError, match="which no haptic loop has"):
+        bh.estimate_etfe(changed(period_s=1e3))
+
+
 def test_the_fewest_samples_will_do() -> None:
     assert check_recording(held().part(0, FEWEST_SAMPLES)) == ()
 
@@ -109,7 +120,6 @@ WARNED = {
         changed(period_s=1.0),
         "units",
     ),
-    "stiffness is then in N/rad": (changed(position_unit="rad"), "units"),
     "time steps vary by 3 % of the period": (changed(time_jitter=0.03), "time stamps"),
     r"answers as 0.00017 kg would.*positions 1000 times as small \(are they in mm": (
         changed(position=1e3 * held().position),

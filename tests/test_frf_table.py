@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bayeshaptic.devices import load_device
 from bayeshaptic.diagnosis.base.begun import begin
+from bayeshaptic.diagnosis.base.opened import opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import free, rigid
 from bayeshaptic.recordings import read_frf, read_measurement
+from bayeshaptic.recordings.checks.check import check_table
+from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.response.etfe import Etfe
 
 FREQUENCY = np.linspace(2.0, 300.0, 40)
@@ -167,6 +171,36 @@ def test_a_table_needs_a_period(tmp_path: Path) -> None:
         read_frf(path, -1.0)
     with pytest.raises(InputError, match="position over force"):
         read_frf(path, 1e-3, "gain_db=gain_db[m]")
+
+
+@pytest.mark.parametrize(
+    ("scale_db", "told"), [(0.0, None), (60.0, "0.001 kg"), (-60.0, "1e+03 kg")]
+)
+def test_a_table_of_a_device_that_cannot_be_is_a_slip_of_units(
+    tmp_path: Path, scale_db: float, told: str | None
+) -> None:
+    lighter = 20 * np.log10(5.0) + scale_db  # of 1 kg, and in mm or km
+    columns = base(sd=1e-2 * np.abs(RESPONSE) * 10 ** (lighter / 20)) | {
+        "gain_db": GAIN_DB + lighter
+    }
+    table = read_frf(write(tmp_path / "a.csv", **columns), 1e-3, "gain_db=gain_db[m/N]")
+    found = check_table(table)
+    assert bool(found) == bool(told)
+    for notice in found:
+        assert f"answers as {told} would: a slip of units?" in notice.text and in_doubt(
+            "position", found
+        )
+    with pytest.raises(InputError, match="position in m.*, but the device phantom is rotational"):
+        check_table(table, load_device("phantom"))
+    compared = check_table(table, load_device("lhifam"))
+    assert bool(compared) == bool(told)
+
+
+def test_the_check_of_a_table_reaches_the_report(tmp_path: Path) -> None:
+    columns = base(sd=1e-2 * np.abs(RESPONSE) * 1e4) | {"gain_db": GAIN_DB + 80}
+    table = read_frf(write(tmp_path / "a.csv", **columns), 1e-3, "gain_db=gain_db[m/N]")
+    found = opened(table, "rigid", Options(delay_s=0.0))
+    assert in_doubt("position", found.notices)
 
 
 @pytest.mark.parametrize(

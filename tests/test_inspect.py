@@ -114,6 +114,39 @@ def test_two_levels_are_no_counts_and_no_time_asks_for_the_period(tmp_path: Path
         assert shown[-1] == '--columns "force=u,position=y" --period-s SECONDS'
 
 
+def test_a_time_in_ms_under_a_name_in_seconds_is_doubted(tmp_path: Path) -> None:
+    for period, doubted in ((1.0, True), (1e-3, False)):
+        columns = np.column_stack([np.arange(len(FORCE)) * period, FORCE, POSITION])
+        np.savetxt(
+            tmp_path / "a.csv",
+            columns,
+            header="time_s,force_n,position_m",
+            comments="",
+            delimiter=",",
+        )
+        shown = "\n".join(lines(overview(tmp_path / "a.csv")))
+        words = "time: time_s: one sample every 1 s by its name, which no loop has: time=time_s[ms]"
+        assert (words in shown) == doubted
+
+
+def test_a_table_of_a_response_needs_no_columns(tmp_path: Path) -> None:
+    frequency = np.linspace(1.0, 300.0, 60)
+    columns = np.column_stack([frequency, -frequency, -frequency, np.ones(60)])
+    np.savetxt(
+        tmp_path / "a.csv",
+        columns,
+        header="frequency_hz,gain_db,phase_deg,sd",
+        comments="",
+        delimiter=",",
+    )
+    study = tmp_path / "study.toml"
+    shown = lines(overview(tmp_path / "a.csv"))
+    assert shown[-1].startswith("a table of a frequency response")
+    assert not any("--columns" in line or line.endswith("?") for line in shown)
+    assert cli.main(["inspect", str(tmp_path / "a.csv"), "--write", str(study)]) == 0
+    assert "columns" not in study.read_text() and read_study(study).device.period_s == 1e-3
+
+
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "a.csv", "t,u,y,v\x1b[31m")
     study, picture = tmp_path / "study.toml", tmp_path / "a.png"

@@ -75,6 +75,8 @@ def test_what_differs_in_period_or_unit_cannot_be_one(series: list[Recording]) -
         bh.join_recordings([series[0], slow])
     with pytest.raises(bh.InputError, match="same units"):
         bh.join_recordings([series[0], noise(1.0, 0)])
+    with pytest.raises(bh.InputError, match="step 1 has the same samples as step 1, and would"):
+        bh.join_recordings([series[0], series[1], series[1]])
     with pytest.raises(bh.InputError, match="too few even for a piece"):
         bh.join_recordings([series[0], series[1].part(0, 100)])
 

@@ -10,6 +10,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Callable
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -313,6 +314,66 @@ def test_dialects_of_csv(tmp_path: Path, name: str, packed: bool) -> None:
     assert recording.position.tolist() == [2.0, 3.0, 4.0]
 
 
+THOUSANDS = {
+    "semicolon": "t;u;q\n0.000;0.181;-976,414\n0.001;0.2;-5.2\n0.002;1.5;1,034.2\n",
+    "quoted": 't,u,q\n0.000,0.181,"-976,414"\n0.001,0.2,12\n0.002,1.5,"1,034"\n',
+    "no decimals": "t;u;q\n0;181;-976,414\n1;5;12\n2;8;3\n",
+    "millions": "t;u;q\n0;181;1,976,414\n1;5;2,000,000\n2;8;3,000,000\n",
+}
+
+
+@pytest.mark.parametrize("name", THOUSANDS)
+def test_commas_between_thousands_are_no_decimal_ones(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(THOUSANDS[name], encoding="utf-8")
+    with pytest.raises(InputError, match="'q': thousands separators .* in row 1; write the num"):
+        read_recording(path, "time=t,force=u,position=q[um]")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t;u;q\n0,000;0,181;-976,414\n0,001;0,5;12,125\n0,002;5;3\n",
+        't,u,q\n"0,000","0,181","-976,414"\n"0,001","0,5","12,125"\n"0,002",5,3\n',
+        "t;u;q\n1.2.2026 0:00:00,000;0,181;-976,414\n1.2.2026 0:00:00,001;0,5;12,125\n"
+        "1.2.2026 0:00:00,002;5;3\n",
+        "t u q\n0,000 0,181 -976,414\n0,001 0,5 12,125\n0,002 5 3\n",
+    ],
+)
+def test_three_decimals_behind_commas_are_decimals(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    recording = read_recording(path, "time=t,force=u,position=q[m]")
+    assert recording.force.tolist() == [0.181, 0.5, 5.0]
+    assert recording.position.tolist() == [-976.414, 12.125, 3.0]
+
+
+def test_bars_and_compound_data_sets(tmp_path: Path) -> None:
+    import h5py
+
+    table = np.column_stack(list(SIGNALS.values()))
+    np.savetxt(tmp_path / "a.csv", table, delimiter="|", header="t|u|q", comments="")
+    compound = np.zeros(N, dtype=[(name, float) for name in SIGNALS])
+    for name, values in SIGNALS.items():
+        compound[name] = values
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["run"] = compound
+    for name, within in (("a.csv", ""), ("a.h5", "run/")):
+        columns = f"time={within}t,force={within}u,position={within}q"
+        np.testing.assert_allclose(read_recording(tmp_path / name, columns).position, POSITION)
+
+
+def test_arrays_of_no_real_numbers_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, t=TIME, u=FORCE + 0j, q=POSITION, o=np.array(list(FORCE), dtype=object))
+    for name in "uo":
+        with pytest.raises(InputError, match=f"'{name}' is there, but holds no real numbers"):
+            read_recording(path, f"time=t,force={name},position=q")
+    np.savez(path, o=np.array(list(FORCE), dtype=object))
+    with pytest.raises(InputError, match="no vectors of numbers"):
+        read_recording(path)
+
+
 def test_columns_without_a_header(tmp_path: Path) -> None:
     (tmp_path / "y.csv").write_text("t,Y[0],Y[1]\n0,1.5,2\n1,-2.5,3\n2,1e1,4\n", encoding="utf-8")
     recording = read_recording(tmp_path / "y.csv", "time=t,force=Y[0],position=Y[1][mm]")
@@ -435,6 +496,23 @@ def test_arrays_in_memory() -> None:
         ({"period_s": 0.0}, "period_s is 0.0; give a number above 0, in seconds"),
         ({}, "no time and no period"),
         ({"period_s": 1e-3, "force_unit": "lbf"}, "force_unit is 'lbf'; use N, Nm, A"),
+        ({"period_s": 1e-3, "kind": "rotary"}, "kind is 'rotary'; use translational or rotational"),
+        (
+            {"period_s": 1e-3, "kind": "rotational", "position_unit": "m"},
+            r"translational by its units \(position in m\), but rotational as it was declared",
+        ),
+        (
+            {"period_s": 1e-3, "kind": "translational", "force_unit": "Nm"},
+            r"rotational by its units \(position in rad\), but translational as",
+        ),
+        (
+            {"period_s": 1e-3, "force_unit": "Nm", "position_unit": "m"},
+            "the force is in Nm and the position in m; give both in N and m",
+        ),
+        (
+            {"period_s": 1e-3, "force": np.ma.array(FORCE, mask=np.arange(N) == 6)},
+            r"force is nan in row 7 \(1 such rows\)",
+        ),
         (
             {"period_s": 1e-3, "encoder_resolution": -1.0},
             "encoder_resolution is -1.0; give a number above 0",
@@ -442,6 +520,12 @@ def test_arrays_in_memory() -> None:
     ):
         with pytest.raises(InputError, match=message):
             recording_from_arrays(**{"force": FORCE, "position": POSITION, **arguments})
+
+
+def test_masked_arrays_without_a_mask_and_fractions_are_numbers() -> None:
+    recording = recording_from_arrays(np.ma.array(FORCE), np.ma.arange(N), Fraction(1, 1000))
+    assert recording.period_s == 1e-3 and type(recording.period_s) is float
+    np.testing.assert_array_equal(recording.force, FORCE)
 
 
 def test_a_recording_or_a_frequency_response(tmp_path: Path) -> None:

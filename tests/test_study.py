@@ -9,8 +9,10 @@ import pytest
 
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
+from bayeshaptic.models.prior_table import _FORMS
 from bayeshaptic.recordings import Recording, read_study
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.study_file import PRIOR_KEYS
 
 SIGNALS = np.random.default_rng(0).normal(size=(30, 2))
 
@@ -161,6 +163,13 @@ WRONG = {
     f"{DEVICE}[prior]\nm1={{scale='x'}}\n{RECORDING}": "m1: scale must be a number, not 'x'",
     f"{DEVICE}[prior]\nm1={{low=1,high=2,log=1}}\n{RECORDING}": "log must be true or false, not 1",
     "[device\n": "not valid TOML",
+    f"{DEVICE}{RECORDING}rows=[0, 5]\n": "recording 1: rows are counted from 1 .*, and 0 is none",
+    f"{DEVICE}{RECORDING}rows=[1.5, 9]\n": "rows are counted from 1 .*, and 1.5 is none",
+    f"{DEVICE}{RECORDING}rows=[1, 9]\nseconds=[0, 1]\n": "both rows and seconds are given",
+    f"{DEVICE}{RECORDING}{RECORDING}": r"recording 2: a\.csv is recording 1 already, and would",
+    f"{DEVICE}{RECORDING}user='A'\n{RECORDING}user='B'\n": "recording 2: a.csv is recording 1",
+    f"{DEVICE}{RECORDING}rows=[1, 9]\n{RECORDING.replace('a.csv', './a.csv')}": "is recording 1",
+    f"{DEVICE}{RECORDING}rows=[1, 9]\n{RECORDING}rows=[8, 20]\n": "is recording 1 already",
 }
 
 
@@ -176,6 +185,21 @@ def test_wrong_studies_say_where(folder: Path, content: str) -> None:
         read_study(path)
     assert str(folder) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_parts_of_one_file_are_recordings_of_their_own(folder: Path) -> None:
+    parts = ("seconds=[0, 1]", "seconds=[1, 2]", "columns='force=force_n,position=position_m*2'")
+    text = "".join(f"{RECORDING}{part}\n" for part in parts)
+    study = read_study(write(folder, f"pool = false\n{DEVICE}{text}"))
+    assert len(study.entries) == 3
+
+
+def test_every_form_of_a_prior_may_be_declared(folder: Path) -> None:
+    for keys in _FORMS:
+        table = ", ".join(f"{key} = 0.5" for key in sorted(keys))
+        content = f"{DEVICE}[prior]\nb1 = {{ {table} }}\n{RECORDING}"
+        assert set(read_study(write(folder, content)).prior["b1"]) == keys
+    assert set(PRIOR_KEYS) == {"log"}.union(*_FORMS)
 
 
 def test_no_study(tmp_path: Path) -> None:

@@ -53,7 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
         draw(found, arguments.png)
         print(f"picture: {arguments.png}")
     if arguments.write is not None:
-        mapping = asked(found) if sys.stdin.isatty() and sys.stdout.isatty() else found.mapping
+        ask = sys.stdin.isatty() and sys.stdout.isatty() and not found.of_a_response
+        mapping = asked(found) if ask else found.mapping
         text = study_text(found, arguments.write, mapping)
         write_whole(arguments.write, text)
         print(f"study: {arguments.write}")
@@ -92,7 +93,9 @@ def lines(found: Overview) -> list[str]:
         if text := "; ".join(filter(None, said)):
             table.append(f"{role}: {printable(name)}: {text}")
     table += filter(None, (_text_in(one, found) for one in shown))
-    if found.mapping is None:
+    if found.of_a_response:
+        table.append("a table of a frequency response, read as it is: give --period-s SECONDS")
+    elif found.mapping is None:
         needed = {"force": ("force",), "position": POSITIONS}
         missing = [what for what, any_of in needed.items() if not set(any_of) & set(found.roles)]
         was = "was" if len(missing) == 1 else "were"
@@ -169,7 +172,11 @@ def study_text(found: Overview, path: Path, mapping: str | None) -> str:
     kind, other = "translational", "rotational"
     if units & {"Nm", "rad"}:
         kind, other = other, kind
-    columns = mapping or "time=...,force=...,position=..."
+    columns = f"""\
+# A guess: check the names, and write factors and units, as in position=enc*3.14e-6[m].
+columns = {json.dumps(mapping or "time=...,force=...,position=...")}"""
+    if found.of_a_response:
+        columns = "period_s = 1e-3                 # of the loop: a table does not say it"
     file = os.path.relpath(found.path.resolve(), path.resolve().parent).replace(os.sep, "/")
     return f"""\
 # A study: one device and all its recordings. See docs/file-formats.md.
@@ -178,8 +185,7 @@ name = "my device"
 kind = {f'"{kind}"':24} # or "{other}"
 # delay_s = 200e-6              # loop delay beyond the hold
 # encoder_resolution = 3.14e-6  # one count, in m or rad
-# A guess: check the names, and write factors and units, as in position=enc*3.14e-6[m].
-columns = {json.dumps(columns)}
+{columns}
 
 [[recording]]
 file = {json.dumps(file)}

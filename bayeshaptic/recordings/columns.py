@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from bayeshaptic.devices.table import nearest
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers import Arrays
+from bayeshaptic.recordings.readers.layout import THOUSANDS
+from bayeshaptic.recordings.readers.reader import NO_NUMBERS, Arrays
 from bayeshaptic.recordings.units import base_unit, is_unit, unit_in_name
 
 # What may stand for the force and for the position (`signals.other_outputs`), where it is named.
@@ -25,7 +26,6 @@ FRF_ROLES = ("frequency", *FRF_KINDS, "phase_deg", "sd", "coherence", "averages"
 # What a controller followed; its unit does not matter.
 REFERENCE = "reference"
 ROLES = (*RECORDING_ROLES, REFERENCE, *FRF_ROLES)
-
 # Headers that need no mapping, with the unit they say.
 DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     "time": {"time_s": "s"},
@@ -36,14 +36,12 @@ DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     **{role: {role: None} for role in FRF_ROLES[1:]},
     **{role: {} for role in (*FORCES[1:], *POSITIONS[1:])},
 }
-
 # The same in words, for headers that say their unit: "Time (s)", "Force [N]", "Position (mm)".
 _PLAIN_HEADERS = {
     "time": ("time", "t"),
     "force": ("force", "torque", "current"),
     "position": ("position", "angle"),
 }
-
 _EXAMPLE = "time=t,force=u,position=q"
 _WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*[(\[](?P<unit>[^()\[\]]+)[)\]]")
 _EXPRESSION = re.compile(
@@ -286,13 +284,17 @@ def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         row, text = next((i, v) for i, v in enumerate(values, start=1) if not _is_number(v))
+    if text == NO_NUMBERS:
+        raise InputError(f"{where} is there, but holds {text}; save it as such")
     what = f"'{text}' is not a number" if str(text).strip() else "there is no number"
-    raise InputError(f"{where}: {what} in row {row}; mend or remove the row")
+    cure = "mend or remove the row"
+    if THOUSANDS.fullmatch(str(text)):
+        what, cure = f"thousands separators ('{text}')", "write the numbers without them"
+    raise InputError(f"{where}: {what} in row {row}; {cure}")
 
 
 def _is_number(value: object) -> bool:
     try:
-        float(value)  # type: ignore[arg-type]
+        return float(value) is not None  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return False
-    return True

@@ -20,6 +20,13 @@ class Cut:
     rows: Span | None
     seconds: Span | None
 
+    def __post_init__(self) -> None:
+        if self.rows is not None and self.seconds is not None:
+            raise InputError("both rows and seconds are given; leave one of them out")
+        for row in self.rows or ():
+            if row is not None and (row < 1 or row != int(row)):
+                raise InputError(f"rows are counted from 1 in whole numbers, and {row:g} is none")
+
     def apply(
         self, signals: dict[str, NDArray[np.float64]], period_s: float | None, path: Path
     ) -> dict[str, NDArray[np.float64]]:

@@ -43,7 +43,8 @@ def join_recordings(
     Raises
     ------
     InputError
-        Where there are none, where period or units differ, or where one is far too short.
+        Where there are none, where one is there twice, where period or units differ, or where one
+        is far too short.
     """
     if not recordings:
         raise InputError("there are no recordings to join")
@@ -69,6 +70,7 @@ def join_recordings(
     if len(read) == 1:
         return first
     pieces = [piece for recording in read for piece in recording.pieces]
+    _refuse_twice(pieces)
     ends = np.cumsum([piece.samples for piece in pieces])
     notices = dict.fromkeys(notice for recording in read for notice in recording.notices)
     text = (
@@ -86,6 +88,19 @@ def join_recordings(
         reference=_references(pieces),
         sensed=_sensed(pieces),
     )
+
+
+def _refuse_twice(pieces: Sequence[Recording]) -> None:
+    """Refuse the same samples once more: they would count as twice the data."""
+    known: dict[tuple[bytes, bytes], str] = {}
+    for piece in pieces:
+        content = (piece.force.tobytes(), piece.position.tobytes())
+        if content in known:
+            raise InputError(
+                f"{piece.name} has the same samples as {known[content]}, and would count as twice "
+                "the data; leave it out"
+            )
+        known[content] = piece.name
 
 
 def _references(pieces: Sequence[Recording]) -> Floats | None:

@@ -165,7 +165,7 @@ def recording_from_arrays(
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
     timing = sampling_period(stamps, period_s, where)
-    unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind)
+    unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind, where)
     angle = unit_of_position == "rad"
     position, notices = unwrapped(position, angle, encoder_resolution, where)
     if timing.rows is not None:
@@ -223,7 +223,8 @@ def recorded(
     if followed is not None:
         signals[REFERENCE] = followed[0]
     signals = cut.apply(signals, period_s, path)
-    if kind is None and force in mapping and position in mapping:
+    said = units[position] is not None or units[force] in ("N", "Nm")
+    if kind is None and not said and force in mapping and position in mapping:
         kind = kind_by_names(mapping[force].names[-1], mapping[position].names[-1])
     recording = recording_from_arrays(
         signals["force"],
@@ -280,6 +281,8 @@ def recording_name(path: Path) -> str:
 
 def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
     """One signal: a vector of finite numbers of its own, so that nobody changes it from outside."""
+    if np.ma.isMaskedArray(values):
+        values = np.ma.filled(values.astype(float), np.nan)
     signal = np.squeeze(as_numbers(np.array(values), f"{where}: {what}"))
     if signal.ndim != 1 or signal.size == 0:
         shape = np.shape(values)

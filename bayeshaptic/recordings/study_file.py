@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,7 +13,7 @@ from bayeshaptic.devices import Device, device_from_table, device_names, load_de
 from bayeshaptic.devices.table import Table, nearest, read_toml
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import parse_columns
-from bayeshaptic.recordings.cut import Span
+from bayeshaptic.recordings.cut import Cut, Span
 from bayeshaptic.recordings.feedback import read_feedback
 from bayeshaptic.recordings.known_limits import read_references
 from bayeshaptic.recordings.read import Columns
@@ -20,7 +21,11 @@ from bayeshaptic.recordings.study import Study, StudyEntry
 
 STUDY_KEYS = ("device", "pool", "prior", "effects", "feedback", "recording", "reference")
 ENTRY_KEYS = ("file", "user", "configuration", "trial", "level", "columns", "rows", "seconds")
-PRIOR_KEYS = ("median", "log_sd", "scale", "floor", "mean", "sd", "low", "high", "log")
+# Of the priors in `bayeshaptic.models.prior_table`.
+PRIOR_KEYS = (
+    *("median", "log_sd", "scale", "floor", "rise", "seen", "weight"),
+    *("mean", "sd", "low", "high", "log"),
+)
 
 
 @at_the_door
@@ -56,8 +61,8 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
     Raises
     ------
     InputError
-        For a missing file or one outside the folder, unknown keys (with the nearest known one),
-        wrong types and impossible values.
+        For a missing file or one outside the folder, samples that are listed twice, unknown keys
+        (with the nearest known one), wrong types and impossible values.
     """
     path = Path(path)
     table = Table(read_toml(path), str(path), known=STUDY_KEYS)
@@ -76,6 +81,7 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
         _entry(entry, f"{path}, recording {number}", path.parent, home)
         for number, entry in enumerate(entries, start=1)
     ]
+    _refuse_twice(read, path)
     return Study(
         name=path.stem,
         path=path,
@@ -95,6 +101,32 @@ def _pool(table: Table) -> bool | None:
     if value is not None and not isinstance(value, bool):
         raise table.wrong("pool", "true or false")
     return value
+
+
+def _refuse_twice(entries: Sequence[StudyEntry], path: Path) -> None:
+    """Refuse samples that are listed twice: they would count as twice the data."""
+    known: dict[Path, list[tuple[int, StudyEntry]]] = {}
+    for number, entry in enumerate(entries, start=1):
+        others = known.setdefault(entry.path.resolve(), [])
+        for other, earlier in others:
+            if _overlap(entry, earlier):
+                raise InputError(
+                    f"{path}, recording {number}: {entry.path.name} is recording {other} already, "
+                    "and would count as twice the data; leave one out, or give each rows or "
+                    "seconds of its own"
+                )
+        others.append((number, entry))
+
+
+def _overlap(one: StudyEntry, other: StudyEntry) -> bool:
+    """Whether two entries of one file have samples in common; columns of their own are others."""
+    if one.columns != other.columns:
+        return False
+    if (one.rows and other.seconds) or (one.seconds and other.rows):  # only the file could tell
+        return False
+    spans = [entry.rows or entry.seconds for entry in (one, other)]
+    lows, highs = zip(*(span or (0.0, math.inf) for span in spans), strict=True)
+    return max(low or 0.0 for low in lows) < min(high or math.inf for high in highs)
 
 
 def _pooled(entries: Sequence[StudyEntry], pool: bool | None) -> tuple[StudyEntry, ...]:
@@ -166,6 +198,11 @@ def _entry(content: object, where: str, folder: Path, home: Path | None) -> Stud
     file = table.text("file")
     if file is None:
         raise InputError(f"{where} needs a file: file = 'recording.csv'")
+    rows, seconds = _span(table, "rows"), _span(table, "seconds")
+    try:
+        Cut(rows, seconds)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
     return StudyEntry(
         path=_file(folder, file, home, where),
         user=_label(table, "user"),
@@ -173,8 +210,8 @@ def _entry(content: object, where: str, folder: Path, home: Path | None) -> Stud
         trial=_trial(table),
         level=table.number("level"),
         columns=_columns(table.content.get("columns"), where),
-        rows=_span(table, "rows"),
-        seconds=_span(table, "seconds"),
+        rows=rows,
+        seconds=seconds,
     )
 
 

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import FORCE_UNITS, POSITION_UNITS
 
+KINDS = ("translational", "rotational")
+
 # unit -> (base unit, factor)
 _TIME = {"s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "ns": ("s", 1e-9)}
 _FORCE = {
@@ -207,8 +209,28 @@ def _plain(unit: str) -> str:
     return _WRITTEN_OUT.get(plain.lower(), plain)
 
 
+def refuse_mixed_units(force_unit: str, position_unit: str, where: str) -> None:
+    """Refuse a force and a position that are not of one kind of motion.
+
+    Raises
+    ------
+    InputError
+        A stiffness would be in N/rad or N m/m, and masses in neither kg nor kg m^2.
+    """
+    if (force_unit, position_unit) in (("N", "rad"), ("Nm", "m")):
+        raise InputError(
+            f"{where}: the force is in {force_unit} and the position in {position_unit}; give both "
+            "in N and m, or both in Nm and rad: correct the units, or turn one into the other by "
+            "the lever arm R, as in force=NAME*R[Nm]",
+            topic="units",
+        )
+
+
 def choose_units(
-    force_unit: str | None, position_unit: str | None, kind: str | None = None
+    force_unit: str | None,
+    position_unit: str | None,
+    kind: str | None = None,
+    where: str = "recording",
 ) -> tuple[str, str]:
     """The units of force and position where one of them, or both, are not said.
 
@@ -218,17 +240,30 @@ def choose_units(
     Raises
     ------
     InputError
-        For units that are not among the base units.
+        For units that are not among the base units, or do not belong together, and for a kind that
+        is none, or not theirs.
     """
     for unit, known, what in (
         (force_unit, FORCE_UNITS, "force_unit"),
         (position_unit, POSITION_UNITS, "position_unit"),
     ):
         if unit is not None and unit not in known:
-            raise InputError(f"{what} is '{unit}'; use {', '.join(known)}")
+            raise InputError(f"{where}: {what} is '{unit}'; use {', '.join(known)}")
+    if kind not in (None, *KINDS):
+        raise InputError(f"{where}: kind is {kind!r}; use {' or '.join(KINDS)}")
     if position_unit is None:
         rotational = {"N": False, "Nm": True}.get(force_unit or "", kind == "rotational")
         position_unit = "rad" if rotational else "m"
     if force_unit is None:
         force_unit = "Nm" if position_unit == "rad" else "N"
+    refuse_mixed_units(force_unit, position_unit, where)
+    of = KINDS[position_unit == "rad"]
+    if kind not in (None, of):
+        other = "m" if of == "rotational" else "rad"
+        raise InputError(
+            f"{where}: {of} by its units (position in {position_unit}), but {kind} as it was "
+            "declared, or as the device is; give the position's unit, as in "
+            f"position=NAME[{other}]",
+            topic="columns",
+        )
     return force_unit, position_unit

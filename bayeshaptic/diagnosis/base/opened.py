@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.base.asked import base_model, device_of
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models import Model
-from bayeshaptic.recordings.checks.check import check_recording
+from bayeshaptic.recordings.checks.check import check_recording, check_table
 from bayeshaptic.recordings.checks.sufficiency import refuse_where_told, told_too_little, too_little
 from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.join import unbroken
@@ -23,6 +23,7 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
+from bayeshaptic.recordings.signals.timing import unusual_period
 from bayeshaptic.recordings.through_reference import through_reference, too_weak
 from bayeshaptic.threads import single_threaded
 
@@ -93,7 +94,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             else:
                 measurement, notices = through_reference(measurement, notices)
             if not any(notice.topic == "feedback" for notice in notices):
-                notices += too_little(whole)
+                notices += _first_of_the_period(whole, too_little(whole))
                 if not one_mass:
                     refuse_where_told(whole, notices)
         with clock.stage("frequency response"):
@@ -102,10 +103,20 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             notices += _not_looked_for(measurement, notices)
     else:
         etfe = measurement
+        if not etfe.direct:  # of a loop, whose controller biases it
+            notices += check_table(etfe, device)
     lever_m = options.lever_m
     if lever_m is None and device is not None:
         lever_m = device.lever_m
     return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m, name)
+
+
+def _first_of_the_period(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+    """Notices that a recording says too little, unless its period is what cannot be."""
+    unusual = unusual_period(recording.period_s)
+    if notices and unusual is not None:
+        raise InputError(f"{recording.name}: {unusual}", topic="units")
+    return notices
 
 
 def _refuse_delay(

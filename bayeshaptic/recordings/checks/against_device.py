@@ -17,6 +17,7 @@ from bayeshaptic.recordings.checks.units_in_doubt import (
     other_units,
 )
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 
@@ -97,7 +98,7 @@ def _slip(ratio: float, tolerance: float) -> float | None:
 
 
 def response_ratio(
-    recording: Recording, device: Device | None, rough: RoughResponse
+    recording: Recording | Etfe, device: Device | None, rough: RoughResponse
 ) -> float | None:
     """How many times as much the position answers as that of the device file's nearest model.
 
@@ -117,7 +118,10 @@ def response_ratio(
 
 
 def against_response(
-    notices: Iterable[Notice], recording: Recording, device: Device | None, rough: RoughResponse
+    notices: Iterable[Notice],
+    recording: Recording | Etfe,
+    device: Device | None,
+    rough: RoughResponse,
 ) -> tuple[Notice, ...]:
     """What was said of units, with what a response says of them.
 
@@ -125,7 +129,7 @@ def against_response(
     ----------
     notices : iterable of Notice
         That the response of the device may confirm to be harmless.
-    recording : Recording
+    recording : Recording, or Etfe of a table
     device : Device or None
     rough : RoughResponse
         That holds: in closed loop a fitted model's, since the measured one is biased.
@@ -144,7 +148,7 @@ def confirms(ratio: float | None) -> bool:
 
 
 def compare_response(
-    recording: Recording, device: Device | None, rough: RoughResponse, slipped: bool
+    recording: Recording | Etfe, device: Device | None, rough: RoughResponse, slipped: bool
 ) -> list[Notice]:
     """Whether the position answers at all, and as much as the device file says."""
     if rough.follows < LEAST_COHERENCE:

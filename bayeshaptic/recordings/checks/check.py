@@ -13,16 +13,19 @@ from bayeshaptic.recordings.checks.against_device import (
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
 from bayeshaptic.recordings.checks.units_in_doubt import (
     degrees,
-    mixed_units,
     whole_numbers,
 )
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.rough_response import rough_response
-from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.signals.rough_response import RoughResponse, rough_response
+from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER, unusual_period
+from bayeshaptic.recordings.units import refuse_mixed_units
 
 USUAL_SECONDS = 30
+# Of a table: the relative standard deviation from which a row tells no size, and the steps.
+MOST_UNSURE, EVEN_LINES = 0.5, 400
 
 
 def check_recording(recording: Recording, device: Device | None = None) -> tuple[Notice, ...]:
@@ -45,20 +48,17 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
     ------
     InputError
         For a recording that is too short, holds NaN or infinity, whose force or position is
-        constant, whose columns are swapped, or that is not of the device's kind.
+        constant, whose columns are swapped, whose units are of two kinds of motion, or that is not
+        of the device's kind.
     """
     where = str(recording.source or recording.name)
     _refuse_unusable(recording, where)
-    if device is not None and device.kind != recording.kind:
-        raise InputError(
-            f"{where}: a {recording.kind} recording (position in {recording.position_unit}), but "
-            f"the device {device.name} is {device.kind}; give the position's unit with "
-            f"--columns, as in position=NAME[{device.position_unit}]",
-            topic="columns",
-        )
+    refuse_mixed_units(recording.force_unit, recording.position_unit, where)
+    _refuse_other_kind(recording.position_unit, device, where)
     scales: tuple[Notice, ...] = (
-        *_period(recording, device),
-        *mixed_units(recording),
+        *_unusual(recording.period_s),
+        *_period(recording.period_s, device),
+        *_jitter(recording),
         *whole_numbers(recording),
         *degrees(recording),
         *compare_resolution(recording, device),
@@ -74,6 +74,52 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *says_nothing_of_the_actuator(recording),
         *driven,
     )
+
+
+def check_table(table: Etfe, device: Device | None = None) -> tuple[Notice, ...]:
+    """What a reader of the report should know of a table of a frequency response.
+
+    Parameters
+    ----------
+    table : Etfe
+        Without a recording.
+    device : Device or None
+        What is known of the device, to compare units with.
+
+    Returns
+    -------
+    tuple of Notice
+        Of the topic "units".
+
+    Raises
+    ------
+    InputError
+        For a table that is not of the device's kind.
+    """
+    _refuse_other_kind(table.position_unit, device, "the table")
+    return against_response(_unusual(table.period_s), table, device, _evenly(table))
+
+
+def _evenly(table: Etfe) -> RoughResponse:
+    """The size of a table's response where it is clear, at even steps as those of a recording."""
+    clear = table.relative_sd < MOST_UNSURE
+    frequency = table.frequency_hz[clear]
+    if not len(frequency):
+        return RoughResponse(*np.zeros((3, 0)))
+    even = np.linspace(frequency[0], frequency[-1], EVEN_LINES)
+    size = np.exp(np.interp(even, frequency, np.log(np.abs(table.value[clear]))))
+    return RoughResponse(even, size.astype(complex), np.ones_like(even))
+
+
+def _refuse_other_kind(position_unit: str, device: Device | None, where: str) -> None:
+    kind = "rotational" if position_unit == "rad" else "translational"
+    if device is not None and device.kind != kind:
+        raise InputError(
+            f"{where}: a {kind} recording (position in {position_unit}), but "
+            f"the device {device.name} is {device.kind}; give the position's unit with "
+            f"--columns, as in position=NAME[{device.position_unit}]",
+            topic="columns",
+        )
 
 
 def _refuse_unusable(recording: Recording, where: str) -> None:
@@ -110,24 +156,27 @@ def _refuse_unusable(recording: Recording, where: str) -> None:
         )
 
 
-def _period(recording: Recording, device: Device | None) -> list[Notice]:
-    notices = []
-    period = recording.period_s
-    if not 2e-6 < period < 0.1:
-        text = (
-            f"The sampling period is {period:g} s, which no haptic loop has: is the time in ms "
-            "or us? Write time=NAME[ms] or time=NAME[us] in --columns."
-        )
-        notices.append(Notice("warning", "units", text, ("time",)))
-    if recording.time_jitter is not None and recording.time_jitter > NOTABLE_JITTER:
-        text = (
-            f"The time steps vary by {100 * recording.time_jitter:.2g} % of the period (standard "
-            "deviation): either the stamps are late, or the samples are; then the noise rises "
-            "with the speed."
-        )
-        notices.append(Notice("warning", "time stamps", text))
+def _unusual(period: float) -> list[Notice]:
+    unusual = unusual_period(period)
+    if unusual is None:
+        return []
+    return [Notice("warning", "units", f"{unusual[0].upper()}{unusual[1:]}.", ("time",))]
+
+
+def _jitter(recording: Recording) -> list[Notice]:
+    if recording.time_jitter is None or recording.time_jitter <= NOTABLE_JITTER:
+        return []
+    text = (
+        f"The time steps vary by {100 * recording.time_jitter:.2g} % of the period (standard "
+        "deviation): either the stamps are late, or the samples are; then the noise rises "
+        "with the speed."
+    )
+    return [Notice("warning", "time stamps", text)]
+
+
+def _period(period: float, device: Device | None) -> list[Notice]:
     if device is None or not device.period_s or abs(period / device.period_s - 1) <= 0.01:
-        return notices
+        return []
     text = (
         f"The recording's period is {period:g} s, the device's {device.period_s:g} s; K_CR is that "
         "of a loop with the recording's period."
@@ -138,5 +187,4 @@ def _period(recording: Recording, device: Device | None) -> list[Notice]:
             f" If the loop ran with the device's, one sample in {every} was written down: then the "
             "forces between are missing, and nothing of this is true; write every sample down."
         )
-    notices.append(Notice("warning", "period", text))
-    return notices
+    return [Notice("warning", "period", text)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 from bayeshaptic.recordings.units import is_assumed
@@ -42,18 +43,6 @@ def not_of_the_position(notices: Iterable[Notice]) -> tuple[Notice, ...]:
         else n
         for n in notices
     )
-
-
-def mixed_units(recording: Recording) -> list[Notice]:
-    """A force and a position that are not of one kind of motion."""
-    if (recording.force_unit, recording.position_unit) not in (("N", "rad"), ("Nm", "m")):
-        return []
-    text = (
-        f"The force is in {recording.force_unit} and the position in {recording.position_unit}: "
-        f"stiffness is then in {recording.stiffness_unit}, and masses are not in kg or kg m^2. "
-        "Give the units with --columns, as in force=NAME[Nm]."
-    )
-    return [Notice("warning", "units", text, ("force",))]
 
 
 def whole_numbers(recording: Recording) -> list[Notice]:
@@ -118,7 +107,7 @@ def steps_of_a_turn(step: float | None) -> int | None:
     return round(360 / step) if whole(360.0) and not whole(2 * np.pi) else None
 
 
-def implausible_mass(recording: Recording, clear: RoughResponse) -> list[Notice]:
+def implausible_mass(recording: Recording | Etfe, clear: RoughResponse) -> list[Notice]:
     """A device of milligrams or tons: a slip of units, with the factor that makes sense of it."""
     kind = (recording.force_unit, recording.position_unit)
     if kind not in _MASSES:

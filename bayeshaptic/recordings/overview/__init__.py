@@ -20,6 +20,7 @@ from bayeshaptic.recordings.columns import (
     DEFAULT_HEADERS,
     POSITIONS,
     REFERENCE,
+    is_frequency_response,
     name_and_unit,
     parse_columns,
     pick,
@@ -50,13 +51,19 @@ _PERIODS_S = (4e-5, 0.2)
 class Overview:
     """The columns of a file, longest first, and which may be time, force, position, reference.
 
-    A velocity or an acceleration stands for a position that no name tells of.
+    A velocity or an acceleration stands for a position that no name tells of; a table of a
+    frequency response has none of them.
     """
 
     path: Path
     columns: tuple[ColumnFacts, ...]
     roles: Mapping[str, str]
     arrays: Arrays
+
+    @property
+    def of_a_response(self) -> bool:
+        """Whether it is a table of a frequency response, which needs no mapping."""
+        return is_frequency_response(self.arrays, {})
 
     @property
     def mapping(self) -> str | None:
@@ -87,7 +94,8 @@ def overview(path: Path) -> Overview:
             seen[id(values)] = name
     facts = [_facts(name, arrays[name]) for name in seen.values()]
     facts.sort(key=lambda one: -one.samples)
-    return Overview(path, tuple(facts), guess_roles(facts, arrays), arrays)
+    roles = {} if is_frequency_response(arrays, {}) else guess_roles(facts, arrays)
+    return Overview(path, tuple(facts), roles, arrays)
 
 
 def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
@@ -162,6 +170,8 @@ def doubts(column: ColumnFacts, role: str) -> str:
     if role == REFERENCE:
         return f"what a controller followed? Then add ,reference={column.name}"
     if role == "time":
+        if (said := _said_of(column)) is not None:
+            return said
         if _scale(role, column) != UNIT_TO_SAY:
             return ""
         rates = (f"{rate:.4g} Hz in {unit}" for unit, rate in _rates(column).items())
@@ -189,6 +199,19 @@ def doubts(column: ColumnFacts, role: str) -> str:
     guess = "rad] or [deg" if guess == "rad" else guess
     perhaps = f", perhaps [{guess}]" if guess else ""
     return f"unit not known{perhaps}: write it after the name, {units}"
+
+
+def _said_of(column: ColumnFacts) -> str | None:
+    """Where a time's name says its unit: what to doubt of that, empty where nothing."""
+    by_name = DEFAULT_HEADERS["time"].get(column.name) or unit_in_name("time", column.name)
+    unit = column.unit or by_name
+    if unit is None or not column.period:
+        return None
+    period_s, usual = column.period * base_unit("time", unit)[1], _rates(column)
+    if unit in usual or not usual:
+        return ""
+    perhaps = " or ".join(f"{column.name}[{one}]" for one in usual)
+    return f"one sample every {period_s:g} s by its name, which no loop has: time={perhaps}?"
 
 
 def is_guess(column: ColumnFacts, role: str) -> bool:

@@ -9,13 +9,14 @@ import gzip
 import io
 import re
 import zlib
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers.layout import NUMBER, find_layout
+from bayeshaptic.recordings.readers.layout import NUMBER, THOUSANDS, find_layout
 from bayeshaptic.recordings.readers.reader import MOST_TEXT, Arrays, Reader
 from bayeshaptic.types import Floats
 
@@ -26,17 +27,19 @@ _MISSING = ("", "-", "--", "na", "n/a", "#n/a", "null", "none")
 _CLOCK = re.compile(
     r".*?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d*)?)\s*(?:[ap]\.?m\.?|z|[-+]\d\d:?\d\d)?", re.I
 )
+_POINT = re.compile(r"[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?")
 _DECLARED = re.compile(r'"?sep=(?P<separator>[^"])"?', re.I)
 
 
 def read_delimited(path: Path) -> Arrays:
     """The columns of a text file of numbers.
 
-    Comma, semicolon, tab or blanks between the fields, or what a first line ``sep=;`` says; lines
-    that start with ``#`` or ``%`` are remarks, the last of which may be the header; a preamble is
-    passed over, and a row of units below the header goes with the names. A decimal comma is
-    understood where the separator is another one, and in quotes. Without a header the columns are
-    named "1", "2" and so on. A column with text in it stays text.
+    Comma, semicolon, tab, | or blanks between the fields, or what a first line ``sep=;`` says;
+    lines that start with ``#`` or ``%`` are remarks, the last of which may be the header; a
+    preamble is passed over, and a row of units below the header goes with the names. A decimal comma is
+    understood where the separator is another one, and in quotes, in a table whose other numbers
+    have no decimal point. Without a header the columns are named "1", "2" and so on. A column with
+    text in it, as with commas that are no decimal ones, stays text.
 
     Raises
     ------
@@ -65,8 +68,10 @@ def read_delimited(path: Path) -> Arrays:
         str(path),
     )
     lines = lines[layout.first :]
-    if separator != ",":
-        lines = [(number, line.replace(",", ".")) for number, line in lines]
+    if separator != "," and any("," in line for _, line in lines):
+        rows = (_fields(line, separator) for _, line in lines)
+        if _comma_is_decimal(rows, any("." in line for _, line in lines)):
+            lines = [(number, line.replace(",", ".")) for number, line in lines]
     names = layout.names
     return _numbers(lines, separator, names) or _mixed(path, lines, separator, names)
 
@@ -115,7 +120,7 @@ def _is_packed(path: Path) -> bool:
 def _separator(lines: list[str]) -> str | None:
     """The separator that most of the rows have; None stands for any run of blanks."""
     sample = lines[len(lines) // 2 :][:50]
-    for separator in ("\t", ";", ","):
+    for separator in ("\t", ";", "|", ","):
         if 2 * sum(separator in line for line in sample) > len(sample):
             # Numbers with decimal commas and blanks between them are no table of commas.
             blanks = separator == "," and 2 * sum(map(_is_of_blanks, sample)) > len(sample)
@@ -184,10 +189,11 @@ def typed_columns(names: list[str], rows: list[list[str]]) -> Arrays:
     What is left empty among numbers is NaN, and clock times are seconds.
     """
     columns: Arrays = {}
+    commas = _comma_is_decimal(rows, any("." in field for row in rows for field in row))
     for name, column in zip(names, zip(*rows, strict=True), strict=True):
         text = np.array(column)
         missing = np.isin(np.char.lower(text), _MISSING)
-        numbers = _numbers_of(text[~missing])
+        numbers = _numbers_of(text[~missing], commas)
         if numbers is None:
             columns[name] = text
         else:
@@ -196,11 +202,47 @@ def typed_columns(names: list[str], rows: list[list[str]]) -> Arrays:
     return columns
 
 
-def _numbers_of(text: NDArray[np.str_]) -> Floats | None:
+def _comma_is_decimal(rows: Iterable[Sequence[str]], points: bool) -> bool:
+    """Whether the commas in the numbers of a table are decimal ones, and part no thousands.
+
+    They are none beside a decimal point. In a table without one, numbers that no thousands explain
+    (0,181 or 1,5) show decimal ones; where all could be either, a column in which every number from
+    1000 on, and no other, has a comma shows thousands.
+
+    Parameters
+    ----------
+    rows : iterable of sequence of str
+        The fields of each row.
+    points : bool
+        Whether there is a point anywhere, in a date or a number.
+    """
+    shown = False
+    parted: set[int] = set()
+    small: set[int] = set()
+    large: set[int] = set()
+    for row in rows:
+        for column, field in enumerate(row):
+            if "." in field and (_POINT.fullmatch(field) or THOUSANDS.fullmatch(field)):
+                return False
+            if "," not in field:
+                if field.lstrip("+-").isdecimal():
+                    (small if len(field.lstrip("+-")) < 4 else large).add(column)
+            elif THOUSANDS.fullmatch(field):
+                if field.count(",") > 1:
+                    return False
+                parted.add(column)
+            elif NUMBER.fullmatch(field):
+                shown = True
+        if shown and not points:
+            return True
+    return shown or not (parted & small) - large
+
+
+def _numbers_of(text: NDArray[np.str_], commas: bool) -> Floats | None:
     """Numbers, or clock times; None where there is anything else, or nothing."""
     if len(text) == 0:
         return None
-    for written in (text, np.char.replace(text, ",", ".")):
+    for written in (text, np.char.replace(text, ",", ".")) if commas else (text,):
         with contextlib.suppress(ValueError):
             return written.astype(float)
     return _seconds(text)

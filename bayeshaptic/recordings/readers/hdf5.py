@@ -18,7 +18,7 @@ def read_hdf5(path: Path, separator: str = "/") -> Arrays:
 
     Links that lead nowhere are passed over; so are those that lead out of the file, and data sets
     kept elsewhere: a file says nothing about others. An attribute ``units`` stands in brackets
-    after the name.
+    after the name. The fields of a compound data set are vectors of their own.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def _expand(node: Any, path: Path) -> Any:
 
     if isinstance(node, h5py.Group):
         return _structures(_members(node))
-    if isinstance(node, dict):
+    if isinstance(node, dict | np.ndarray):
         return node
     if not isinstance(node, h5py.Dataset) or "MATLAB_empty" in node.attrs:
         return None
@@ -83,11 +83,14 @@ def _expand(node: Any, path: Path) -> Any:
     # MATLAB stores text as whole numbers.
     if node.attrs.get("MATLAB_class") == b"char":
         return _text(node)
-    outside = node.is_virtual or node.external
-    if node.dtype.kind not in "iufb" or outside or not is_signal(node.shape or ()):
+    if node.is_virtual or node.external or not is_signal(node.shape or ()):
         return None
-    refuse_size(node.shape, f"{path}: '{node.name}'")
-    return np.asarray(node[()])
+    fields = node.dtype.names or ()
+    if node.dtype.kind not in "iufb" and not fields:
+        return None
+    refuse_size((*node.shape, max(len(fields), 1)), f"{path}: '{node.name}'")
+    content = np.asarray(node[()])
+    return {field: content[field] for field in fields} if fields else content
 
 
 def _structures(members: dict[str, Any]) -> Any:

@@ -10,11 +10,18 @@ import numpy as np
 from numpy.lib import format as npy
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers.reader import Arrays, Reader, is_signal, refuse_size, vectors
+from bayeshaptic.recordings.readers.reader import (
+    NO_NUMBERS,
+    Arrays,
+    Reader,
+    is_signal,
+    refuse_size,
+    vectors,
+)
 
 
 def read_npz(path: Path) -> Arrays:
-    """The vectors of an NPZ file; arrays of Python objects are passed over, never unpickled.
+    """The vectors of an NPZ file; arrays of Python objects are named, and never unpickled.
 
     Raises
     ------
@@ -38,13 +45,15 @@ def read_npz(path: Path) -> Arrays:
         raise InputError(
             f"{path}: {name} is damaged ({type(error).__name__}: {' '.join(str(error).split())})"
         ) from None
-    return found
+    return found if any(values.dtype.kind != "U" for values in found.values()) else {}
 
 
 def _read(file: IO[Any], path: Path, name: str) -> Arrays:
     version = npy.read_magic(file)
     read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, by_columns, dtype = read_header(file)
+    if dtype.kind in "Oc":
+        return {name: np.array([NO_NUMBERS])}
     if dtype.kind not in "iufb" or not is_signal(shape):
         return {}
     refuse_size(shape, f"{path}: '{name}'")

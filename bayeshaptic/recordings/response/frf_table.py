@@ -113,7 +113,7 @@ def frf_from_arrays(
     written = mapping[of].unit if of in mapping else None
     if written is not None:
         position_unit, force_unit, factor = _units_of_gain(path, written, derivatives)
-    units = choose_units(force_unit, position_unit, kind)
+    units = choose_units(force_unit, position_unit, kind, str(path))
     notices: tuple[Notice, ...] = ()
     if force_unit is None and position_unit is None:
         text = f"No units were given: the gain is taken to be in {units[1]}/{units[0]}."

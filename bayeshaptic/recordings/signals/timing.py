@@ -26,6 +26,16 @@ _WORTH_READING = 1000  # rows, about what a response can be read from
 NOTABLE_JITTER = 0.005
 
 
+def unusual_period(period_s: float) -> str | None:
+    """What to say of a sampling period that no haptic loop has; None of another."""
+    if 2e-6 < period_s < 0.1:
+        return None
+    return (
+        f"the sampling period is {period_s:g} s, which no haptic loop has: is the time in ms or "
+        "us? Write time=NAME[ms] or time=NAME[us] in --columns, or give --period-s in seconds"
+    )
+
+
 @dataclass(frozen=True)
 class Timing:
     """What the time stamps say.
@@ -70,6 +80,7 @@ def sampling_period(
         For an impossible period; without a period for stamps that show no even sampling (with the
         row, counted from 1).
     """
+    period_s = None if period_s is None else float(period_s)
     if period_s is not None and not (np.isfinite(period_s) and period_s > 0):
         raise InputError(f"{where}: the period must be a number of seconds above 0, not {period_s}")
     if time_s is None:

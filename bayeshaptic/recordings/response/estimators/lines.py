@@ -13,6 +13,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.local_polynomial import window_edges
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
 from bayeshaptic.recordings.response.window_reference import unit_mass
+from bayeshaptic.recordings.signals.timing import unusual_period
 
 FEWEST_WINDOWS = 8
 # The lowest window then spans a factor 2.14: for 30 s and 24 lines, 0.7 to 1.5 Hz.
@@ -91,6 +92,9 @@ def _too_short(
 ) -> str:
     """What to say when the band holds too few lines."""
     needed, (low, high) = FEWEST_WINDOWS * minimum, band_hz
+    unusual = unusual_period(recording.period_s)
+    if unusual is not None:
+        return f"{recording.name}: {unusual}"
     where = f"{recording.name}: {recording.samples} samples ({recording.duration_s:.3g} s)"
     if lines and high < 0.5 / recording.period_s:
         return (
