@@ -187,9 +187,8 @@ def test_a_table_of_a_device_that_cannot_be_is_a_slip_of_units(
     found = check_table(table)
     assert bool(found) == bool(told)
     for notice in found:
-        assert f"answers as {told} would: a slip of units?" in notice.text and in_doubt(
-            "position", found
-        )
+        assert f"answers as {told} would: a slip of units?" in notice.text
+        assert in_doubt("position", found)
     with pytest.raises(InputError, match="position in m.*, but the device phantom is rotational"):
         check_table(table, load_device("phantom"))
     compared = check_table(table, load_device("lhifam"))

@@ -36,10 +36,10 @@ def read_delimited(path: Path) -> Arrays:
 
     Comma, semicolon, tab, | or blanks between the fields, or what a first line ``sep=;`` says;
     lines that start with ``#`` or ``%`` are remarks, the last of which may be the header; a
-    preamble is passed over, and a row of units below the header goes with the names. A decimal comma is
-    understood where the separator is another one, and in quotes, in a table whose other numbers
-    have no decimal point. Without a header the columns are named "1", "2" and so on. A column with
-    text in it, as with commas that are no decimal ones, stays text.
+    preamble is passed over, and a row of units below the header goes with the names. A decimal
+    comma is understood where the separator is another one, and in quotes, in a table whose other
+    numbers have no decimal point. Without a header the columns are named "1", "2" and so on. A
+    column with text in it, as with commas that are no decimal ones, stays text.
 
     Raises
     ------
