@@ -26,27 +26,21 @@ Names = Mapping[str, Any]
 
 BOUNDS: dict[str, tuple[float, float, str]] = {
     "seed": (0, math.inf, "of at least 0"),
-    "draws": (1, math.inf, "of at least 1"),
-    "max_draws": (1, math.inf, "of at least 1"),
+    **dict.fromkeys(("draws", "max_draws"), (1, math.inf, "of at least 1")),
+    **dict.fromkeys(("minimum_lines", "most_evaluations"), (1, math.inf, "of at least 1")),
     "count": (2, math.inf, "of at least 2"),
-    "minimum_lines": (1, math.inf, "of at least 1"),
-    "most_evaluations": (1, math.inf, "of at least 1"),
     "ess": (1e-9, math.inf, "above 0"),
     "budget_s": (1e-9, math.inf, "above 0"),
-    "period_s": (1e-12, 1e12, "above 0, in seconds"),
-    "default_period_s": (1e-12, 1e12, "above 0, in seconds"),
+    **dict.fromkeys(("period_s", "default_period_s"), (1e-12, 1e12, "above 0, in seconds")),
     "encoder_resolution": (1e-300, 1e300, "above 0, in m or rad"),
     "lever_m": (1e-300, 1e300, "above 0, in metres"),
     "cutoff_hz": (1e-300, 1e300, "above 0, in Hz"),
     "delay_s": (0, 1e12, "of at least 0, in seconds"),
     "delay_sd_s": (0, math.inf, "of at least 0, in seconds"),
-    "risk": (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01"),
-    "risks": (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01"),
+    **dict.fromkeys(("risk", "risks"), (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01")),
     "p": (0, 1, "between 0 and 1, as in 0.05"),
-    "theta": (-1e300, 1e300, "that are finite"),
-    "start": (-1e300, 1e300, "that are finite"),
-    "stiffness": (-math.inf, math.inf, "that are not NaN"),
-    "damping": (-math.inf, math.inf, "that are not NaN"),
+    **dict.fromkeys(("theta", "start"), (-1e300, 1e300, "other than NaN or infinity")),
+    **dict.fromkeys(("stiffness", "damping"), (-math.inf, math.inf, "other than NaN")),
 }
 """Lowest and highest value of numbers by their name, and how to say it."""
 
@@ -54,7 +48,8 @@ _ALIAS = re.compile(r"(?<![\w.])(collections\.abc|typing)\.")
 _MAY_BE_INFINITE = ("delay_sd_s", "low", "stiffness")
 
 _OFFERED = {
-    "source": (("model", "structure"), "a Model, Fit, Posterior, Case or Analysis"),
+    "source": (("model", "structure"), "a Model, Fit, Posterior, Case, Analysis or Closed"),
+    "Extension": (("apply",), "an effect, as those of bayeshaptic.effects.linear"),
     "result": (("analysis",), "what bayeshaptic.analyse or close_loop returned"),
     "StudyAnalysis": (("new_person",), "a StudyAnalysis (see bayeshaptic.analyse_study)"),
     "Damping": (("smoothing",), "a Backward or a LowPass"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 
 class InputError(ValueError):
@@ -49,6 +50,26 @@ class Notice:
     topic: str
     text: str
     about: tuple[str, ...] = ()
+
+
+def refuse_place(path: Path, example: str) -> None:
+    """Say before any work that a file cannot be written there.
+
+    Parameters
+    ----------
+    path : Path
+    example : str
+        Of a file's name.
+
+    Raises
+    ------
+    InputError
+        Where `path` is a folder, or its folder does not exist.
+    """
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name a file, such as {path / example}")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"{path.parent}: no such folder; make it first")
 
 
 def printable(text: str) -> str:

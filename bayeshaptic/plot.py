@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.figures import (
@@ -27,6 +28,7 @@ from bayeshaptic.report.figures import pairs as pairs_figure
 from bayeshaptic.report.figures import residuals as residuals_figure
 from bayeshaptic.report.figures import response as response_figure
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
+from bayeshaptic.report.figures.on_axes import axes_of, fit_legends, is_narrow, stacked
 from bayeshaptic.report.figures.walls import kb
 from bayeshaptic.report.walls.section import case_of, table_of
 
@@ -47,9 +49,6 @@ __all__ = [
     "walls",
 ]
 
-_WIDTH_IN = 7.4
-_NARROW_IN = 4.5  # axes less wide have no room for a legend or numbers beside them
-
 
 class OnePanel(Protocol):
     """A figure of one panel."""
@@ -65,13 +64,25 @@ class SeveralPanels(Protocol):
         """Draw it."""
 
 
-def _one(name: str, what: str, draw_on: Callable[[Axes, Any], None], height_in: float) -> OnePanel:
+def _one(
+    name: str,
+    what: str,
+    draw_on: Callable[[Axes, Any], None],
+    height_in: float,
+    of_a_loop: bool = False,
+) -> OnePanel:
     """The public function of a figure of one panel."""
 
-    def drawn(result: Result, ax: Axes | None = None) -> Axes:
-        axes = _axes(ax, height_in)
+    @at_the_door
+    def drawn(result: Result, ax: Any = None) -> Axes:
+        if of_a_loop and result.closed is None:
+            raise InputError(
+                "result is an analysis without a closed loop; give what bayeshaptic.close_loop "
+                "returned."
+            )
+        axes = axes_of(ax, height_in)
         draw_on(axes, result)
-        _fit((axes,))
+        fit_legends((axes,))
         return axes
 
     return _named(drawn, name, what, "ax : Axes, optional\n    By default those of a new figure.")
@@ -87,10 +98,11 @@ def _several(
 ) -> SeveralPanels:
     """The public function of a figure of two panels or more."""
 
-    def drawn(result: Result, ax: Sequence[Axes] | None = None) -> Sequence[Axes]:
-        given = _stacked(ax, heights_in, range(2, most(result) + 1))
+    @at_the_door
+    def drawn(result: Result, ax: Any = None) -> Sequence[Axes]:
+        given = stacked(ax, heights_in, range(2, most(result) + 1))
         draw_on(given, result)
-        _fit(given)
+        fit_legends(given)
         return given
 
     return _named(
@@ -117,14 +129,15 @@ limit = _one(
 estimates = _one(
     "estimates",
     "Every estimate of the limit on one axis: model, deterministic fit, measurement, rules.",
-    lambda axes, result: answer.draw_on(axes, result, _is_narrow(axes)),
+    lambda axes, result: answer.draw_on(axes, result, is_narrow(axes)),
     2.4,
 )
 before_after = _one(
     "before_after",
     "The critical stiffness before and after closing the loop, beside the measurement's own.",
-    lambda axes, result: loop_stiffness.draw_on(axes, result, _is_narrow(axes)),
+    lambda axes, result: loop_stiffness.draw_on(axes, result, is_narrow(axes)),
     2.0,
+    of_a_loop=True,
 )
 response = _several(
     "response",
@@ -148,6 +161,7 @@ residual = _several(
 )
 
 
+@at_the_door
 def walls(result: Result, ax: Axes | None = None, table: LimitTable | None = None) -> Axes:
     """The probability that a wall is stable, over its damping and stiffness.
 
@@ -164,14 +178,15 @@ def walls(result: Result, ax: Axes | None = None, table: LimitTable | None = Non
     Axes
     """
     known = table_of([case_of(result)]) if table is None else table
-    axes = _axes(ax, 3.5)
+    axes = axes_of(ax, 3.5)
     kb.draw_on(axes, known.filters[0], known)
     if axes.get_legend_handles_labels()[0]:  # no boundary where the draws are too few for one
         style.legend(axes)
-    _fit((axes,))
+    fit_legends((axes,))
     return axes
 
 
+@at_the_door
 def marginals(result: Result, name: str, ax: Axes | None = None) -> Axes:
     """Posterior and prior of one parameter, with the deterministic fit.
 
@@ -193,13 +208,14 @@ def marginals(result: Result, name: str, ax: Axes | None = None) -> Axes:
         If the model has no such parameter.
     """
     _known(result, name)
-    axes = _axes(ax, 2.4, 3.6)
+    axes = axes_of(ax, 2.4, 3.6)
     marginals_figure.draw_on(axes, result, name)
     style.legend(axes)
-    _fit((axes,))
+    fit_legends((axes,))
     return axes
 
 
+@at_the_door
 def pairs(result: Result, x: str, y: str, ax: Axes | None = None) -> Axes:
     """Draws of two parameters, with contours that hold 50 % and 90 % of them.
 
@@ -221,7 +237,7 @@ def pairs(result: Result, x: str, y: str, ax: Axes | None = None) -> Axes:
         If the model has no such parameter.
     """
     _known(result, x, y)
-    axes = _axes(ax, 3.6, 3.6)
+    axes = axes_of(ax, 3.6, 3.6)
     pairs_figure.draw_on(axes, result, x, y)
     return axes
 
@@ -231,61 +247,3 @@ def _known(result: Result, *names: str) -> None:
     for name in names:
         if name not in model.names:
             raise InputError(f"no parameter {name!r}; the model has {', '.join(model.names)}.")
-
-
-def _axes(ax: Axes | None, height_in: float, width_in: float = _WIDTH_IN) -> Axes:
-    if ax is not None:
-        return ax
-    import matplotlib.pyplot as plt
-
-    return plt.subplots(figsize=(width_in, height_in), layout="constrained")[1]
-
-
-def _is_narrow(axes: Axes) -> bool:
-    figure = axes.get_figure(root=True)
-    return figure is not None and axes.get_position().width * figure.get_figwidth() < _NARROW_IN
-
-
-def _fit(panels: Sequence[Axes]) -> None:
-    """On narrow axes one legend below the lowest, in the place of those beside and inside them."""
-    if not _is_narrow(panels[-1]):
-        return
-    entries: dict[str, Any] = {}
-    for axes in panels:
-        legend = axes.get_legend()
-        if legend is not None:
-            shown = {text.get_text() for text in legend.get_texts()}
-            known = zip(*axes.get_legend_handles_labels(), strict=True)
-            entries.update({label: handle for handle, label in known if label in shown})
-            legend.remove()
-    if not entries:
-        return
-    from matplotlib.transforms import ScaledTranslation
-
-    last, figure, gap_in = panels[-1], panels[-1].get_figure(root=True), 0.42
-    assert figure is not None
-    style.legend(
-        last,
-        handles=list(entries.values()),
-        labels=list(entries),
-        loc="upper center",
-        bbox_to_anchor=(0.5, 0.0),
-        bbox_transform=last.transAxes + ScaledTranslation(0, -gap_in, figure.dpi_scale_trans),
-        ncols=2 if max(map(len, entries)) < 26 else 1,
-        borderaxespad=0.0,
-    )
-
-
-def _stacked(
-    ax: Sequence[Axes] | None, heights: tuple[float, ...], counts: Sequence[int]
-) -> Sequence[Axes]:
-    if ax is not None:
-        if len(ax) not in counts:
-            allowed = " or ".join(str(count) for count in counts)
-            raise InputError(f"ax has {len(ax)} axes; this figure takes {allowed}.")
-        return ax
-    import matplotlib.pyplot as plt
-
-    options: dict[str, Any] = {"sharex": True, "height_ratios": heights, "layout": "constrained"}
-    size = (_WIDTH_IN, sum(heights))
-    return list(plt.subplots(len(heights), 1, figsize=size, **options)[1])

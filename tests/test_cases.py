@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fake_analysis import fake_closed
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
@@ -22,6 +23,30 @@ def case(label: str, samples: Floats, joint: str | None = None, unit: str = "N/m
     limit = CriticalStiffness(samples, np.ones(count), unit, (), np.zeros(count, int), chains=count)
     group = FREE if label == "nobody holds it" else HELD
     return Case(label, group, MODEL, np.ones((count, MODEL.size)), limit, joint)
+
+
+@pytest.mark.parametrize("kind", ["model", "fit", "posterior", "case", "analysis", "closed"])
+def test_whatever_holds_parameters_has_walls_and_guidance(kind: str) -> None:
+    closed = fake_closed()
+    analysis = closed.analysis
+    draws = analysis.posterior.chains[:, ::40].reshape(-1, analysis.model.size)
+    limit = bh.critical_stiffness(analysis.model, draws)
+    source = {
+        "model": bh.free(device="phantom"),
+        "fit": analysis.fit,
+        "posterior": analysis.posterior,
+        "case": Case("user ana", HELD, analysis.model, draws, limit),
+        "analysis": analysis,
+        "closed": closed,
+    }[kind]
+    found = bh.critical_stiffness(source)
+    assert np.isfinite(found.value)
+    count = {"model": 1, "fit": 1, "case": len(draws)}.get(kind, len(analysis.posterior.draws))
+    assert len(found.samples) == count
+    assert bh.kb_region(source, draws=20).probability(0.1 * found.value, 0.0) == 1.0
+    assert bh.elasticities(source, draws=20)
+    assert np.isfinite(bh.sweep(source, "kc", [0.5, 1.0, 2.0], draws=20).middle).all()
+    assert bh.variance_shares(source, draws=200).draws >= 1
 
 
 def test_the_least_of_two_independent_cases() -> None:

@@ -105,6 +105,10 @@ def test_the_same_seed_gives_the_same_draws(held_phantom):
 
 def test_a_saved_posterior_is_as_good(held_phantom, tmp_path):
     *_, posterior = held_phantom
+    with pytest.raises(InputError, match="is a folder; name a file, such as .*posterior.nc"):
+        posterior.save(tmp_path)
+    with pytest.raises(InputError, match="none: no such folder; make it first"):
+        posterior.save(tmp_path / "none" / "posterior.nc")
     path = posterior.save(tmp_path / "posterior.nc")
     assert [p.name for p in tmp_path.iterdir()] == ["posterior.nc"]
     again = bh.load_posterior(path)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from linear_bench import LHIFAM_FREE, Device
 
+from bayeshaptic.devices import load_device
+from bayeshaptic.errors import InputError
 from bayeshaptic.inference.least_squares import _other_valleys, least_squares
 from bayeshaptic.models import LogNormal, free, grasped, rigid
 from bayeshaptic.numerics.gauss_newton import _damped_step, jacobian, minimise
@@ -250,6 +252,21 @@ def test_valleys_where_several_starts_end_are_kept_beside_the_best():
     cost = np.array([10.0, 50.0, 50.4, 200.0, 90.2, 90.0, 90.5])
     np.testing.assert_array_equal(_other_valleys(ended, cost), [[5.01], [2.0]])
     assert _other_valleys(ended[:1], cost[:1]).shape == (0, 1)
+
+
+def test_a_start_or_a_period_that_does_not_fit_is_refused(unknown) -> None:
+    _, etfe, _ = unknown
+    for start in (np.ones(2), np.ones((3, 2)), 1.0):
+        with pytest.raises(InputError, match="start has the shape|start is 1.0"):
+            least_squares(rigid(delay_s=None), etfe, start=start)
+    with pytest.raises(InputError, match="start is .*; give numbers other than NaN or infinity"):
+        least_squares(rigid(), etfe, start=np.full(3, np.nan))
+    with pytest.raises(InputError, match=r"period_s is 0\.002 s, and .* every 0\.001 s; leave"):
+        least_squares(rigid(period_s=2e-3), etfe)
+    # Of a device the data come first, as in a report, which says so.
+    device = replace(load_device("phantom"), period_s=2e-3)
+    fit = least_squares(rigid(device=device), etfe, start=rigid(device=device).values)
+    assert fit.model.period_s == etfe.period_s
 
 
 def test_a_mode_above_half_the_sampling_rate_is_found() -> None:

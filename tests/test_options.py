@@ -126,6 +126,7 @@ def test_a_path_goes_where_a_recording_does(tmp_path: Path) -> None:
     recording = bh.read_recording(RECORDING)
     found = bh.estimate_etfe(str(RECORDING), band_hz=(1, 25))
     assert (found.value == bh.estimate_etfe(recording, band_hz=(1, 25)).value).all()
-    assert bh.join_recordings([RECORDING, recording]).joints == (recording.samples,)
+    joined = bh.join_recordings([RECORDING, recording.part(0, 9000)])
+    assert joined.joints == (recording.samples,)
     with pytest.raises(bh.InputError, match="no such file"):
         bh.measure_relay(tmp_path / "a.csv")

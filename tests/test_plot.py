@@ -35,6 +35,22 @@ def test_two_panels_are_drawn_where_they_are_wanted(name: str) -> None:
         getattr(bh.plot, name)(result(), ax=axes[:1])
 
 
+@pytest.mark.parametrize("name", bh.plot.__all__)
+def test_what_cannot_be_drawn_is_said(name: str) -> None:
+    draw, several = getattr(bh.plot, name), name in ("response", "crossings", "residual")
+    names = {"marginals": ("kc",), "pairs": ("m1", "kc")}.get(name, ())
+    with pytest.raises(bh.InputError, match="result is of type Fit; give what bayeshaptic.ana"):
+        draw(result().analysis.fit, *names)
+    axes = Figure().subplots(1, 2)
+    with pytest.raises(bh.InputError, match="ax has 1 axes; .* 2" if several else "takes one Axes"):
+        draw(result(), *names, ax=axes[0] if several else axes)
+
+
+def test_before_and_after_need_a_closed_loop() -> None:
+    with pytest.raises(bh.InputError, match="give what bayeshaptic.close_loop returned"):
+        bh.plot.before_after(fake_analysis())
+
+
 def test_parameters_are_drawn_by_name() -> None:
     left, right = Figure().subplots(1, 2)
     assert bh.plot.marginals(result(), "kc", ax=left) is left and left.has_data()

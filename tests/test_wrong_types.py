@@ -78,6 +78,8 @@ def test_an_argument_of_a_wrong_type(
     assert not list(tmp_path.iterdir())
 
 
+FREE_MODEL = bh.free(device="lhifam")
+REGION = bh.kb_region(FREE_MODEL)
 LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, int))
 
 
@@ -115,6 +117,23 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
         (lambda: bh.recording_from_arrays("xy", [1, 2]), "force is 'xy'; give numbers"),
         (lambda: bh.estimate_etfe(3), "give a Recording (see bayeshaptic.read_recording) or"),
         (lambda: bh.sample(blank(bh.Model), None), "etfe is None; give an Etfe"),
+        (lambda: bh.Normal(0.2, 0.1, low=5), "Normal needs low below mean + 6 sd"),
+        (lambda: bh.Normal(0.2, 0.1, low=np.inf), "Normal needs low below mean + 6 sd"),
+        (lambda: bh.free(prior={"m1": bh.Uniform(-2, -1)}), "prior of m1 is Uniform(low=-2, high"),
+        (lambda: bh.free(prior={"m1": bh.Normal}), "prior['m1'] is of type"),
+        (lambda: LIMIT.probability_unstable(np.nan), "stiffness is nan; give a number other than"),
+        (lambda: bh.critical_stiffness(FREE_MODEL, [np.nan] * 6), "give numbers other than NaN"),
+        (lambda: bh.critical_stiffness(FREE_MODEL, [0.0] * 6), "m1 is 0; a mass must be above 0"),
+        (lambda: bh.critical_stiffness(FREE_MODEL, [1.0] * 5), "has 6 parameters"),
+        (lambda: bh.critical_stiffness(bh.Settings()), "source is of type Settings; give a Model"),
+        (lambda: bh.kb_region(SimpleNamespace(model=1)), "source is of type SimpleNamespace; give"),
+        (lambda: REGION.probability([1, 2, 3], [1, 2]), "stiffness has the shape (3,) and damping"),
+        (lambda: REGION.probability(np.nan, 0), "stiffness is nan; give a number other than NaN"),
+        (lambda: REGION.quantile(0.05, [np.nan]), "damping is [nan]; give numbers other than NaN"),
+        (lambda: FREE_MODEL.prior("zz"), "no parameter zz in the free model; it has m1, b1"),
+        (lambda: FREE_MODEL.unit("zz"), "no parameter zz in the free model"),
+        (lambda: FREE_MODEL.response({"m1": 1}, [1.0]), "theta is of type dict; give numbers"),
+        (lambda: FREE_MODEL.with_effect("reflex"), "effect is 'reflex'; give an effect"),
         (lambda: bh.elasticities(3), "source is 3; give a Model, Fit, Posterior"),
         (lambda: bh.write_report(3, "out"), "result is 3; give what bayeshaptic.analyse"),
         (lambda: bh.device_limit([3]), "cases is [3]; give a sequence of a Case"),

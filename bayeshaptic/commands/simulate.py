@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.commands.options import add_quiet, band, non_negative, place, positive, whole
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, refuse_place
 
 if TYPE_CHECKING:
     from bayeshaptic.rig.bench import Bench
@@ -127,7 +127,11 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.rig.recording import write_recording
 
-    refuse_place(arguments.output, arguments.force)
+    refuse_place(arguments.output, "recording.csv.gz")
+    if arguments.output.exists() and not arguments.force:
+        raise InputError(
+            f"{arguments.output} exists; name another file, or overwrite it with --force"
+        )
     bench = bench_from(arguments)
     recording = record(arguments, bench)
     path = write_recording(arguments.output, recording)
@@ -224,20 +228,3 @@ def parse_effect(text: str) -> tuple[str, dict[str, float]]:
                 f"--effect {text}: '{part}' is not FIELD:VALUE with a number, for example force:1.5"
             ) from None
     return name.strip(), fields
-
-
-def refuse_place(path: Path, force: bool) -> None:
-    """Say before any work that a file cannot be written there.
-
-    Raises
-    ------
-    InputError
-        Where `path` is a folder, its folder does not exist, or there is such a file and not
-        `force`.
-    """
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; name a file, such as {path / 'recording.csv.gz'}")
-    if not path.absolute().parent.is_dir():
-        raise InputError(f"{path.parent}: no such folder; make it first")
-    if path.exists() and not force:
-        raise InputError(f"{path} exists; name another file, or overwrite it with --force")

@@ -11,17 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.errors import InputError
 from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.quantities import quantity, scale
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Complexes, Floats
 
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
+SAME_PERIOD = 1e-3  # relative: time stamps are rounded
 REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
 
 
@@ -161,6 +164,36 @@ class Fit(Shown):
             f"Least-squares fit of the model {self.model.name}",
             f"reduced chi-square {quantity(self.reduced_chi_square, '')}, where 1 is pure noise",
             listed(found, 4),
+        )
+
+
+def refuse_unfit(model: Model, etfe: Etfe, start: Floats | None) -> None:
+    """Refuse to fit a model of another period, or to begin where it has no such parameters.
+
+    Parameters
+    ----------
+    model : Model
+    etfe : Etfe
+    start : ndarray or None
+
+    Raises
+    ------
+    InputError
+        With what to give. The data come before a device's file, here as everywhere.
+    """
+    shape = () if start is None else np.shape(start)
+    if start is not None and (len(shape) not in (1, 2) or shape[-1] != model.size):
+        raise InputError(
+            f"start has the shape {shape}; give the {model.size} parameters of the {model.name} "
+            f"model ({', '.join(model.names)}), or rows of them"
+        )
+    device = model.device
+    if model.period_s is None or (device is not None and device.period_s == model.period_s):
+        return
+    if abs(model.period_s / etfe.period_s - 1) > SAME_PERIOD:
+        raise InputError(
+            f"the model's period_s is {model.period_s:g} s, and the response was measured every "
+            f"{etfe.period_s:g} s; leave period_s out, or give that of the response"
         )
 
 

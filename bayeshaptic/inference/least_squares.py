@@ -14,6 +14,7 @@ from bayeshaptic.inference.fit import (
     Fit,
     ends_at_bounds,
     impossible_at_bounds,
+    refuse_unfit,
     runs_away,
     search_box,
     summarise,
@@ -82,7 +83,14 @@ def least_squares(
     Returns
     -------
     Fit
+
+    Raises
+    ------
+    InputError
+        Where the model was given another sampling period than the response has, or `start` has
+        not as many parameters as the model.
     """
+    refuse_unfit(model, etfe, start)
     model = informed(model, etfe)
     if start is not None:
         return _fit(model, etfe, start)

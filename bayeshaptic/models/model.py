@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -111,7 +111,8 @@ class Model(Shown):
         return np.array([self.reference[name] for name in self.names])
 
     def parameter(self, name: str) -> Parameter:
-        """The sampled parameter called `name`."""
+        """The sampled parameter called `name`; an InputError where there is none."""
+        self._refuse_unknown((name,))
         return self.parameters[self.names.index(name)]
 
     def prior(self, name: str) -> Prior:
@@ -123,8 +124,7 @@ class Model(Shown):
 
     def unit(self, name: str) -> str:
         """Unit of the parameter called `name`, for example "N s/m"."""
-        dimension = self.parameter(name).dimension
-        return unit_of(dimension, self.force_unit, self.position_unit)
+        return unit_of(self.parameter(name).dimension, self.force_unit, self.position_unit)
 
     def system(self, theta: ArrayLike) -> LinearSystem:
         """The linear systems of parameter vectors `theta`, shape (B, P) or (P,)."""
@@ -156,6 +156,7 @@ class Model(Shown):
         one = np.ones_like(lag)
         return system.with_filter(np.stack([one, lag]), one[None])
 
+    @at_the_door
     def response(
         self,
         theta: ArrayLike,
@@ -223,8 +224,7 @@ class Model(Shown):
 
     def log_prior(self, theta: ArrayLike) -> Floats:
         """Log prior density of parameter vectors `theta` of shape (B, P); shape (B,)."""
-        theta = np.atleast_2d(np.asarray(theta, float))
-        return self._joint_prior(theta)
+        return self._joint_prior(np.atleast_2d(np.asarray(theta, float)))
 
     @cached_property
     def _joint_prior(self) -> JointPrior:
@@ -242,16 +242,19 @@ class Model(Shown):
         Raises
         ------
         InputError
-            If a name is not a parameter of this model.
+            If a name is not a parameter of this model, or a prior allows for no value of it.
         """
-        unknown = sorted(set(priors) - set(self.names))
-        if unknown:
-            raise InputError(
-                f"no parameter {', '.join(unknown)} in the {self.name} model; it has "
-                f"{', '.join(self.names)}."
-            )
+        self._refuse_unknown(priors)
         parameters = tuple(replace(p, prior=priors.get(p.name, p.prior)) for p in self.parameters)
         return replace(self, parameters=parameters)
+
+    def _refuse_unknown(self, names: Iterable[str]) -> None:
+        unknown = sorted(set(names) - set(self.names))
+        if unknown:
+            raise InputError(
+                f"no parameter {', '.join(map(str, unknown))} in the {self.name} model; it has "
+                f"{', '.join(self.names)}."
+            )
 
     @at_the_door
     def with_known(self, values: Mapping[str, float]) -> Model:
@@ -266,6 +269,7 @@ class Model(Shown):
         known = {p.name: float(values[p.name]) for p in self.parameters if p.name in values}
         return replace(self, parameters=left, fixed={**self.fixed, **known})
 
+    @at_the_door
     def with_effect(self, effect: Extension) -> Model:
         """With one more linear effect, whose parameters come before the delay's."""
         own = tuple(p for p in self.parameters if p.name != "delay_s")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from bayeshaptic.errors import InputError
 from bayeshaptic.models.prior import Prior
 
 _UNITS = {
@@ -71,3 +72,10 @@ class Parameter:
     dimension: str
     title: str
     prior: Prior | None = None
+
+    def __post_init__(self) -> None:
+        never_below_zero = self.dimension in ("mass", "damping", "stiffness", "time")
+        if self.prior is not None and never_below_zero and not self.prior.support[1] > 0:
+            raise InputError(
+                f"the prior of {self.name} is {self.prior}; give one with values above 0."
+            )

@@ -18,6 +18,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.quantities import quantity, scale
 from bayeshaptic.types import Floats
 
+_MOST_CUT = 6.0  # standard deviations above the mean: a part in 1e9 is left, and its digits end
 _LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
 
 
@@ -158,6 +159,10 @@ class Normal(ByTerms):
         check_fields(self, globals())
         if not self.sd > 0:
             raise InputError(f"Normal needs sd > 0, got {self}.")
+        if self.low > self.mean + _MOST_CUT * self.sd:
+            raise InputError(
+                f"Normal needs low below mean + {_MOST_CUT:g} sd: nothing is above; got {self}."
+            )
 
     @property
     def support(self) -> tuple[float, float]:

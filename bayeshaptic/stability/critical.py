@@ -16,7 +16,7 @@ from bayeshaptic.quantities import estimate, percent, quantity, rounded_down
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import BindingCrossing, group_crossings
 from bayeshaptic.stability.crossings import rational
-from bayeshaptic.stability.draws import vectors_of
+from bayeshaptic.stability.draws import opened, vectors_of
 from bayeshaptic.stability.each_draw import limits_of
 from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
@@ -207,7 +207,8 @@ def critical_stiffness(
 
     Parameters
     ----------
-    source : Model, Fit or Posterior
+    source : Model, Fit, Posterior, Case, Analysis or Closed
+        Of the last two the draws of their posterior; their `limit` allows for more than these.
     theta : array_like, shape (n, P) or (P,), optional
         With a model: the parameter vectors to use instead of its device file's.
     approximation : {"exact", "continuous"}
@@ -226,7 +227,8 @@ def critical_stiffness(
     Raises
     ------
     InputError
-        If the model has no values or no sampling period, or the approximation is unknown.
+        If the source is none of these, the model has no values or no sampling period, a mass is
+        not above 0, or the approximation is unknown.
 
     Notes
     -----
@@ -236,11 +238,15 @@ def critical_stiffness(
     """
     if approximation not in ("exact", "continuous"):
         raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
-    model: Model = source if isinstance(source, Model) else source.model
+    model, holder, _ = opened(source)
     vectors, chains = vectors_of(source, theta, max_draws)
     if model.period_s is None:
         raise InputError("the model has no sampling period: give period_s, or a device.")
-    if before is not None and len(vectors) < np.asarray(source.chains)[..., 0].size:
+    if (
+        before is not None
+        and hasattr(holder, "chains")
+        and len(vectors) < np.asarray(holder.chains)[..., 0].size
+    ):
         before = None  # thinned: other draws than those
     limit = _limits(model, vectors, chains, approximation, before)
     checkable = approximation == "exact" and rational(model.system(vectors[:1]))

@@ -7,12 +7,62 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayeshaptic.arguments import shown
+from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.crossings import rational
 from bayeshaptic.types import Floats
 
 MOST_DRAWS = 150_000
 MOST_SEARCHED = 30_000  # of a loop without a finite set of poles, whose search is slow
+
+
+def opened(source: Any) -> tuple[Model, Any, Any]:
+    """What a caller has, in parts.
+
+    Parameters
+    ----------
+    source : Model, Fit, Posterior, Case, Analysis or Closed
+
+    Returns
+    -------
+    model : Model
+    holder : Model, or what has `chains`, `draws` or `theta`
+    limit : CriticalStiffness or None
+        What the caller states for it.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    if isinstance(source, Model):
+        return source, source, None
+    inner = getattr(source, "analysis", source)  # of a closed loop
+    model, holder = getattr(inner, "model", None), getattr(inner, "posterior", inner)
+    holds = any(hasattr(holder, name) for name in ("chains", "draws", "theta"))
+    if not isinstance(model, Model) or not holds:
+        raise InputError(
+            f"source is {shown(source)}; give a Model, Fit, Posterior, Case, Analysis or Closed"
+        )
+    return model, holder, getattr(inner, "limit", None)
+
+
+def vectors_given(model: Model, theta: ArrayLike) -> Floats:
+    """Parameter vectors of a caller, shape (n, P).
+
+    Raises
+    ------
+    InputError
+        For another number of parameters, and for a mass that is none.
+    """
+    vectors = np.atleast_2d(np.asarray(theta, float))
+    model.system(vectors[:1])  # which says how many there are
+    for column, parameter in enumerate(model.parameters):
+        if parameter.dimension == "mass" and not np.all(vectors[:, column] > 0):
+            low = vectors[:, column].min()
+            raise InputError(f"theta: {parameter.name} is {low:g}; a mass must be above 0")
+    return vectors
 
 
 def draws_of(posterior: Any) -> Floats:
@@ -27,14 +77,16 @@ def most_draws(model: Model, vector: Floats) -> int:
 
 def vectors_of(source: Any, theta: ArrayLike | None, max_draws: int | None) -> tuple[Floats, int]:
     """Parameter vectors, chain after chain, and the number of chains."""
-    chains = getattr(source, "chains", None)
-    if theta is not None or chains is None:
-        if theta is None:
-            theta = source.values if isinstance(source, Model) else source.theta
-        vectors = np.atleast_2d(np.asarray(theta, float))
+    model, holder, _ = opened(source)
+    if theta is not None or isinstance(holder, Model):
+        vectors = vectors_given(model, model.values if theta is None else theta)
         return vectors, len(vectors)
-    chains = np.asarray(chains)  # (E, S, W, P)
-    most = max_draws or most_draws(source.model, chains[0, 0, 0])
+    if not hasattr(holder, "chains"):
+        vectors = np.atleast_2d(holder.draws if hasattr(holder, "draws") else holder.theta)
+        vectors = vectors[:: -(-len(vectors) // (max_draws or len(vectors)))]
+        return vectors, len(vectors)
+    chains = np.asarray(holder.chains)  # (E, S, W, P)
+    most = max_draws or most_draws(model, chains[0, 0, 0])
     every = min(-(-chains[..., 0].size // most), chains.shape[1])
     kept = np.swapaxes(chains[:, every - 1 :: every], 1, 2)
     return kept.reshape(-1, kept.shape[-1]), kept.shape[0] * kept.shape[1]

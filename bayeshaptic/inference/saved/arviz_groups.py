@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bayeshaptic.errors import refuse_place
 from bayeshaptic.inference.diagnostics import Diagnostics
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.saved.archive import model_to_dict
@@ -94,7 +95,8 @@ def _arviz() -> Any:
 
 
 def save_posterior(posterior: Sampled, path: Path) -> Path:
-    """Write `posterior` as netCDF."""
+    """Write `posterior` as netCDF; an InputError where it cannot be written there."""
+    refuse_place(path, "posterior.nc")
     write(_groups(posterior), path)
     return path
 

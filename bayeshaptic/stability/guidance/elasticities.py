@@ -88,7 +88,7 @@ def elasticities(source: Any, draws: int = DRAWS) -> tuple[Elasticities, ...]:
 
     Parameters
     ----------
-    source : Model, Fit, Posterior, Case or Analysis
+    source : Model, Fit, Posterior, Case, Analysis or Closed
     draws : int
         About how many are used.
 

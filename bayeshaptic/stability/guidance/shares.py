@@ -83,7 +83,7 @@ def variance_shares(source: Any, draws: int = DRAWS) -> VarianceShares:
 
     Parameters
     ----------
-    source : Posterior, Case or Analysis
+    source : Posterior, Case, Analysis or Closed
     draws : int
         About how many are used.
 

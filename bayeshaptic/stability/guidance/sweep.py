@@ -108,7 +108,7 @@ def sweep(
 
     Parameters
     ----------
-    source : Model, Fit, Posterior, Case or Analysis
+    source : Model, Fit, Posterior, Case, Analysis or Closed
     name : str
         Of a parameter of the model; "delay_s" also where it is known.
     factors : array_like, shape (V,), optional

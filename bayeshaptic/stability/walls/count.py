@@ -3,10 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from bayeshaptic.errors import InputError
 from bayeshaptic.stability.walls.curve import Events, KbCurve, along_damping
 from bayeshaptic.types import Floats, Ints
+
+
+def pairs_of(stiffness: ArrayLike, damping: ArrayLike) -> tuple[Floats, Floats]:
+    """Stiffnesses and dampings that broadcast against each other, as arrays of one shape.
+
+    Raises
+    ------
+    InputError
+        Where they do not.
+    """
+    k, b = np.asarray(stiffness, float), np.asarray(damping, float)
+    try:
+        k, b = np.broadcast_arrays(k, b)
+    except ValueError:
+        raise InputError(
+            f"stiffness has the shape {k.shape} and damping {b.shape}, which do not go together; "
+            "give as many of one as of the other, or stiffness[:, None] for every pair"
+        ) from None
+    return k, b
 
 
 def unstable_at_start(curve: KbCurve, start: Floats, levels: Floats) -> Ints:

@@ -14,7 +14,7 @@ from bayeshaptic.models.model import Model
 from bayeshaptic.quantities import quantity
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.tail import ENOUGH_BELOW
-from bayeshaptic.stability.walls.count import beyond_start, unstable_at_start
+from bayeshaptic.stability.walls.count import beyond_start, pairs_of, unstable_at_start
 from bayeshaptic.stability.walls.curve import (
     InverseCurve,
     KbCurve,
@@ -116,7 +116,7 @@ class KbRegion(Shown):
         ----------
         stiffness, damping : array_like
         """
-        k, b = np.broadcast_arrays(np.asarray(stiffness, float), np.asarray(damping, float))
+        k, b = pairs_of(stiffness, damping)
         levels, column = np.unique(b, return_inverse=True)
         heights, row = np.unique(k, return_inverse=True)
         share = self.probability_map(heights, levels)[column.ravel(), row.ravel()]
@@ -224,7 +224,7 @@ def kb_region(
 
     Parameters
     ----------
-    source : Model, Posterior, Case or Analysis
+    source : Model, Fit, Posterior, Case, Analysis or Closed
         Where it has a `limit`, the region is stretched draw by draw (by rank, where the limit is
         not one of the draws) so that without damping it is just that limit: what widens K_CR
         beyond the parameters' spread (an effect's strength, what remains unexplained) widens the

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
+from bayeshaptic.stability.draws import opened, vectors_given
 from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.types import Floats
 
@@ -45,11 +46,11 @@ class Loops:
 
 
 def loops_of(source: Any, theta: ArrayLike | None = None, draws: int = 4000) -> Loops:
-    """The loops of a model, a posterior, a case of a device, or an analysis.
+    """The loops of a model, a fit, a posterior, a case of a device, or an analysis.
 
     Parameters
     ----------
-    source : Model, Fit, Posterior, Case or Analysis
+    source : Model, Fit, Posterior, Case, Analysis or Closed
     theta : array_like, shape (n, P) or (P,), optional
     draws : int
         About how many of a longer set are kept, at equal steps.
@@ -57,15 +58,13 @@ def loops_of(source: Any, theta: ArrayLike | None = None, draws: int = 4000) -> 
     Raises
     ------
     InputError
-        If the model has no values or no sampling period.
+        If the source is none of these, or the model has no values or no sampling period.
     """
-    model: Model = source if isinstance(source, Model) else source.model
+    model, holder, limit = opened(source)
     if model.period_s is None:
         raise InputError("the model has no sampling period: give period_s, or a device.")
-    limit = getattr(source, "limit", None)
-    holder = getattr(source, "posterior", source)
-    if theta is not None or isinstance(source, Model):
-        vectors = np.atleast_2d(np.asarray(source.values if theta is None else theta, float))
+    if theta is not None or isinstance(holder, Model):
+        vectors = vectors_given(model, model.values if theta is None else theta)
         return Loops(model, vectors, float(len(vectors)), None)
     if hasattr(holder, "chains"):
         vectors, effective = _thinned_chains(np.asarray(holder.chains), draws)
