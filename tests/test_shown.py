@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,16 @@ def test_a_result_shows_itself_in_three_lines(name: str) -> None:
     assert len(lines) <= 3 and all(0 < len(line) < 160 for line in lines)
     assert "array(" not in repr(SHOWN[name]) and "_" not in lines[0]
     assert SHOWN[name]._repr_html_().startswith("<div><strong>")
+
+
+@pytest.mark.parametrize(
+    "name", ["recording", "response", "fit", "posterior", "limit", "case", "region", "walls"]
+)
+def test_a_result_is_equal_to_itself_alone(name: str) -> None:
+    one = SHOWN[name]
+    other = copy.deepcopy(one)
+    assert one == one and one != other and one in [other, one] and other not in [one]
+    assert len({one, other}) == 2
 
 
 def test_numbers_have_units() -> None:

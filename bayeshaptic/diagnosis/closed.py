@@ -23,7 +23,7 @@ from bayeshaptic.shown import Shown
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Closed(Shown):
     """The result of closing the loop on one measurement.
 

@@ -70,7 +70,7 @@ class ScoredFit:
         return self.fit.model.held
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Choice(Shown):
     """The chosen base model and the reason in words.
 

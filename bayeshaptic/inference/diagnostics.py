@@ -13,7 +13,7 @@ RHAT_LIMIT = 1.01
 _FEWEST = 8000  # draws that statistics are computed from: R-hat is known to some thousandths then
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Diagnostics:
     """Convergence of every column.
 

@@ -28,7 +28,7 @@ SAME_PERIOD = 1e-3  # relative: time stamps are rounded
 REACH_SDS = 6.0  # a fit without priors may go so many prior standard deviations out
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit(Shown):
     """A weighted least-squares fit.
 

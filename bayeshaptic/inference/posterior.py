@@ -21,7 +21,7 @@ from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Floats
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Posterior(Shown):
     """Draws from the posterior of a model's parameters.
 

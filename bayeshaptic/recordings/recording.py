@@ -18,7 +18,7 @@ FORCE_UNITS = ("N", "Nm", "A")
 POSITION_UNITS = ("m", "rad")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording(Shown):
     """One experiment: commanded force u[k] and motor position y[k], every T seconds.
 

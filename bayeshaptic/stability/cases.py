@@ -22,7 +22,7 @@ from bayeshaptic.types import Floats, Ints
 FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Case(Shown):
     """A situation that a device must stay stable in: who holds it, in which configuration.
 
@@ -71,7 +71,7 @@ class Binding:
     probability: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DeviceLimit:
     """The critical stiffness over all cases of a device: in each joint draw, the smallest.
 

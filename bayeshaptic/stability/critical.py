@@ -25,7 +25,7 @@ from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Ints
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CriticalStiffness(Shown):
     """K_CR of each draw of a posterior, or of one model.
 

@@ -23,7 +23,7 @@ _DOUBTFUL = 1.0  # a stretch below this is worth a word where it is not in the n
 _NEAR = 2.0  # and a place that is nearer than this without reaching the other side
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EtfeCriticalStiffness(Shown):
     """Model-free critical stiffness of a measurement.
 

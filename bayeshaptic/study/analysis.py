@@ -36,7 +36,7 @@ from bayeshaptic.types import Executor, Progress
 _RECORDINGS = 0.8  # share of the progress that the recordings take
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StudyAnalysis(Shown):
     """Everything that is known of one device from one study.
 

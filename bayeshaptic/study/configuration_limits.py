@@ -16,7 +16,7 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats, Progress
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ConfigurationLimits:
     """K_CR over the configurations between the outermost measured ones.
 

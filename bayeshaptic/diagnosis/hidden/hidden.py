@@ -59,7 +59,7 @@ class HiddenEffect:
     pareto_k: float
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Hidden(Shown):
     """What could hide in a recording.
 

@@ -19,7 +19,7 @@ from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Floats
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Population(Shown):
     """Posterior of a population of hands, and of the device that they held.
 

@@ -60,7 +60,7 @@ class MotionLikelihood:
         return -0.5 * (FREEDOM + len(NAMES)) * np.log1p(squares / FREEDOM)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InLoopFit(Fit):
     """A fit of the motion in the form of a fit of the response.
 

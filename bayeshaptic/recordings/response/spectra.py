@@ -37,7 +37,7 @@ class Spectra(Protocol):
         """The windows of the likelihood."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RandomSpectra:
     """DFT lines of a recording with random excitation, and where its windows begin and end.
 
@@ -226,7 +226,7 @@ class RandomSpectra:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PeriodicSpectra:
     """Excited lines of a periodic excitation.
 
@@ -269,7 +269,7 @@ class PeriodicSpectra:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JoinedSpectra:
     """Spectra of the pieces of a recording, each with its own noise.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bayeshaptic.recordings.response.windows import Reference, Windows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TableSpectra:
     """Rows of a frequency-response table.
 

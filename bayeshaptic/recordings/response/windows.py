@@ -26,7 +26,7 @@ def remembered(reference: Reference) -> Reference:
     return answer
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Windows:
     r"""Windows of neighbouring DFT lines, each compressed to k linear combinations and a scatter.
 

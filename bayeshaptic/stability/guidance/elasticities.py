@@ -28,7 +28,7 @@ DRAWS = 160
 _TURN = 1e-5  # relative, of the angle
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Elasticities(Shown):
     """d ln K_CR / d ln p at one of the crossings that may bind.
 

@@ -43,7 +43,7 @@ class Jump:
     after_hz: float
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Shown):
     """K_CR over one parameter.
 

@@ -31,7 +31,7 @@ from bayeshaptic.stability.walls.damping import Damping, derivative, derivative_
 from bayeshaptic.types import Complexes, Floats, Ints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InverseCurve:
     """-1/G of a batch of loops along the upper half of the unit circle.
 
@@ -72,7 +72,7 @@ class InverseCurve:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class KbCurve:
     """The boundaries of a batch of loops with a given damping term.
 

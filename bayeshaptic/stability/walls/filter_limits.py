@@ -25,7 +25,7 @@ from bayeshaptic.types import Floats
 ROWS = 25  # dampings a filter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FilterLimits:
     """The stiffness that a wall may have over its damping, with one way to get the velocity.
 

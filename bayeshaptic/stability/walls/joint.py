@@ -17,7 +17,7 @@ from bayeshaptic.types import Floats
 CUTOFF = 0.1  # of the sampling rate: the usual low-pass of a velocity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointRegion:
     """The walls that are stable in every case, cases taken as independent of each other.
 

@@ -32,7 +32,7 @@ RISKS = (0.05, 0.01, 0.001)
 _FORMAT = "bayeshaptic limits 1"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LimitTable(Shown):
     """Limits at given risks over the cases of a device.
 

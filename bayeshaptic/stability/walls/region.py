@@ -34,7 +34,7 @@ _START = 1e-3  # of K_CR: where a loop that is stable at rest is still stable
 INSIDE = 1 - 1e-6  # of the largest damping: the very tip of a region is a matter of rounding
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class KbRegion(Shown):
     """The stable region of C(z) = K + B D(z) for each loop of a posterior, or of one model.
 

@@ -9,7 +9,7 @@ import numpy as np
 from bayeshaptic.types import Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Boundary:
     """The stiffness that is unstable with a given probability, over damping.
 
@@ -27,7 +27,7 @@ class Boundary:
     stiffness: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ZWidth:
     """How wide the range of walls is that may be rendered at a given risk.
 

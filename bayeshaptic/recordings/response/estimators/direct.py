@@ -32,7 +32,7 @@ from bayeshaptic.recordings.response.windows import Reference, Windows
 _FREEDOM = 0.75
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DirectSpectra(RandomSpectra):
     """All DFT lines of a recording, whose windows hold whatever loop it was made in.
 

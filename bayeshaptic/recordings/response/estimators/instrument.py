@@ -40,7 +40,7 @@ HIGHEST_THROUGH_REFERENCE = 0.4
 _COLUMNS = 3  # of the instrument in a window: a parabola
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InstrumentSpectra(RandomSpectra):
     """DFT lines of force and position, and of the reference behind them.
 
