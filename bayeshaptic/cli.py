@@ -7,12 +7,14 @@ that cannot be used; 130 interrupted, 143 terminated. A command is one module of
 
 from __future__ import annotations
 
+import _thread
 import argparse
 import os
 import re
 import signal
 import sys
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
@@ -42,6 +44,7 @@ the environment, errors come with their traceback."""
 
 
 LAST_S = 4.0  # from a signal to the end by force: all is to have ended after five seconds
+AGAIN_S = 0.1  # until a signal that was lost is raised again
 
 
 class _Parser(argparse.ArgumentParser):
@@ -116,31 +119,87 @@ class _Stopped(BaseException):
     """
 
 
+class _Signals:
+    """Signals as an exception, which is raised until it got through.
+
+    What a handler raises is lost where C calls Python, as while numba compiles. On its way out it
+    is not raised again: it would interrupt what tidies up.
+
+    Parameters
+    ----------
+    alone : bool
+        Whether the process is ours, and ends in time. Libraries may take long to close what they
+        have started: a dask cluster that was stopped while it started took six seconds.
+    """
+
+    def __init__(self, alone: bool) -> None:
+        self.alone, self.over = alone, False
+        self.number: int | None = None
+        self._lock = threading.Lock()
+
+    def raised(self, number: int, frame: FrameType | None) -> None:
+        """The handler."""
+        if self.number is None:
+            self.number = number
+            # Not by `threading`, whose locks the interrupted frame may hold.
+            _thread.start_new_thread(self._insist, (number,))
+        if not _on_its_way():
+            raise _Stopped(self.number)
+
+    def _insist(self, number: int) -> None:
+        last = time.monotonic() + LAST_S
+        while self.alone or not self.over:
+            time.sleep(AGAIN_S)
+            if self.alone and time.monotonic() > last:
+                _end_by_force(128 + number)
+            with self._lock:
+                if not self.over:
+                    _signal_again(number)
+
+    def end(self) -> None:
+        """From here on nothing is raised."""
+        with self._lock:
+            self.over = True
+
+
+def _signal_again(number: int) -> None:
+    """To the main thread, which may wait in a system call."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:  # Windows
+        _thread.interrupt_main(number)  # type: ignore[arg-type]
+
+
+def _on_its_way() -> bool:
+    """Whether the exception of a signal is being handled."""
+    error = sys.exc_info()[1]
+    while error is not None and not isinstance(error, _Stopped):
+        error = error.__context__
+    return error is not None
+
+
 @contextmanager
 def _stopped_in_order(alone: bool) -> Iterator[None]:
-    """Signals become exceptions; where the process is ours `alone`, it ends in time, too.
-
-    Libraries may take long to close what they have started: a dask cluster that was stopped while
-    it started took six seconds.
-    """
+    """Signals become exceptions; where the process is ours `alone`, it ends in time, too."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-
-    def end(number: int, frame: FrameType | None) -> NoReturn:
-        if alone:
-            last = threading.Timer(LAST_S, _end_by_force, [128 + number])
-            last.daemon = True
-            last.start()
-        signal.signal(number, signal.SIG_IGN)
-        raise _Stopped(number)
-
-    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGINT)}
+    signals, told = _Signals(alone), sys.unraisablehook
+    sys.unraisablehook = lambda lost: None if lost.exc_type is _Stopped else told(lost)
+    handled = (signal.SIGTERM, signal.SIGINT)
+    before = {number: signal.signal(number, signals.raised) for number in handled}
     try:
         yield
+    except Exception:
+        if signals.number is None:
+            raise
     finally:
+        signals.end()
+        sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
+    if signals.number is not None:
+        raise _Stopped(signals.number)
 
 
 def _end_by_force(status: int) -> None:

@@ -488,6 +488,8 @@ class TestReport:
     def three(self, phantom: Path, tmp_path: Path) -> Path:
         """A study of which one recording is bad and two have the same name."""
         (tmp_path / "bad.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
+        (tmp_path / "again").mkdir()
+        (tmp_path / "again" / phantom.name).write_bytes(phantom.read_bytes())
         (tmp_path / "study.toml").write_text(
             f"""
             [device]
@@ -501,7 +503,7 @@ class TestReport:
             file = "bad.csv"
             level = 2
             [[recording]]
-            file = "{phantom.as_posix()}"
+            file = "again/{phantom.name}"
             """
         )
         return tmp_path / "study.toml"

@@ -152,6 +152,40 @@ files.write_whole(Path({str(tmp_path / "index.html")!r}), "half")
     assert not os.listdir(tmp_path)
 
 
+LOST = """
+import ctypes, sys, time
+from bayeshaptic import cli
+from bayeshaptic.commands import explain
+def called():
+    print("here", flush=True)
+    time.sleep({seconds})
+def run(arguments):
+    ctypes.CFUNCTYPE(None)(called)()  # what is raised in there is lost
+    if {fails}:
+        raise RuntimeError("no compiled object yet")
+    time.sleep(60)
+explain.run = run
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("fails", [False, True])
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_was_lost_is_raised_again(sign: int, fails: bool) -> None:
+    words = [sys.executable, "-c", LOST.format(seconds=30, fails=fails), "explain", "units"]
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None and process.stdout.readline() == "here\n"
+        began = time.monotonic()
+        process.send_signal(sign)
+        _, told = process.communicate(timeout=30)
+        assert time.monotonic() - began < 3.0
+    word = "terminated" if sign == signal.SIGTERM else "interrupted"
+    assert process.returncode == 128 + sign and told.count("\n") == 1 and word in told
+
+
 STUCK = """
 import time
 from bayeshaptic import cli
