@@ -109,6 +109,8 @@ def check_fields(thing: Any, names: Names) -> None:
         Where a field cannot be; the message names it.
     """
     for field in fields(thing):
+        if isinstance(getattr(thing, field.name), Fraction):
+            object.__setattr__(thing, field.name, float(getattr(thing, field.name)))
         _check(field.name, getattr(thing, field.name), str(field.type), names)
 
 

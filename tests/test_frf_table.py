@@ -195,6 +195,11 @@ def test_a_table_of_a_device_that_cannot_be_is_a_slip_of_units(
     assert bool(compared) == bool(told)
 
 
+def test_a_table_that_is_noise_alone_says_nothing_of_units(tmp_path: Path) -> None:
+    table = read_frf(write(tmp_path / "a.csv", **base(sd=9 * np.abs(RESPONSE))), 1e-3)
+    assert check_table(table) == ()
+
+
 def test_the_check_of_a_table_reaches_the_report(tmp_path: Path) -> None:
     columns = base(sd=1e-2 * np.abs(RESPONSE) * 1e4) | {"gain_db": GAIN_DB + 80}
     table = read_frf(write(tmp_path / "a.csv", **columns), 1e-3, "gain_db=gain_db[m/N]")

@@ -167,6 +167,7 @@ WRONG = {
     f"{DEVICE}{RECORDING}rows=[1.5, 9]\n": "rows are counted from 1 .*, and 1.5 is none",
     f"{DEVICE}{RECORDING}rows=[1, 9]\nseconds=[0, 1]\n": "both rows and seconds are given",
     f"{DEVICE}{RECORDING}{RECORDING}": r"recording 2: a\.csv is recording 1 already, and would",
+    f"{DEVICE}columns='force=u'\n{RECORDING}{RECORDING}columns='force=u'\n": "recording 1 already",
     f"{DEVICE}{RECORDING}user='A'\n{RECORDING}user='B'\n": "recording 2: a.csv is recording 1",
     f"{DEVICE}{RECORDING}rows=[1, 9]\n{RECORDING.replace('a.csv', './a.csv')}": "is recording 1",
     f"{DEVICE}{RECORDING}rows=[1, 9]\n{RECORDING}rows=[8, 20]\n": "is recording 1 already",

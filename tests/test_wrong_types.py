@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -151,7 +152,7 @@ def test_the_line_says_what_to_give(call: Callable[[], Any], words: str) -> None
     [
         partial(bh.Normal, np.float64(1), np.float32(2)),
         partial(bh.Options, seed=np.int64(3), band_hz=[1, 200], delay_sd_s=float("inf")),
-        partial(bh.Options, progress=True, prior=None),
+        partial(bh.Options, progress=True, prior=None, delay_s=Fraction(1, 5000)),
         partial(LIMIT.quantile, np.array([0.1, 0.9])),
         partial(LIMIT.probability_unstable, 3),
         partial(bh.recording_from_arrays, [1, 2] * 9, [3, 4] * 9, 1e-3),

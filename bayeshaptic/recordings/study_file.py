@@ -81,7 +81,7 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
         _entry(entry, f"{path}, recording {number}", path.parent, home)
         for number, entry in enumerate(entries, start=1)
     ]
-    _refuse_twice(read, path)
+    _refuse_twice(read, columns, path)
     return Study(
         name=path.stem,
         path=path,
@@ -103,13 +103,16 @@ def _pool(table: Table) -> bool | None:
     return value
 
 
-def _refuse_twice(entries: Sequence[StudyEntry], path: Path) -> None:
+def _refuse_twice(entries: Sequence[StudyEntry], columns: Columns, path: Path) -> None:
     """Refuse samples that are listed twice: they would count as twice the data."""
     known: dict[Path, list[tuple[int, StudyEntry]]] = {}
     for number, entry in enumerate(entries, start=1):
         others = known.setdefault(entry.path.resolve(), [])
         for other, earlier in others:
-            if _overlap(entry, earlier):
+            alike = parse_columns(entry.columns or columns) == parse_columns(
+                earlier.columns or columns
+            )
+            if alike and _overlap(entry, earlier):
                 raise InputError(
                     f"{path}, recording {number}: {entry.path.name} is recording {other} already, "
                     "and would count as twice the data; leave one out, or give each rows or "
@@ -119,9 +122,7 @@ def _refuse_twice(entries: Sequence[StudyEntry], path: Path) -> None:
 
 
 def _overlap(one: StudyEntry, other: StudyEntry) -> bool:
-    """Whether two entries of one file have samples in common; columns of their own are others."""
-    if one.columns != other.columns:
-        return False
+    """Whether two entries of the same columns of one file have samples in common."""
     if (one.rows and other.seconds) or (one.seconds and other.rows):  # only the file could tell
         return False
     spans = [entry.rows or entry.seconds for entry in (one, other)]

@@ -22,6 +22,7 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.rough_response import RoughResponse, rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER, unusual_period
 from bayeshaptic.recordings.units import refuse_mixed_units
+from bayeshaptic.types import Bools
 
 USUAL_SECONDS = 30
 # Of a table: the relative standard deviation from which a row tells no size, and the steps.
@@ -97,15 +98,16 @@ def check_table(table: Etfe, device: Device | None = None) -> tuple[Notice, ...]
         For a table that is not of the device's kind.
     """
     _refuse_other_kind(table.position_unit, device, "the table")
-    return against_response(_unusual(table.period_s), table, device, _evenly(table))
-
-
-def _evenly(table: Etfe) -> RoughResponse:
-    """The size of a table's response where it is clear, at even steps as those of a recording."""
+    told = tuple(_unusual(table.period_s))
     clear = table.relative_sd < MOST_UNSURE
+    if not clear.any():
+        return told
+    return against_response(told, table, device, _evenly(table, clear))
+
+
+def _evenly(table: Etfe, clear: Bools) -> RoughResponse:
+    """The size of a table's response where it is clear, at even steps as those of a recording."""
     frequency = table.frequency_hz[clear]
-    if not len(frequency):
-        return RoughResponse(*np.zeros((3, 0)))
     even = np.linspace(frequency[0], frequency[-1], EVEN_LINES)
     size = np.exp(np.interp(even, frequency, np.log(np.abs(table.value[clear]))))
     return RoughResponse(even, size.astype(complex), np.ones_like(even))
