@@ -163,9 +163,11 @@ def test_less_delay_than_was_told_gets_no_stiffness(told_s: float) -> None:
 
 
 def test_every_piece_is_moved_by_itself() -> None:
-    counts = np.arange(600.0)
-    one = recording_from_arrays(counts, 2 * counts, 1e-3, force_unit="N", position_unit="m")
-    moved = with_rows_moved(join_recordings([one, one]), 2)
+    one, other = (
+        recording_from_arrays(force, 2 * force, 1e-3, force_unit="N", position_unit="m")
+        for force in (np.arange(600.0), np.arange(600.0) + 1)
+    )
+    moved = with_rows_moved(join_recordings([one, other]), 2)
     assert moved.joints == (598,) and moved.samples == 1196
     for piece in moved.pieces:
         assert np.array_equal(2 * piece.force, piece.position + 4)
