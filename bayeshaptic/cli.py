@@ -143,7 +143,7 @@ class _Signals:
             self.number = number
             # Not by `threading`, whose locks the interrupted frame may hold.
             _thread.start_new_thread(self._insist, (number,))
-        if not _on_its_way():
+        if not self.over and not _on_its_way():
             raise _Stopped(self.number)
 
     def _insist(self, number: int) -> None:
