@@ -330,6 +330,13 @@ def test_commas_between_thousands_are_no_decimal_ones(tmp_path: Path, name: str)
         read_recording(path, "time=t,force=u,position=q[um]")
 
 
+def test_points_and_commas_are_no_one_decimal_sign(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;u;q\n0;0,5;1.234\n1;1,5;2.345\n", encoding="utf-8")
+    with pytest.raises(InputError, match="'0,5' is not a number in row 1; write all with one dec"):
+        read_recording(path, "time=t,force=u,position=q[mm]")
+
+
 @pytest.mark.parametrize(
     "text",
     [

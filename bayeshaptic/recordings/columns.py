@@ -287,7 +287,7 @@ def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:
     if text == NO_NUMBERS:
         raise InputError(f"{where} is there, but holds {text}; save it as such")
     what = f"'{text}' is not a number" if str(text).strip() else "there is no number"
-    cure = "mend or remove the row"
+    cure = "write all with one decimal sign" if "," in str(text) else "mend or remove the row"
     if THOUSANDS.fullmatch(str(text)):
         what, cure = f"thousands separators ('{text}')", "write the numbers without them"
     raise InputError(f"{where}: {what} in row {row}; {cure}")
