@@ -39,7 +39,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "delay_sd_s": (0, math.inf, "of at least 0, in seconds"),
     **dict.fromkeys(("risk", "risks"), (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01")),
     "p": (0, 1, "between 0 and 1, as in 0.05"),
-    **dict.fromkeys(("theta", "start"), (-1e300, 1e300, "other than NaN or infinity")),
+    "start": (-1e300, 1e300, "other than NaN or infinity"),
     **dict.fromkeys(("stiffness", "damping"), (-math.inf, math.inf, "other than NaN")),
 }
 """Lowest and highest value of numbers by their name, and how to say it."""

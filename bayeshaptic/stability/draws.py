@@ -54,9 +54,11 @@ def vectors_given(model: Model, theta: ArrayLike) -> Floats:
     Raises
     ------
     InputError
-        For another number of parameters, and for a mass that is none.
+        For what is no number, another number of parameters, and a mass that is none.
     """
     vectors = np.atleast_2d(np.asarray(theta, float))
+    if not np.all(np.isfinite(vectors)):
+        raise InputError(f"theta is {shown(theta)}; give numbers other than NaN or infinity")
     model.system(vectors[:1])  # which says how many there are
     for column, parameter in enumerate(model.parameters):
         if parameter.dimension == "mass" and not np.all(vectors[:, column] > 0):
