@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_response import from_poles
 
 from bayeshaptic.models.build import build_model
-from bayeshaptic.models.response.sampled import from_poles
 from bayeshaptic.numerics.polynomial import evaluate, multiply, roots
 from bayeshaptic.numerics.polynomial_roots import find_roots
 from bayeshaptic.stability.crossings import _compiled_search, find_crossings, plain_search
