@@ -52,22 +52,6 @@ _USUAL = (
 )
 
 
-def refuse_too_little(recording: Recording) -> None:
-    """Refuse a recording that says too little of the device.
-
-    Parameters
-    ----------
-    recording : Recording
-        In open loop; of one with feedback no stiffness is recommended anyway.
-
-    Raises
-    ------
-    InputError
-        With the reason, and what to do.
-    """
-    refuse_where_told(recording, too_little(recording))
-
-
 def too_little(recording: Recording) -> tuple[Notice, ...]:
     """The warning that a recording in open loop says too little, and what to do; or none."""
     reasons = (look(recording) for look in _LOOKS)
