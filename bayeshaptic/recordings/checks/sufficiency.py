@@ -17,6 +17,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
+from bayeshaptic.recordings.signals.runs import longest, runs
 from bayeshaptic.recordings.signals.sweeps import moves_until
 from bayeshaptic.types import Bools, Floats
 
@@ -151,10 +152,12 @@ def few_tones(recording: Recording) -> str | None:
 
 def _no_force(recording: Recording) -> str | None:
     force = recording.force
-    idle = _long(force == 0, round(_IDLE_S / recording.period_s))
+    idle = np.zeros(len(force), dtype=bool)
+    for first, stop in zip(*runs(force == 0), strict=True):
+        idle[first:stop] = stop - first >= round(_IDLE_S / recording.period_s)
     if np.mean(idle) <= MOST_IDLE:
         return None
-    first, stop = _longest(~idle)
+    first, stop = longest(~idle)
     if stop - first < max(FEWEST_SAMPLES, SHORTEST_S / recording.period_s):
         cure = "excite the device all the time, and record again"
     else:
@@ -235,21 +238,3 @@ _LOOKS: tuple[Callable[[Recording], str | None], ...] = (
     _standstill,
     _unanswered,
 )
-
-
-def _long(flags: Bools, least: int) -> Bools:
-    """Only the runs of at least so many samples."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    kept = np.zeros(len(flags), dtype=bool)
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        kept[start:stop] = stop - start >= least
-    return kept
-
-
-def _longest(flags: Bools) -> tuple[int, int]:
-    """The longest run: its first index, and the one behind its last; (0, 0) where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
-    if len(edges) == 0:
-        return 0, 0
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    return int(edges[2 * longest]), int(edges[2 * longest + 1])

@@ -20,6 +20,7 @@ from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.recordings.checks.sufficiency import standstill
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.runs import runs
 from bayeshaptic.types import Floats
 
 # A hand wanders below this; what it does above falls so steeply that the velocity's whole band
@@ -89,9 +90,9 @@ def _rests(recording: Recording) -> list[tuple[int, int]]:
     count, length = standstill(recording)
     position = recording.position
     span = maximum_filter1d(position, length) - minimum_filter1d(position, length)
-    still = maximum_filter1d((span <= 1.01 * count).astype(int), length)
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], still, [0]])))
-    return list(zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True))
+    still = maximum_filter1d((span <= 1.01 * count).astype(int), length) > 0
+    starts, stops = runs(still)
+    return list(zip(starts.tolist(), stops.tolist(), strict=True))
 
 
 def _knots(recording: Recording) -> list[Floats]:
