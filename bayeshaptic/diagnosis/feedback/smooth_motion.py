@@ -6,8 +6,8 @@ from dataclasses import astuple, dataclass, field
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.signal import butter, sosfiltfilt
 
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Bools, Floats
@@ -28,12 +28,6 @@ class SmoothMotion:
     velocity: Floats = field(repr=False)
     acceleration: Floats = field(repr=False)
     jerk: Floats = field(repr=False)
-
-
-def smoothed(signal: Floats, cutoff_hz: float, period_s: float) -> Floats:
-    """Zero-phase low-pass, Butterworth, order 4, forwards and backwards."""
-    low = butter(4, cutoff_hz, fs=1 / period_s, output="sos")
-    return np.asarray(sosfiltfilt(low, signal))
 
 
 def count_of(recording: Recording) -> float:
@@ -89,7 +83,7 @@ def at_rest(recording: Recording, cutoff_hz: float) -> Bools:
 
 def smooth_motion(recording: Recording, cutoff_hz: float) -> SmoothMotion:
     """Low-passed, and central differences."""
-    x = smoothed(recording.position, cutoff_hz, recording.period_s)
+    x = low_pass(recording.position, cutoff_hz, recording.period_s)
     v = np.gradient(x, recording.period_s)
     a = np.zeros_like(x)
     a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / recording.period_s**2

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.unforced import drifts, parts, slow_motion, slow_share
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass, slow_share
+from bayeshaptic.diagnosis.residuals.unforced import drifts, parts
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.response.motion import linear_motion
@@ -41,7 +42,7 @@ def drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Float
 
 def slow_velocity(position: Floats, period_s: float) -> Floats:
     """The velocity below the frequencies of hands, shape (N,)."""
-    return np.gradient(slow_motion(position, period_s, _edge_hz(period_s)), period_s)
+    return np.gradient(low_pass(position, _edge_hz(period_s), period_s), period_s)
 
 
 def moved_besides(fit: Fit, recording: Recording) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from bayeshaptic.diagnosis.residuals.unforced import HAND_ORDER
+from bayeshaptic.diagnosis.residuals.low_pass import ORDER
 from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.recordings.checks.sufficiency import standstill
@@ -115,7 +115,5 @@ def _pulses(knots: Floats, samples: int) -> Iterator[Floats]:
 
 def _fast_velocity(motion: Floats, period_s: float, edge_hz: float) -> Floats:
     """The velocity of a motion, shape (N, ...), between where hands wander and the edge."""
-    band = butter(
-        HAND_ORDER, [_WANDERS_HZ, edge_hz], btype="bandpass", fs=1 / period_s, output="sos"
-    )
+    band = butter(ORDER, [_WANDERS_HZ, edge_hz], btype="bandpass", fs=1 / period_s, output="sos")
     return np.asarray(np.gradient(sosfiltfilt(band, motion, axis=0), period_s, axis=0))

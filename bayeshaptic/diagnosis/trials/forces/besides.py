@@ -19,7 +19,8 @@ import numpy as np
 from numpy.linalg import lstsq
 from scipy.fft import next_fast_len
 
-from bayeshaptic.diagnosis.residuals.unforced import parts, slow_motion, slow_share
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass, slow_share
+from bayeshaptic.diagnosis.residuals.unforced import parts
 from bayeshaptic.diagnosis.trials.forces.at_rest import AtRest
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.types import Floats
@@ -80,7 +81,7 @@ class Hand:
 
     def of(self, left: Floats) -> Floats:
         hand = left if self.rests is None else self.rests.smoothest(left)
-        return slow_motion(hand, self.period_s, self.edge_hz)
+        return low_pass(hand, self.edge_hz, self.period_s)
 
     def off(self, taken: Floats, rest: Floats) -> Floats:
         return self.of(taken + rest) - taken
