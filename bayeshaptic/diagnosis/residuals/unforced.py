@@ -45,8 +45,8 @@ def hand_edge_hz(position: Floats, period_s: float) -> float:
     return float(np.clip((_NOISE * velocity / unit) ** (2 / 3), min(_LEAST_HZ, most), most))
 
 
-def drifts(system: LinearSystem, samples: int, period_s: float) -> Floats:
-    """Standing still, and what a constant force and a push do, shape (N, 3)."""
+def coasting_motions(system: LinearSystem, samples: int, period_s: float) -> Floats:
+    """Of a free device: standing still, and what a constant force and a push do, shape (N, 3)."""
     steady = np.ones(samples)
     return np.stack([steady, *linear_motion(system, steady, period_s)], axis=1)
 
@@ -75,5 +75,5 @@ def fitted_motion(fit: Fit, recording: Recording, acted: Floats | float) -> Floa
     if fit.model.held:
         edge_hz = hand_edge_hz(recording.position + acted, period_s)
         return np.asarray(acted + known + low_pass(left, edge_hz, period_s))
-    columns = drifts(system, len(left), period_s)
+    columns = coasting_motions(system, len(left), period_s)
     return np.asarray(acted + known + columns @ parts(columns, left))

@@ -1,4 +1,4 @@
-"""The motion that neither the command nor forces make: a hand's, or a free device's drift.
+"""The motion that neither the command nor forces make: a hand's, or a free device's coasting.
 
 It is read off the encoder: what is measured, less what command and forces do.  Forces act in it,
 so that what they do and it must be found together.  One read off beside what forces did in the
@@ -111,14 +111,14 @@ class HandAfar(Hand):
 
 
 @dataclass(frozen=True)
-class Drift:
+class Coasting:
     """A free device's: how it began to move, and a constant force.
 
     Attributes
     ----------
     own, usual : ndarray, shape (N, 2 or 3)
-        `drifts` of the mechanism without forces, and of that with what they do on the average;
-        as many as are `remembered`.
+        `coasting_motions` of the mechanism without forces, and of that with what they do on the
+        average; as many as are `remembered`.
     mean : float
         Of the command: a force that is constant, and no other, as long as nothing else is known.
     """
@@ -166,7 +166,7 @@ class Nothing:
 
 
 def remembered(columns: Floats) -> Floats:
-    """`drifts` without the push where that is forgotten within a hundredth of the recording.
+    """`coasting_motions` without the push where a hundredth of the recording forgets that.
 
     It cannot be told from standing elsewhere then; but where forces are taken for less than they
     are it goes far.
