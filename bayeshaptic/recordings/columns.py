@@ -44,6 +44,7 @@ _PLAIN_HEADERS = {
     "position": ("position", "angle"),
 }
 
+_MOST_LISTED = 20  # arrays of a file in a message, which is one line
 _EXAMPLE = "time=t,force=u,position=q"
 _WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*[(\[](?P<unit>[^()\[\]]+)[)\]]")
 _EXPRESSION = re.compile(
@@ -263,7 +264,7 @@ def column_of(arrays: Arrays, role: str, mapping: Mapping[str, Column]) -> str |
     return next((key for name in names if (key := _find(arrays, name)) is not None), None)
 
 
-def listing(arrays: Arrays, most: int = 20) -> str:
+def listing(arrays: Arrays) -> str:
     """The names of a file's arrays and their lengths, the longest first, single numbers not."""
     names: dict[int, list[str]] = {}
     for name, values in arrays.items():
@@ -271,7 +272,8 @@ def listing(arrays: Arrays, most: int = 20) -> str:
             names.setdefault(id(values), []).append(name)
     lines = [f"{' = '.join(same)} ({len(arrays[same[0]])})" for same in names.values()]
     lines.sort(key=lambda line: -int(line.rpartition("(")[2][:-1]))
-    return ", ".join(lines[:most]) + (f" and {len(lines) - most} more" if len(lines) > most else "")
+    more = len(lines) - _MOST_LISTED
+    return ", ".join(lines[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:
