@@ -15,7 +15,7 @@ from bayeshaptic.types import Bools, Floats
 _BAND = 0.05  # of the sampling rate: in which the motion that laws are over is smooth
 # Of the acceleration's power, that counts may be. Of 20 loops of one mass of another simulation six
 # have more, 0.23 to 0.62, and four of these were not known as one mass; of ten with a mode or a
-# hand nine have less than 0.001, and are as before.
+# hand nine have less than 0.001, and keep their cut-off.
 _MOST_COUNTS = 0.05
 _FEWEST_PERIODS = 54  # of the cut-off, in a recording: what inverse dynamics need
 

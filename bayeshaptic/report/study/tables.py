@@ -144,7 +144,7 @@ def unstated(study: StudyAnalysis) -> str:
 
 
 def binding(study: StudyAnalysis) -> Rows:
-    """Every case: (case, group, median in dB, 90 % interval, probability that it binds)."""
+    """Every case: (case, median in dB, 90 % interval, probability that it binds)."""
     assert study.limit is not None
     cases = {case.label: case for case in study.cases}
     rows = []
