@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,16 @@ from bayeshaptic.inference.sampling.near_zero import Redraw, reached, start_of
 from bayeshaptic.inference.sampling.proposal import Proposal
 from bayeshaptic.inference.sampling.several_peaks import covered, log_held
 from bayeshaptic.numerics.gauss_newton import minimise
+from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.types import Floats, LogDensity
 
-_MOST = 6  # peaks that are looked at
-_SLIGHT = 7.0  # log of a peak's probability below the largest, from which on it is left out
+_MOST = 6  # peaks
+_IDLE = 2  # that turn out to be none, after which no more are looked for
+_SHARED = 0.5  # of walkers that lie where others have been: it is their peak
+_LOOKED_AT = 12  # ends of the fit, by their densities
+# Log of a peak's probability below the largest, from which on it is left out: as its draws say, and
+# as those of Laplace's approximation do, which miss most of a bent one.
+_SLIGHT, _TOO_SLIGHT = 7.0, 14.0
 
 
 def warmed_up_about_peaks(
@@ -52,26 +58,54 @@ def warmed_up_about_peaks(
     peak, first = laplace(density, origin)
     found = [warmed_up(counted, first, seed, peak, redraw, most_steps)]
     held = [log_held(counted, found[0].proposal)]
-    tried = 1
-    for start in _others(density, fit, found[0]):
-        if tried == _MOST:
+    idle = 0
+    for one in _candidates(counted, density, fit, found[0]):
+        if len(found) == _MOST or idle == _IDLE or one.held < max(held) - _TOO_SLIGHT:
             break
-        if any(covered(one.proposal, start[None])[0] for one in found):
+        if _share_covered(found, one.best) > _SHARED:
             continue
-        tried += 1
-        peak, first = laplace(density, start)
         (own,) = seed.spawn(1)
-        about = warmed_up(counted, first, own, peak, redraw, most_steps / _MOST)
+        about = warmed_up(counted, one.proposal, own, one.peak, redraw, most_steps / _MOST)
         share = log_held(counted, about.proposal)
-        there = [float(covered(one.proposal, about.positions).mean()) for one in found]
-        if share > max(held) - _SLIGHT and max(there) < 0.5:  # not where others have been
+        idle += 1
+        if share > max(held) - _SLIGHT and _share_covered(found, about.positions) < _SHARED:
             found.append(about)
             held.append(share)
+            idle = 0
     kept = [index for index, share in enumerate(held) if share > max(held) - _SLIGHT]
     if len(kept) == 1:
         return found[kept[0]]
     (last,) = seed.spawn(1)
     return joined(counted, [found[i] for i in kept], np.array([held[i] for i in kept]), last)
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """Laplace's approximation around a peak; how much it holds, and the best of some draws."""
+
+    peak: Floats
+    proposal: StudentMixture
+    held: float
+    best: Floats
+
+
+def _candidates(
+    counted: LogDensity, density: Density, fit: Fit, own: Ensembles[Proposal]
+) -> list[_Candidate]:
+    """Peaks about which one might warm up, those that seem to hold the most first."""
+    found = []
+    for start in _others(density, fit, own)[:_LOOKED_AT]:
+        peak, first = laplace(density, start)
+        draws = first.sample(np.random.default_rng(0), 200)
+        weights = counted(draws) - first.log_density(draws)
+        held = float(np.logaddexp.reduce(weights) - np.log(len(draws)))
+        found.append(_Candidate(peak, first, held, draws[np.argsort(weights)[-20:]]))
+    return sorted(found, key=lambda one: one.held, reverse=True)
+
+
+def _share_covered(found: list[Ensembles[Proposal]], points: Floats) -> float:
+    """Of points, shape (B, P), the share that the proposal draws which draws the most of them."""
+    return max(float(covered(one.proposal, points).mean()) for one in found)
 
 
 def _others(density: Density, fit: Fit, own: Ensembles[Proposal]) -> list[Floats]:
