@@ -38,7 +38,7 @@ class Scale:
             return _NOTHING
         scaled = value * self.factor
         decimals = _decimals(scaled, None if sd is None else sd * self.factor, digits, least)
-        return _minus(f"{round(scaled, decimals) + 0.0:.{max(decimals, 0)}f}")
+        return minus(f"{round(scaled, decimals) + 0.0:.{max(decimals, 0)}f}")
 
     def with_error(self, value: float | None, sd: float | None) -> str:
         """A number and its error with as many decimals: ``"0.590 ± 0.020"``; alone without one."""
@@ -170,7 +170,7 @@ def pure(value: float, digits: int = 3) -> str:
     """A number without a unit and without powers of ten: ``"10,400"``, ``"0.957"``."""
     if not math.isfinite(value):
         return _NOTHING
-    return _minus(f"{float(f'{value:.{digits}g}'):,.10g}")
+    return minus(f"{float(f'{value:.{digits}g}'):,.10g}")
 
 
 def percent(probability: float) -> str:
@@ -212,5 +212,6 @@ def _decimals(value: float, sd: float | None, digits: int, least: int) -> int:
     return min(max(wanted, least - 1 - exponent) if least else wanted, most_digits - 1 - exponent)
 
 
-def _minus(text: str) -> str:
+def minus(text: str) -> str:
+    """The text of a number with minus signs for its hyphens."""
     return text.replace("-", "\N{MINUS SIGN}")

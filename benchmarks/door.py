@@ -24,7 +24,7 @@ from typing import Any
 
 from bayeshaptic import analyse
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.checks.sufficiency import refuse_too_little
+from bayeshaptic.recordings.checks.sufficiency import refuse_where_told, too_little
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import causality
 from bayeshaptic.recordings.signals.controller import share_by_a_law
@@ -120,7 +120,7 @@ def replayed(case: Case) -> Recording:
 def limits(recording: Recording, case: Case) -> list[float] | str:
     """K_CR's 90 % interval without the loop; or in short why there is none."""
     try:
-        refuse_too_little(recording)
+        refuse_where_told(recording, too_little(recording))
         limit = analyse(recording, case.device.split()[1], ess=150.0).limit
     except InputError as error:
         return str(error)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from plain_alias_series import from_polynomials
 
 from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
+from bayeshaptic.models.response.motion import phi
 from bayeshaptic.models.response.poles import poles_and_residues
-from bayeshaptic.models.response.sampled import from_poles, from_polynomials
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.types import Bools, Complexes, Floats
@@ -37,6 +38,39 @@ def plain_response(
                 )
                 response[bad] = from_poles(*poles, delay_s[bad], frequency_hz, period_s)
     return response
+
+
+def from_poles(
+    poles: Complexes, residues: Complexes, delay_s: Floats, frequency_hz: Floats, period_s: float
+) -> Complexes:
+    """Sampled response from poles and residues of the continuous transfer function: exact.
+
+    Ill-conditioned beside a double pole, and as slow as the eigenvalues it needs.
+
+    Parameters
+    ----------
+    poles, residues : ndarray, shape (B, n)
+    delay_s : ndarray, shape (B,)
+    frequency_hz : ndarray, shape (L,) or (B, L)
+    period_s : float
+
+    Returns
+    -------
+    ndarray of complex, shape (B, L)
+    """
+    whole = np.floor(delay_s / period_s)
+    late = np.clip(delay_s - whole * period_s, 0.0, period_s)[:, None]
+    early = period_s - late
+    s = 2j * np.pi * np.atleast_2d(frequency_hz)
+    back = np.exp(-s * period_s)
+    first = residues * early * phi(poles * early)
+    second = residues * np.exp(poles * early) * late * phi(poles * late)
+    # 1 - e^{(p - s) T} = z^-1 ((z - 1) - (e^{pT} - 1)): accurate where p and s are both near zero.
+    point, centre = np.expm1(s * period_s), np.expm1(poles * period_s)
+    total = np.zeros(np.broadcast_shapes(back.shape, (len(poles), 1)), complex)
+    for i in range(poles.shape[1]):
+        total += (first[:, i, None] + back * second[:, i, None]) / (point - centre[:, i, None])
+    return total * np.exp(-s * whole[:, None] * period_s)
 
 
 def _by_polynomials(

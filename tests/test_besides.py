@@ -47,7 +47,7 @@ def simulated(held: bool) -> tuple[Simulation, Floats, float]:
 
 @pytest.mark.parametrize(("held", "counts"), [(False, 8.0), (True, 0.6)])
 def test_friction_that_is_nearly_all_damping_leaves_little(held: bool, counts: float) -> None:
-    """97 and 0.8 of the encoder's counts beside the first guess of drift and hand."""
+    """97 and 0.8 of the encoder's counts beside the first guess of coasting and hand."""
     simulation, theta, count = simulated(held)
     recording = simulation.recording
     friction = (Acting(CoulombFriction(MOTOR), FRICTION),)
@@ -76,7 +76,7 @@ def test_forces_that_are_not_those_that_acted_settle_too(held: bool, factor: flo
 
 
 def test_what_a_force_adds_is_known_to_first_order_from_another_near_by() -> None:
-    """With the drift that goes with friction of a fiftieth more; or it is off by all of that."""
+    """With the coasting that goes with friction of a fiftieth more; or it is off by all of that."""
     simulation, theta, _ = simulated(held=False)
     now, then = ((Acting(CoulombFriction(MOTOR), factor * FRICTION),) for factor in (1.0, 1.02))
     added = simulation.added(now, theta)

@@ -56,8 +56,7 @@ def outcome(
         tried.append(base)
         return by_name[base]
 
-    monkeypatch.setattr(best_in_any_loop, "untraced", lambda state, tests: state.fit.model.name)
-    monkeypatch.setattr(best_in_any_loop, "residual_tests", lambda fit, etfe: ())
+    monkeypatch.setattr(best_in_any_loop, "untraced", lambda state: state.fit.model.name)
     monkeypatch.setattr(best_in_any_loop, "trace_by_all_lines", traced)
     monkeypatch.setattr(best_in_any_loop, "stands", lambda one: one.verdict != UNEXPLAINED)
     monkeypatch.setattr(best_in_any_loop, "criterion", lambda one, _: one.score)

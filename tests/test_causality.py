@@ -5,7 +5,7 @@ Error rates over hundreds of recordings are in `benchmarks/door.py`.
 
 from __future__ import annotations
 
-import os
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -32,9 +32,6 @@ from bayeshaptic.recordings.signals.switching import is_switched
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 from benchmarks.strangers.loops import make
 
-MEASURED = Path(
-    os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
-)
 SAMPLES = 12_000
 BANDS = (100.0, 200.0, 300.0, 500.0)
 
@@ -320,27 +317,21 @@ def test_short_recordings(samples: int) -> None:
     assert judge(position, force).swapped
 
 
-def measured(name: str, columns: str) -> Causality:
-    path = MEASURED / name
-    if not path.exists():
-        pytest.skip(f"measured recording not found: {path} (set BAYESHAPTIC_MEASURED)")
-    return causality(read_recording(path, columns))
-
-
-def test_the_measured_servo_is_feedback() -> None:
-    found = measured("emps/DATA_EMPS.mat", "time=t,force=vir*35.15[N],position=qm[m]")
+def test_the_measured_servo_is_feedback(measured: Callable[[str], Path]) -> None:
+    columns = "time=t,force=vir*35.15[N],position=qm[m]"
+    found = causality(read_recording(measured("emps/DATA_EMPS.mat"), columns))
     assert found.has_feedback
     assert found.same_sample.value < -0.3
 
 
-def test_the_measured_bench_is_open_loop() -> None:
-    name = "two_mass_bench/MultisineTypeA.mat"
+def test_the_measured_bench_is_open_loop(measured: Callable[[str], Path]) -> None:
+    path = measured("two_mass_bench/MultisineTypeA.mat")
     columns = "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]"
-    found = measured(name, columns)
+    found = causality(read_recording(path, columns))
     assert not (found.has_feedback or found.swapped or found.early_position)
     assert found.answer.value > 0.3
     swapped = "time=time*1e-6,force=theta_mx[N],position=iq_refx[m]"
-    assert measured(name, swapped).swapped
+    assert causality(read_recording(path, swapped)).swapped
 
 
 def a_motor(noise: float) -> tuple[np.ndarray, np.ndarray]:

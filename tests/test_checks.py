@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -25,10 +25,6 @@ from bayeshaptic.recordings.checks.units_in_doubt import in_doubt, steps_of_a_tu
 from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.recordings.read import recording_from_arrays
 from bayeshaptic.recordings.units import is_assumed
-
-MEASURED = Path(
-    os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
-)
 
 
 @cache
@@ -251,7 +247,7 @@ def test_a_doubt_of_feedback_is_no_certainty(monkeypatch: pytest.MonkeyPatch) ->
         assert topics(notices) == ["feedback"] and is_certain(notices) == has_feedback
 
 
-def test_the_measured_recordings() -> None:
+def test_the_measured_recordings(measured: Callable[[str], Path]) -> None:
     for name, columns, expected in (
         ("emps/DATA_EMPS.mat", "time=t,force=vir*35.15[N],position=qm[m]", ["feedback"]),
         (
@@ -260,10 +256,7 @@ def test_the_measured_recordings() -> None:
             [],
         ),
     ):
-        path = MEASURED / name
-        if not path.exists():
-            pytest.skip(f"measured recording not found: {path} (set BAYESHAPTIC_MEASURED)")
-        notices = check_recording(read_recording(path, columns))
+        notices = check_recording(read_recording(measured(name), columns))
         assert [notice.topic for notice in notices] == expected
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from linear_bench import (
@@ -25,11 +22,6 @@ from bayeshaptic.recordings.response.estimators.random_excitation import points
 from bayeshaptic.recordings.signals.excitation import Repetition, excited_lines, find_repetition
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
 
-MEASURED = Path(
-    os.environ.get(
-        "BAYESHAPTIC_MEASURED", Path(__file__).resolve().parents[2] / "shared" / "measured"
-    )
-)
 SYSTEMS = [
     pytest.param(LHIFAM_FREE, 1.0, 5e-7, id="lhifam-free"),
     pytest.param(PHANTOM_HELD, 0.02, 5e-5, id="phantom-held"),
@@ -367,13 +359,10 @@ def test_exactly_repeated_counts_have_a_variance():
     assert 0.5 < np.mean(np.abs(error) ** 2 / etfe.variance) < 1.5
 
 
-def test_measured_two_mass_bench():
+def test_measured_two_mass_bench(measured):
     from scipy.io import loadmat
 
-    path = MEASURED / "two_mass_bench" / "MultisineTypeA.mat"
-    if not path.exists():
-        pytest.skip(f"no measured recordings at {MEASURED}")
-    data = loadmat(path)
+    data = loadmat(measured("two_mass_bench/MultisineTypeA.mat"))
     force, position = data["iq_refx"].ravel(), data["theta_mx"].ravel()
     etfe = estimate_etfe(Recording(force, position, 4e-4, "A", "rad"))
     assert np.allclose(etfe.frequency_hz, np.arange(11, 251))

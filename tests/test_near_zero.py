@@ -248,6 +248,7 @@ def test_chains_that_agree_in_a_wrong_valley_have_not_converged(light, monkeypat
     scale = fit.model.prior("b1").scale
     prior = bh.NearZero(scale, 1e-6 * scale, 0.25)
     fit = bh.least_squares(fit.model.with_prior({"b1": prior, "b2": prior}), etfe, start=fit.theta)
+    fit = replace(fit, alike=fit.alike[:0])  # which would show the right one
     monkeypatch.setattr(sampler, "start_of", lambda here, fit: inside(here, fit, 0.3))
     posterior = bh.sample(fit.model, etfe, start=fit, ess=200, seed=1, most_evaluations=100_000)
     assert not posterior.converged and "best fit" in posterior.message
@@ -300,28 +301,61 @@ def test_two_small_dampers_whose_sum_is_known_are_sampled_over_all_of_it():
 
 
 def test_a_damper_that_others_are_measured_beside_has_less_for_more_of_them(light, monkeypatch):
-    """Also where one that follows too far is left out, and it follows that one then."""
+    """And is the one that ends first; what two known sums leave open is one damper, not two."""
     _, fit, _ = light
     plain = sampling_coordinates(fit.model, fit.theta, fit.sd)
     values = fit.theta / plain.scale
     dampers = [fit.model.names.index(name) for name in ("b1", "b2", "bc")]
-    small, left_out, largest = sorted(dampers, key=lambda index: values[index])
-    other = fit.model.names.index("kc")
+    small, middle, largest = sorted(dampers, key=lambda index: values[index])
     slope = np.zeros((4, len(values)))  # of a size that a change of each by itself is seen
     slope[:, small] = np.array([1e4, 0, 0, 0]) / values[small]
-    slope[:, left_out] = np.array([2e4, 1e4, 3, 0]) / values[left_out]
+    slope[:, middle] = np.array([2e4, 1e4, 3, 0]) / values[middle]
     slope[:, largest] = np.array([2e3, 1e4, 0, 0]) / values[largest]
-    slope[2, other] = 1.0
+    slope[2, fit.model.names.index("kc")] = 1.0
     prior = bh.MaybeZero(1.0)
     monkeypatch.setattr(near_zero, "_candidates", lambda *_: dict.fromkeys(dampers, prior))
     monkeypatch.setattr(near_zero, "_slope", lambda *_: slope)
-    both = with_near_zero(plain, fit)
-    assert both.beside == largest and set(both.near_zero) == {small, left_out}
+    two_sums = with_near_zero(plain, fit)
+    assert two_sums.near_zero == (small,) and two_sums.beside == middle
+    assert two_sums.follow[largest, 0] > 0  # it has more for more of the small one
+    slope[1] = 0.0
+    one_sum = with_near_zero(plain, fit)
+    assert one_sum.beside == largest and set(one_sum.near_zero) == {small, middle}
     monkeypatch.setattr(near_zero, "_LONGEST", 1.0)
-    here = with_near_zero(plain, fit)
-    assert left_out not in here.near_zero and small in here.near_zero
-    assert here.follow[largest, here.near_zero.index(small)] >= 0  # it has more for more of that
-    assert here.beside is None
+    followed = with_near_zero(plain, fit)
+    assert middle not in followed.near_zero and small in followed.near_zero
+    assert followed.beside is None  # the sum is not known where the one left out is not given
+
+
+def test_a_damper_that_the_fit_leaves_nothing_is_sampled_beside_the_others(light):
+    """In its logarithm others would bend along it, and chains stayed at one end of the ridge."""
+    _, fit, _ = light
+    bc = fit.model.names.index("bc")
+    theta, covariance = fit.theta.copy(), fit.covariance.copy()
+    theta[bc] = fit.model.prior("bc").quantile(1e-9)
+    covariance[bc] = covariance[:, bc] = np.nan  # at a bound
+    nothing = replace(fit, theta=theta, covariance=covariance)
+    plain = sampling_coordinates(nothing.model, nothing.theta, nothing.sd)
+    assert not plain.log[bc]
+    assert bc in with_near_zero(plain, nothing).near_zero
+
+
+def test_zero_weighs_no_more_than_there_is_room_for(light, monkeypatch):
+    """Of two dampers whose sum alone is known the error of each is many times that sum."""
+    _, fit, _ = light
+    plain = sampling_coordinates(fit.model, fit.theta, fit.sd)
+    whole, both = 4e-3, [fit.model.names.index(name) for name in ("b1", "b2")]
+    theta = fit.theta.copy()
+    theta[both] = whole, 0.0
+    slope = 1e6 * np.eye(len(theta))
+    slope[both] = 0.0
+    slope[both[0], both] = 1e6 * plain.scale[both] / whole  # the sum to a millionth
+    monkeypatch.setattr(near_zero, "_slope", lambda *_: slope)
+    found = resolved(replace(fit, theta=theta))
+    # Uniform up to the sum: its deviation, in those of half a normal; 1,000 draws know it to 2 %.
+    room = whole / np.sqrt(12) / np.sqrt(1 - 2 / np.pi)
+    seen = [found.model.prior(fit.model.names[index]).seen for index in both]
+    assert seen == pytest.approx([room, room], rel=0.06)
 
 
 @pytest.mark.parametrize(
@@ -341,9 +375,10 @@ def test_sampling_takes_what_is_seen_from_the_fit():
     _, fit, _ = without_file({**LIGHT, "b1": 0.1, "b2": 0.2}, 10.0)
     assert fit.model.prior("b1").seen is None
     prior = resolved(fit).model.prior("b1")
-    # With the other damper held the fit's own error is a tenth of that.
+    # Forward differences of the same residuals along other coordinates: of eight recordings they
+    # are 5e-4 to 6e-4 apart.  With the other damper held the error is a fiftieth of that, or less.
     index = fit.model.names.index("b1")
-    assert prior.seen == pytest.approx(fit.sd[index], rel=0.3)
+    assert prior.seen == pytest.approx(fit.sd[index], rel=1e-3)
     own = fit.model.with_prior({"b1": bh.MaybeZero(1.0, 0.5)})
     assert resolved(replace(fit, model=own)).model.prior("b1").seen == 0.5
 

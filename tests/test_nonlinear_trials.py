@@ -325,8 +325,9 @@ def test_slopes_over_the_linear_parameters_are_taken_again_only_where_something_
 def test_the_gain_is_on_windows_that_were_not_fitted() -> None:
     _, trials = rubbed(0.5)
     best = max(trials, key=lambda trial: trial.score)
-    # Half as many windows to choose by as to fit: half the gain, where the force is true.
-    assert best.gain_choose == pytest.approx(0.5 * best.gain_fit, rel=0.5)
+    # Half as many windows to choose by as to fit: half the gain, where the force is true.  Over 24
+    # recordings the ratio scatters by 0.021 about that: four standard deviations.
+    assert best.gain_choose == pytest.approx(0.5 * best.gain_fit, rel=0.084)
     assert best.score == best.gain_choose - 2 * best.size
 
 

@@ -1,11 +1,11 @@
-"""Facts that raw samples show: resolution, held samples, clipping."""
+"""Facts that raw samples show: resolution, clipping."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit, repeats
+from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 
 RNG = np.random.default_rng(0)
 MOTION = np.cumsum(np.cumsum(RNG.normal(size=5000)) * 1e-5 * np.hanning(5000))
@@ -39,28 +39,6 @@ def test_a_file_rounded_to_a_sixth_of_a_count() -> None:
     count = 5.992e-6
     reading = np.round(count * np.round(MOTION / count), 6)
     assert increment_unit(reading) == pytest.approx(count, rel=1e-3)
-
-
-def test_held_samples_catch_up_and_rest_does_not() -> None:
-    moving = np.linspace(0, 1, 200) + 1e-5 * RNG.normal(size=200)
-    held = moving.copy()
-    held[50:55] = held[50]
-    found = repeats(held)
-    assert (found.start.tolist(), found.length.tolist()) == ([50], [5])
-    assert found.catch_up[0] == pytest.approx(5, rel=0.01)
-    rest = np.concatenate([moving[:50], np.full(4, moving[50]), moving[50:] + 0.0])
-    found = repeats(rest)
-    assert (found.start.tolist(), found.length.tolist()) == ([50], [5])
-    assert found.catch_up[0] == pytest.approx(1, rel=0.01)
-
-
-def test_runs_at_the_ends_and_short_ones() -> None:
-    found = repeats(np.array([1, 1, 1, 2, 3, 3, 4, 5, 5, 5, 5]), shortest=3)
-    assert found.start.tolist() == [0, 7]
-    assert found.length.tolist() == [3, 4]
-    assert np.all(np.isnan(found.catch_up))
-    assert repeats(np.array([1, 1, 2]), shortest=2).length.tolist() == [2]
-    assert len(repeats(MOTION).start) == 0
 
 
 def test_clipping() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import os
 import re
 import struct
 import zipfile
@@ -32,10 +31,6 @@ from bayeshaptic.recordings import (
 from bayeshaptic.recordings import readers as registry
 from bayeshaptic.recordings.readers import apart
 from bayeshaptic.recordings.readers.matlab_sizes import refuse_sizes
-
-MEASURED = Path(
-    os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")
-)
 
 
 def write_mat5(path: Path) -> None:
@@ -466,10 +461,8 @@ def test_matrices_structures_and_groups(tmp_path: Path) -> None:
     )
 
 
-def test_the_measured_mat_file_with_objects() -> None:
-    path = MEASURED / "two_mass_bench" / "MultisineTypeA.mat"
-    if not path.exists():
-        pytest.skip(f"measured recording not found: {path} (set BAYESHAPTIC_MEASURED)")
+def test_the_measured_mat_file_with_objects(measured: Callable[[str], Path]) -> None:
+    path = measured("two_mass_bench/MultisineTypeA.mat")
     recording = read_recording(path, "time=time*1e-6,force=iq_refx[A],position=theta_mx[rad]")
     assert recording.samples == 50_000
     assert recording.period_s == 4e-4
@@ -479,10 +472,8 @@ def test_the_measured_mat_file_with_objects() -> None:
         read_recording(path)
 
 
-def test_the_measured_servo() -> None:
-    path = MEASURED / "emps" / "DATA_EMPS.mat"
-    if not path.exists():
-        pytest.skip(f"measured recording not found: {path} (set BAYESHAPTIC_MEASURED)")
+def test_the_measured_servo(measured: Callable[[str], Path]) -> None:
+    path = measured("emps/DATA_EMPS.mat")
     recording = read_recording(path, "time=t,force=vir*35.15[N],position=qm[m]")
     assert recording.samples == 24_841
     assert recording.period_s == 1e-3

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plain_alias_series import from_polynomials
+from plain_response import from_poles
 from scipy.linalg import expm
 from scipy.signal import tf2ss
 
 from bayeshaptic.devices import load_device
 from bayeshaptic.models import build_model, draw
 from bayeshaptic.models.response.mechanism import Link, Mechanism
-from bayeshaptic.models.response.sampled import from_poles, from_polynomials
 from bayeshaptic.models.response.system import LinearSystem
 
 T = 1e-3

@@ -14,7 +14,11 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.checks.check import check_recording
-from bayeshaptic.recordings.checks.sufficiency import LEAST_COHERENCE, refuse_too_little
+from bayeshaptic.recordings.checks.sufficiency import (
+    LEAST_COHERENCE,
+    refuse_where_told,
+    too_little,
+)
 from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
@@ -28,6 +32,10 @@ BENCH = Bench.from_device("phantom")
 def recorded(excitation: object, bench: Bench = BENCH) -> Recording:
     made = simulate(bench, excitation, seed=1)
     return recording_from_arrays(**made.signals)
+
+
+def refuse(recording: Recording) -> None:
+    refuse_where_told(recording, too_little(recording))
 
 
 def noise(seconds: float = 8.0, rms: float = 0.1) -> np.ndarray:
@@ -82,7 +90,7 @@ SAYS_TOO_LITTLE = {
 @pytest.mark.parametrize("reason", SAYS_TOO_LITTLE)
 def test_what_says_too_little_is_refused(reason: str) -> None:
     with pytest.raises(InputError, match=reason) as caught:
-        refuse_too_little(SAYS_TOO_LITTLE[reason]())
+        refuse(SAYS_TOO_LITTLE[reason]())
     assert "\n" not in str(caught.value)
 
 
@@ -97,9 +105,9 @@ def test_noise_far_above_what_moves_the_device_is_no_silence() -> None:
     recording = recording_from_arrays(force=force, position=position, **signals)
     rough = rough_response(recording)
     assert np.quantile(rough.coherence, 0.9) < LEAST_COHERENCE < 0.9 < rough.follows
-    refuse_too_little(recording)
+    refuse(recording)
     with pytest.raises(InputError, match="hardly answers"):
-        refuse_too_little(replace(recording, force=force[::-1]))
+        refuse(replace(recording, force=force[::-1]))
 
 
 def levels(force: np.ndarray) -> bool:
@@ -131,7 +139,7 @@ def test_no_test_reads_rounding_where_a_force_has_two_levels() -> None:
 def test_what_says_enough_is_not_refused() -> None:
     multisine = Multisine(0.1, 1.0, 100.0, 1.0, 2)
     for excitation in (noise(3.0), multisine, np.sign(noise())):
-        refuse_too_little(recorded(excitation))
+        refuse(recorded(excitation))
     for path in RECORDINGS.glob("*.csv.gz"):
         if "relay" not in path.name:
-            refuse_too_little(read_recording(path))
+            refuse(read_recording(path))

@@ -108,7 +108,7 @@ def lines(found: Overview) -> list[str]:
 
 def _text_in(column: ColumnFacts, found: Overview) -> str | None:
     """Where a column of numbers holds text, as a second header in the middle; None elsewhere."""
-    from bayeshaptic.recordings.columns import as_numbers
+    from bayeshaptic.recordings.readers.numbers import as_numbers
 
     values = found.arrays[column.name]
     first = values[:1]

@@ -19,7 +19,7 @@ from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.around_fit import draws_around
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.inference.sampler import sample
+from bayeshaptic.inference.sampler import sample_around
 from bayeshaptic.models import Model
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.feedback import is_certain
@@ -31,7 +31,7 @@ from bayeshaptic.threads import single_threaded
 
 NO_WITNESS = "feedback biases it"
 # Evaluations of the likelihood that one posterior may take.
-_MOST_EVALUATIONS = 400_000
+_MOST_EVALUATIONS = 600_000
 _MOST_WITH_LINKS = 200_000  # where dynamic links make each take ten times as long
 # Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
 _MISFIT_EVALUATIONS = 100_000
@@ -106,10 +106,9 @@ def finish(
     most = _MOST_EVALUATIONS if rational else _MOST_WITH_LINKS
     watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
     with clock.stage("sampling"):
-        posterior = sample(
-            fit.model,
+        posterior = sample_around(
+            _with_noise(fit, scale),
             etfe,
-            start=_with_noise(fit, scale),
             seed=options.seed,
             progress=options.within(0.1, 0.8).report,
             most_evaluations=_MISFIT_EVALUATIONS if scale > 1 else most,

@@ -24,7 +24,7 @@ from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.effects.measurement import MainsTone
 from bayeshaptic.errors import Notice
-from bayeshaptic.inference.sampler import sample
+from bayeshaptic.inference.sampler import sample_around
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
@@ -77,10 +77,9 @@ def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
     model = rigid_with_friction(recording, found.motion, begun.device, *delay, options.prior)
     fit = in_loop_fit(model, begun.etfe, found.motion, found.misfit)
     watch = LimitKnown(model)
-    posterior = sample(
-        model,
+    posterior = sample_around(
+        fit,
         begun.etfe,
-        start=fit,
         seed=options.seed,
         progress=options.report,
         checkpoints=options.checkpoints,

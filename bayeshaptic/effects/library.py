@@ -69,7 +69,7 @@ def effect_class(name: str) -> Any:
 
 
 def force_laws(names: Iterable[str]) -> list[type[NonlinearEffect]]:
-    """Those of some names that are laws of a force.
+    """The laws of forces among the effects called `names`.
 
     What ripples along the way is found without a law, and has a name of its own.
     """

@@ -15,11 +15,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.models import Model
+from bayeshaptic.models import LogNormal, Model, Prior
 from bayeshaptic.types import Floats
 
 _SUMS = ("mass", "damping")  # quantities whose sums the data know best
 _KNOWN = 0.8  # log standard deviation, of prior and data together, below which one is known
+_WIDE = 1.0  # log standard deviation of a prior that does not know how large a damper is
 
 
 @dataclass(frozen=True)
@@ -166,11 +167,18 @@ def sampling_coordinates(model: Model, theta: Floats, sd: Floats) -> Coordinates
             continue
         believed = 0.5 * float(np.log(prior.quantile(0.84) / prior.quantile(0.16)))
         # A fit at a bound, where the error is nan, says nothing of where the peak is; but where
-        # it leaves one of two springs side by side nothing, the ridge between them is straight.
-        left_out = dimension == "stiffness" and not error > 0
+        # it leaves one of two springs side by side nothing, or a damper whose size nobody knows,
+        # the ridge between them and others is straight.
+        none = dimension == "damping" and is_wide(prior) and value < prior.quantile(0.5)
+        left_out = not error > 0 and (dimension == "stiffness" or none)
         if left_out or (error > 0 and np.hypot(1 / believed, value / error) > 1 / _KNOWN):
             known.add(name)
     return coordinates(model, known)
+
+
+def is_wide(prior: Prior) -> bool:
+    """Whether a prior leaves open how large a parameter is."""
+    return isinstance(prior, LogNormal) and prior.log_sd > _WIDE
 
 
 def reach(model: Model, prior_sds: float) -> tuple[Floats, Floats]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -57,6 +57,10 @@ class Fit(Shown):
     elsewhere : ndarray, shape (V, P)
         Where many starting points ended that did not end here: a model that lacks something may fit
         best when bent far from the truth.
+    alike : ndarray, shape (A, P)
+        Where starting points ended that fit about as well: a device may have more than one.
+    etfe : Etfe or None
+        What was fitted, where it was a response as it stands.
     """
 
     model: Model
@@ -70,6 +74,8 @@ class Fit(Shown):
     residual: NDArray[np.complex128] = field(repr=False)
     starts: int = 0
     elsewhere: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False, kw_only=True)
+    alike: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False, kw_only=True)
+    etfe: Etfe | None = field(default=None, repr=False, kw_only=True)
 
     @property
     def by_chance(self) -> float:
@@ -118,7 +124,8 @@ class Fit(Shown):
         ----------
         theta : ndarray, shape (P,)
         """
-        return summarise(self.model, self.windows, theta, self.starts)
+        there = summarise(self.model, self.windows, theta, self.starts)
+        return replace(there, alike=self.alike, etfe=self.etfe)
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
         """The fitted sampled response at `frequency_hz`, as it is measured, shape (L,)."""

@@ -45,6 +45,9 @@ SETS = 4
 _ONE_VALLEY = 0.02
 # In closed loop: of 70 simulated ones most settle in four, some short ones not in twenty.
 _REWEIGHINGS, _SETTLED = 20, 0.02
+# Half chi-square over the best, of starting points that lead to fits as good: they are not at the
+# end of their valleys yet.
+_ALIKE = 30.0
 _OTHER_VALLEYS = 2  # from which effects are searched for, too: each costs what the fit itself does
 
 
@@ -93,7 +96,7 @@ def least_squares(
     refuse_unfit(model, etfe, start)
     model = informed(model, etfe)
     if start is not None:
-        return _fit(model, etfe, start)
+        return replace(_fit(model, etfe, start), etfe=etfe)
     fit = _fit(model, etfe, _starts(model, etfe, seed, shorter))
     for another in range(1, most_sets):
         if not fit.misfits or shorter_chain(model) is not None:
@@ -112,7 +115,7 @@ def least_squares(
         fit = replace(fit, elsewhere=elsewhere)
         if alike:
             break
-    return fit
+    return replace(fit, etfe=etfe)
 
 
 def _fit(model: Model, etfe: Etfe, start: Floats) -> Fit:
@@ -130,7 +133,7 @@ def _fit(model: Model, etfe: Etfe, start: Floats) -> Fit:
         ways = [_sharpened(model, etfe, way, _REWEIGHINGS) for way in (theta, *found.elsewhere)]
         theta, windows = max(ways, key=lambda way: Likelihood(model, way[1])(way[0][None])[0])
     fit = summarise(model, windows, theta, found.agreeing)
-    return replace(fit, elsewhere=found.elsewhere)
+    return replace(fit, elsewhere=found.elsewhere, alike=found.alike)
 
 
 def _sharpened(
@@ -177,6 +180,8 @@ class Optimum:
         How many of those refined to the end found the same optimum.
     elsewhere : ndarray, shape (V, P)
         The best points of the other valleys in which several ended, that with most of them first.
+    alike : ndarray, shape (A, P)
+        Points in valleys about as deep, the best first, not at their ends.
     reduced_chi_square : float
     impossible : tuple of str
         As of a `Fit`.
@@ -185,6 +190,7 @@ class Optimum:
     theta: Floats
     agreeing: int
     elsewhere: Floats
+    alike: Floats
     reduced_chi_square: float
     impossible: tuple[str, ...] = ()
 
@@ -213,6 +219,7 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
 
     phi, cost = _valleys(residuals, phi, low, high)
     elsewhere = here.natural(_other_valleys(phi, cost))
+    alike = here.natural(phi[np.argsort(cost)][: np.sum(cost < cost.min() + _ALIKE)])
     refined = 6  # of them converged to the end
     phi = phi[np.argsort(cost + penalty(phi))[:refined]]
     phi, cost = minimise(residuals, phi, low, high, steps=100, tolerance=1e-3)
@@ -221,7 +228,7 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
     left = float(cost[best] / windows.target.size)
     ends = np.array(model.names)[ends_at_bounds(phi[best], low, high)]
     impossible = impossible_at_bounds(model, ends.tolist())
-    return Optimum(here.natural(phi)[best], agreeing, elsewhere, left, impossible)
+    return Optimum(here.natural(phi)[best], agreeing, elsewhere, alike, left, impossible)
 
 
 def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Optimum:

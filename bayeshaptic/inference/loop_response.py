@@ -23,9 +23,9 @@ from bayeshaptic.types import Floats
 _SAME = 0.1  # the chi-square that is no difference
 _MOST_ROUNDS = 8  # fits to what the last one makes of the samples
 _AS_DEEP = 1.01  # of the reduced chi-square: valleys no deeper than that are one
-# Times the reduced chi-square: what a fit made of the samples was not there.  Of 111 rounds of 30
-# velocities and accelerations five are not taken, all of one recording; those went up to 14,000
-# times and more.
+# How many times the reduced chi-square may grow in a round: beyond that the fit made of the samples
+# what was not there.  Of 111 rounds of 30 velocities and accelerations five are refused, all of one
+# recording, where it grew 14,000-fold and more.
 _RUNS_AWAY = 2.0
 _TOP = 0.2  # of the lines, where the motor's mass is nearly alone
 

@@ -16,8 +16,7 @@ from bayeshaptic.inference.fit import REACH_SDS, Fit, weighted_residuals
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampling.density import Density
-from bayeshaptic.inference.sampling.ensembles import ENSEMBLES, WALKERS, warmed_up
-from bayeshaptic.inference.sampling.laplace import laplace
+from bayeshaptic.inference.sampling.ensembles import ENSEMBLES, WALKERS
 from bayeshaptic.inference.sampling.near_zero import (
     inside,
     redrawing,
@@ -25,10 +24,12 @@ from bayeshaptic.inference.sampling.near_zero import (
     start_of,
     with_near_zero,
 )
+from bayeshaptic.inference.sampling.peaks import warmed_up_about_peaks
 from bayeshaptic.inference.sampling.run import Run, run_until_done
 from bayeshaptic.inference.saved.checkpoint import Checkpoint, Stored, key_of
 from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
+from bayeshaptic.models.start import informed
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.progress import told
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -86,7 +87,8 @@ def sample(
     model : Model
     etfe : Etfe
     start : Fit, optional
-        A least-squares fit to begin from; made here when absent.
+        A least-squares fit to begin from; made here when absent, and made anew from there where it
+        is of other data, or of a model with other priors or known values.
     ess : float
         Effective draws that every parameter must have, in the bulk and in the tails.
     seed : int
@@ -119,9 +121,36 @@ def sample(
             f"start is a fit of {', '.join(start.model.names)}, but the model has "
             f"{', '.join(model.names)}: fit this model first."
         )
+    if start is None:
+        start = least_squares(model, etfe, seed=seed)
+    elif start.etfe is not etfe or start.model != informed(model, etfe):
+        start = least_squares(model, etfe, start=start.theta)
+    return sample_around(start, etfe, ess, seed, progress, most_evaluations, rule, checkpoints)
+
+
+@single_threaded
+def sample_around(
+    fit: Fit,
+    etfe: Etfe,
+    ess: float = DEFAULT_ESS,
+    seed: int = 0,
+    progress: Progress | bool | None = None,
+    most_evaluations: int = MOST_EVALUATIONS,
+    rule: Rule | None = None,
+    checkpoints: str | Path | None = None,
+) -> Posterior:
+    """Draw from the posterior of the likelihood and the priors that `fit` has: see `sample`.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+        What the posterior is said to be of.
+    ess, seed, progress, most_evaluations, rule, checkpoints
+        As of `sample`.
+    """
     began = time.perf_counter()
     report = told(progress) or (lambda share, word: None)
-    fit = start if start is not None else least_squares(model, etfe, seed=seed)
     report(0.02, "finding the peak")
     fit = resolved(_converged(fit))
     asked = rule or EveryParameter(fit.model, ess)
@@ -145,10 +174,9 @@ def sample(
     run = checkpoint.read(restore)
     if run is None:
         warm, refit = np.random.SeedSequence(seed).spawn(2)
-        peak, proposal = laplace(density, origin)
         report(0.1, "warming up")
-        most_steps = _WARM_UP * most_evaluations / (ENSEMBLES * WALKERS)
-        ensembles = warmed_up(counted, proposal, warm, peak, redraw, most_steps)
+        steps = _WARM_UP * most_evaluations / (ENSEMBLES * WALKERS)
+        ensembles = warmed_up_about_peaks(counted, density, origin, fit, warm, redraw, steps)
         run = Run(ensembles, np.random.default_rng(refit))
     verdict = run_until_done(
         run,

@@ -24,7 +24,7 @@ from bayeshaptic.report.draft import refuse_to_replace
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.write import NAMES, write_study_report
-from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
+from bayeshaptic.study.analysis import StudyAnalysis, analyse_study, distinct
 from bayeshaptic.types import Executor, Progress
 
 _WRITING = 0.95
@@ -149,12 +149,8 @@ def analyse_and_report(
 
 def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:
     """A folder for each recording, numbered where two have the same name."""
-
-    names = [recording_name(task.entry.path) for task in tasks]
-    return tuple(
-        parent / (name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}")
-        for index, name in enumerate(names)
-    )
+    names = distinct([recording_name(task.entry.path) for task in tasks])
+    return tuple(parent / name for name in names)
 
 
 def _read(job: Job) -> Study:
@@ -183,7 +179,6 @@ def _read(job: Job) -> Study:
 def _analysed(
     study: Study, job: Job, progress: Progress | None, executor: Executor
 ) -> StudyAnalysis:
-
     settings = job.settings
     return analyse_study(
         study,
@@ -201,7 +196,6 @@ def _device(
     progress: Progress | None,
 ) -> tuple[Reported, ...]:
     """The page of the device, shorter without reports; none where no recording could be used."""
-
     if study.limit is None:
         return ()
     if progress is not None:
@@ -216,7 +210,6 @@ def _device(
 
 def _executor(progress: Progress | None, names: Sequence[str], workers: int) -> Executor:
     """Processes, or one recording after the other with the progress of each."""
-
     if workers > 1 and len(names) > 1:
         return executors.processes(workers)
 

@@ -13,6 +13,7 @@ from bayeshaptic.numerics.mixture import StudentMixture, student
 from bayeshaptic.types import Floats
 
 _SETTLED = 1e-3  # gain of log density a point that is none
+_MOST_ROUNDS = 25  # fewer where the points gain nothing any more
 
 
 def fit_student_mixture(
@@ -21,7 +22,6 @@ def fit_student_mixture(
     components: int,
     freedom: float,
     rng: np.random.Generator,
-    rounds: int = 25,
 ) -> StudentMixture:
     """Fit a mixture to weighted points.
 
@@ -34,8 +34,6 @@ def fit_student_mixture(
     freedom : float
     rng : numpy.random.Generator
         For the starting points.
-    rounds : int
-        At most; they end when the points gain nothing any more.
     """
     w = weights / weights.sum()
     size = x.shape[1]
@@ -54,7 +52,7 @@ def fit_student_mixture(
     )
     ridge = 1e-3 * np.eye(size)
     before = -np.inf
-    for _ in range(rounds):
+    for _ in range(_MOST_ROUNDS):
         distances = _quadratics(mixture) @ terms.T
         logs = mixture.log_densities_at(distances)
         largest = logs.max(axis=0)

@@ -70,6 +70,49 @@ def moments_above(
     return points.mean(axis=0), np.atleast_2d(np.cov(points.T))
 
 
+def spread_above(low: Floats, mean: Floats, root: Floats, draws: int) -> Floats:
+    """Standard deviations (n,) of one normal distribution above `low`, from `draws` of it.
+
+    Gibbs sampling along its principal axes: entry by entry, points would stay where they are on a
+    ridge that is much longer than wide.  The same numbers in every call.
+
+    Parameters
+    ----------
+    low : ndarray, shape (n,)
+    mean : ndarray, shape (n,)
+        Not below `low`.
+    root : ndarray, shape (n, m)
+        Of the covariance, root @ root.T: its square has lost the width of such a ridge.
+    draws : int
+    """
+    rng = np.random.default_rng(0)
+    axes, widths, _ = np.linalg.svd(root, full_matrices=False)
+    points, sweeps = np.tile(mean, (draws, 1)), 20
+    for _ in range(sweeps):
+        for width, axis in zip(widths, axes.T, strict=True):
+            beside = points - np.outer((points - mean) @ axis, axis)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ends = (low - beside) / (axis * width)
+            begin = np.max(np.where(axis > 0, ends, -np.inf), axis=1)
+            end = np.min(np.where(axis < 0, ends, np.inf), axis=1)
+            moved = width * _one_between(begin, np.maximum(begin, end), rng)
+            points = np.maximum(beside + np.outer(moved, axis), low)
+    return np.asarray(points.std(axis=0))
+
+
+def _one_between(low: Floats, high: Floats, rng: np.random.Generator) -> Floats:
+    """A draw of a standard normal number between each pair of ends."""
+    from scipy.special import log_ndtr, ndtri_exp
+
+    # In the lower tail, through logarithms: the ends may be many standard deviations away.
+    upper = low > 0
+    low, high = np.where(upper, -high, low), np.where(upper, -low, high)
+    share, log_high = rng.uniform(size=len(low)), log_ndtr(high)
+    log_low = np.minimum(log_ndtr(low) - log_high, 0.0)
+    drawn = ndtri_exp(log_high + np.log(share + (1 - share) * np.exp(log_low)))
+    return np.where(upper, -1.0, 1.0) * np.clip(drawn, low, high)
+
+
 def _one_above(
     low: float, centre: Floats, sd: Floats, spike: Floats, rng: np.random.Generator
 ) -> Floats:

@@ -9,10 +9,8 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.frf_table import read_frf
 from bayeshaptic.recordings.signals.raw_signals import (
     Clipping,
-    Repeats,
     clipping,
     increment_unit,
-    repeats,
 )
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.recordings.study_file import read_study
@@ -21,7 +19,6 @@ __all__ = [
     "Clipping",
     "Reader",
     "Recording",
-    "Repeats",
     "Study",
     "StudyEntry",
     "check_recording",
@@ -34,5 +31,4 @@ __all__ = [
     "read_study",
     "recording_from_arrays",
     "register_reader",
-    "repeats",
 ]

@@ -6,15 +6,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.devices.table import nearest
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers.layout import THOUSANDS
-from bayeshaptic.recordings.readers.reader import NO_NUMBERS, Arrays
+from bayeshaptic.recordings.readers import Arrays
+from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.units import base_unit, is_unit, unit_in_name
 
 # What may stand for the force and for the position (`signals.other_outputs`), where it is named.
@@ -26,6 +25,7 @@ FRF_ROLES = ("frequency", *FRF_KINDS, "phase_deg", "sd", "coherence", "averages"
 # What a controller followed; its unit does not matter.
 REFERENCE = "reference"
 ROLES = (*RECORDING_ROLES, REFERENCE, *FRF_ROLES)
+
 # Headers that need no mapping, with the unit they say.
 DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     "time": {"time_s": "s"},
@@ -36,12 +36,15 @@ DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     **{role: {role: None} for role in FRF_ROLES[1:]},
     **{role: {} for role in (*FORCES[1:], *POSITIONS[1:])},
 }
+
 # The same in words, for headers that say their unit: "Time (s)", "Force [N]", "Position (mm)".
 _PLAIN_HEADERS = {
     "time": ("time", "t"),
     "force": ("force", "torque", "current"),
     "position": ("position", "angle"),
 }
+
+_MOST_LISTED = 20  # arrays of a file in a message, which is one line
 _EXAMPLE = "time=t,force=u,position=q"
 _WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*[(\[](?P<unit>[^()\[\]]+)[)\]]")
 _EXPRESSION = re.compile(
@@ -261,7 +264,7 @@ def column_of(arrays: Arrays, role: str, mapping: Mapping[str, Column]) -> str |
     return next((key for name in names if (key := _find(arrays, name)) is not None), None)
 
 
-def listing(arrays: Arrays, most: int = 20) -> str:
+def listing(arrays: Arrays) -> str:
     """The names of a file's arrays and their lengths, the longest first, single numbers not."""
     names: dict[int, list[str]] = {}
     for name, values in arrays.items():
@@ -269,32 +272,5 @@ def listing(arrays: Arrays, most: int = 20) -> str:
             names.setdefault(id(values), []).append(name)
     lines = [f"{' = '.join(same)} ({len(arrays[same[0]])})" for same in names.values()]
     lines.sort(key=lambda line: -int(line.rpartition("(")[2][:-1]))
-    return ", ".join(lines[:most]) + (f" and {len(lines) - most} more" if len(lines) > most else "")
-
-
-def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:
-    """The array in double precision.
-
-    Raises
-    ------
-    InputError
-        Where something in it is not a number: the first such row, counted from 1 after the header.
-    """
-    try:
-        return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        row, text = next((i, v) for i, v in enumerate(values, start=1) if not _is_number(v))
-    if text == NO_NUMBERS:
-        raise InputError(f"{where} is there, but holds {text}; save it as such")
-    what = f"'{text}' is not a number" if str(text).strip() else "there is no number"
-    cure = "write all with one decimal sign" if "," in str(text) else "mend or remove the row"
-    if THOUSANDS.fullmatch(str(text)):
-        what, cure = f"thousands separators ('{text}')", "write the numbers without them"
-    raise InputError(f"{where}: {what} in row {row}; {cure}")
-
-
-def _is_number(value: object) -> bool:
-    try:
-        return float(value) is not None  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        return False
+    more = len(lines) - _MOST_LISTED
+    return ", ".join(lines[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")

@@ -17,7 +17,6 @@ from bayeshaptic.recordings.columns import (
     POSITIONS,
     REFERENCE,
     Column,
-    as_numbers,
     column_of,
     is_frequency_response,
     listing,
@@ -27,6 +26,7 @@ from bayeshaptic.recordings.columns import (
 )
 from bayeshaptic.recordings.cut import Cut, Span
 from bayeshaptic.recordings.readers import Arrays, read_arrays
+from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
 from bayeshaptic.recordings.signals.timing import sampling_period

@@ -92,7 +92,7 @@ def too_weak(before: tuple[Notice, ...], read: tuple[Notice, ...], why: str) -> 
 
 
 def unusable(why: str) -> Notice:
-    """That a reference is known, and set aside."""
+    """The warning that a reference is known but not used, and why."""
     return Notice("warning", "reference", f"The reference is not used: {why}.")
 
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
-from bayeshaptic.diagnosis.feedback.in_loop import WIDEST_DB
+from bayeshaptic.diagnosis.feedback.in_loop import WIDE, is_wide
 from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
 from bayeshaptic.quantities import quantity
 from bayeshaptic.report.numbers.result import hides_hand
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
-
-_WIDE = "the recording leaves the limit open within more than a factor of two"
 
 
 def in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
@@ -30,8 +27,8 @@ def in_closed_loop(analysis: Analysis, verdict: str | None) -> list[str]:
         found = _through_reference(analysis, verdict)
     elif not analysis.etfe.direct:
         return []
-    if _is_wide(analysis):
-        found.append(_WIDE)
+    if is_wide(analysis.limit):
+        found.append(WIDE)
     return found
 
 
@@ -58,9 +55,3 @@ def _through_reference(analysis: Analysis, verdict: str | None) -> list[str]:
     if any(notice.topic == VALLEY for notice in analysis.notices):
         found.append("a vibration mode elsewhere explains what the reference moves as well")
     return found
-
-
-def _is_wide(analysis: Analysis) -> bool:
-    """Whether the limit's 90 % interval is wider than a factor of two."""
-    low, high = (analysis.limit.quantile(p) for p in (0.05, 0.95))
-    return not (low > 0 and 20 * math.log10(high / low) < WIDEST_DB)

@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import (
     interval,
+    minus,
     percent,
     percents,
     pretty_unit,
@@ -29,6 +30,7 @@ from bayeshaptic.report.numbers.trust import doubtful_parameters
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.models.prior import Prior
+    from bayeshaptic.stability.critical import CriticalStiffness
 
 _DASH = "\N{EN DASH}"
 _OUTCOMES = {
@@ -121,11 +123,11 @@ def safe(analysis: Analysis) -> Rows:
     return tuple((percents(risks), *row) for row, risks in shown.items())
 
 
-def crossings(analysis: Analysis) -> Rows:
+def crossings(limit: CriticalStiffness) -> Rows:
     """Which crossing binds: (label, median frequency, probability)."""
     return tuple(
         (c.label, quantity(c.frequency_hz, "Hz", digits=4), percent(c.probability))
-        for c in analysis.limit.crossings
+        for c in limit.crossings
     )
 
 
@@ -144,7 +146,7 @@ def comparison(result: Result) -> Rows:
         apart = _DASH
         if middle and np.isfinite(ours) and witness.key != "posterior":
             difference = round(decibel(middle) - ours, 2) + 0.0  # no minus before a zero
-            apart = f"{difference:+.2f}".replace("-", "\N{MINUS SIGN}")
+            apart = minus(f"{difference:+.2f}")
         rows.append((witness.label, *numbers, level, apart, witness.remark))
     return tuple(rows)
 

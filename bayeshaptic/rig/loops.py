@@ -62,7 +62,6 @@ def run_loop(
         run.streams,
         samples,
         run.command[done],
-        run.time_s[done],
         run.position[done],
         run.hand[done],
     )

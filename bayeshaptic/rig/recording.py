@@ -26,7 +26,7 @@ class SimulatedRecording:
     ----------
     time_s, force, position : ndarray, shape (N,)
         As written down by the logger: commanded force, measured position.
-    true_time_s, true_position : ndarray, shape (M,)
+    true_position : ndarray, shape (M,)
         Position in front of the encoder (behind an analogue filter) at the sample instants, without
         noise; M is larger than N where samples were dropped.
     hand_force : ndarray, shape (M,)
@@ -40,7 +40,6 @@ class SimulatedRecording:
     time_s: Array = field(repr=False)
     force: Array = field(repr=False)
     position: Array = field(repr=False)
-    true_time_s: Array = field(repr=False)
     true_position: Array = field(repr=False)
     hand_force: Array = field(repr=False)
     period_s: float

@@ -87,7 +87,6 @@ def write_down(
     streams: Streams,
     samples: Readings,
     command: Array,
-    true_time_s: Array,
     true_position: Array,
     hand: Array,
 ) -> SimulatedRecording:
@@ -99,7 +98,6 @@ def write_down(
         log.time_s,
         log.force,
         log.position,
-        true_time_s,
         true_position,
         hand,
         bench.period_s,

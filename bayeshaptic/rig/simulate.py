@@ -66,9 +66,7 @@ def simulate(
     position, velocity = respond(bench, force, hand, progress, start, substeps, halvings)
     kept = slice(lead, None)
     samples = Encoder(bench, streams).read(time_s[kept], position[kept], velocity[kept])
-    return write_down(
-        bench, streams, samples, command[kept], time_s[kept], position[kept], hand[lead:-1]
-    )
+    return write_down(bench, streams, samples, command[kept], position[kept], hand[lead:-1])
 
 
 def _excitation(bench: Bench, excitation: Excitation | ArrayLike | None) -> Excitation:

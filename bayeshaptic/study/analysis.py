@@ -235,7 +235,7 @@ def _analysed(
     tasks: Sequence[Task], report: Progress, executor: Executor | None
 ) -> tuple[Analysed, ...]:
     """All recordings in their order; the progress counts those that are done."""
-    names = _distinct([recording_name(task.entry.path) for task in tasks])
+    names = distinct([recording_name(task.entry.path) for task in tasks])
     done: dict[int, Analysed] = {}
     outcomes = (
         _one_by_one(tasks, names, report) if executor is None else executor(analyse_entry, tasks)
@@ -276,8 +276,13 @@ def _failures(recordings: Sequence[Analysed]) -> tuple[Notice, ...]:
     return (Notice("warning", "recordings", text),)
 
 
-def _distinct(names: Sequence[str]) -> list[str]:
-    """The names, numbered where one comes more than once."""
+def distinct(names: Sequence[str]) -> list[str]:
+    """The names, numbered where one comes more than once.
+
+    Parameters
+    ----------
+    names : sequence of str
+    """
     return [
         name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}"
         for index, name in enumerate(names)

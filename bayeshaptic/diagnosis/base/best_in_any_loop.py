@@ -16,7 +16,6 @@ import numpy as np
 
 from bayeshaptic.diagnosis.base.begun import Begun, base_of
 from bayeshaptic.diagnosis.base.best_base import criterion
-from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, Traced
 from bayeshaptic.diagnosis.trials.all_lines import (
@@ -59,7 +58,7 @@ def traced_in_any_loop(
         Whether it stands is not asked.
     """
     chosen = begun.fit.model.name
-    own = untraced(State(begun.etfe, begun.fit), residual_tests(begun.fit, begun.etfe))
+    own = untraced(State(begun.etfe, begun.fit))
     if chosen == _ONE_MASS:  # is followed in time instead, with its friction
         return begun, own
     # Before the long ways on a base model that may be the wrong one.
@@ -71,7 +70,7 @@ def traced_in_any_loop(
     found = {chosen: own}
     for name in _rivals(begun.choice):
         etfe, fit = base_of(begun, name)
-        other = untraced(State(etfe, fit), residual_tests(fit, etfe))
+        other = untraced(State(etfe, fit))
         found[name] = trace_by_all_lines(other, meter, tick)
         if name in rubbing and not found[name].state.accepted:  # there was nothing left for it
             found[name] = with_trial(other, rubbing[name])
@@ -79,7 +78,7 @@ def traced_in_any_loop(
     if rubs(found[best]) and _may_be_one_mass(begun.choice, best):
         etfe, fit = base_of(begun, _ONE_MASS)
         choice = replace(begun.choice, fit=fit)
-        one = untraced(State(etfe, fit), residual_tests(fit, etfe))
+        one = untraced(State(etfe, fit))
         return replace(begun, etfe=etfe, fit=fit, choice=choice), one
     if best == chosen:
         return begun, own

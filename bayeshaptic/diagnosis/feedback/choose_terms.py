@@ -18,8 +18,9 @@ from bayeshaptic.types import Floats
 SIMPLEST, LAG = "coulomb", "jerk"
 # Share of the held-out error, of both halves, that the simplest law must take away, and any other
 # term.  Of 96 closed loops of 1.5 and 4 s, 70 of them with dry friction: at (0.1, 0.3) friction is
-# named in 66, and in 2 of 26 without; at (0.02, 0.02), whichever law is best first, in 40 and none,
-# and masses from 1.5 s of steps are 7 standard deviations off, root mean square (now 0.9).
+# named in 66, and in 2 of 26 without; at (0.02, 0.02), with whichever law is best first, in 40 and
+# none, and masses from 1.5 s of steps are off by 7 standard deviations rms, where with these
+# numbers it is 0.9.
 _SIMPLEST_WORTH, _WORTH = 0.1, 0.3
 # A longer record needs less: in proportion beyond so many seconds, down to a fiftieth.
 _SHORT_S, _LEAST_WORTH = 4.0, 0.02

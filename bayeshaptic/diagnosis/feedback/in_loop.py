@@ -25,10 +25,12 @@ from bayeshaptic.types import Floats
 
 # Half a recording has too few strokes to say much: the halves may differ by so many of their sds.
 _APART = 4.0
-WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
+_WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
 # Share of the force (one standard deviation) that may be anything but one mass where its few tones
 # cannot tell: a base that gives, eddy currents, a gain that ripples.
 UNSEEN = 0.01
+WIDE = "the recording leaves the limit open within more than a factor of two"
+"""What is said of a limit that `is_wide`."""
 _CENTRAL = 1.6449  # standard deviations that hold 90 %
 _DIMENSIONS = {"m": "mass", "b": "damping", "delay_s": "time"}
 _WORDS = {"m": "mass", "b": "viscous damping", "delay_s": "delay"}
@@ -166,10 +168,15 @@ def open_questions(
         unknown = dominated or (unsure and name == "delay_s")
         if unknown and free and name in _WORDS:
             reasons.append(f"the recording says too little of the {_WORDS[name]}")
-    low, high = (limit.quantile(p) for p in (0.05, 0.95))
-    if not (low > 0 and 20 * np.log10(high / low) < WIDEST_DB):
-        reasons.append("the recording leaves the limit open within more than a factor of two")
+    if is_wide(limit):
+        reasons.append(WIDE)
     return tuple(reasons)
+
+
+def is_wide(limit: CriticalStiffness) -> bool:
+    """Whether the limit's 90 % interval is wider than a factor of two."""
+    low, high = (limit.quantile(p) for p in (0.05, 0.95))
+    return not (low > 0 and 20 * np.log10(high / low) < _WIDEST_DB)
 
 
 def _unsure_of_the_delay(motion: MotionFit) -> bool:

@@ -32,9 +32,9 @@ from bayeshaptic.diagnosis.feedback.smooth_motion import (
     at_rest,
     below_the_counts,
     smooth_motion,
-    smoothed,
 )
 from bayeshaptic.diagnosis.feedback.terms import Term, terms_of
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Bools, Floats
@@ -197,7 +197,7 @@ class _LowPass:
         return np.asarray(decimate(inner, self.every, zero_phase=True), dtype=np.float64)
 
     def smooth(self, signal: Floats) -> Floats:
-        return self.thin(smoothed(signal, self.cutoff_hz, self.period_s))
+        return self.thin(low_pass(signal, self.cutoff_hz, self.period_s))
 
 
 def _moving(recording: Recording, low: _LowPass) -> Bools:

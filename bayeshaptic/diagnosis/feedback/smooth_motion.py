@@ -6,8 +6,8 @@ from dataclasses import astuple, dataclass, field
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.signal import butter, sosfiltfilt
 
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Bools, Floats
@@ -15,7 +15,7 @@ from bayeshaptic.types import Bools, Floats
 _BAND = 0.05  # of the sampling rate: in which the motion that laws are over is smooth
 # Of the acceleration's power, that counts may be. Of 20 loops of one mass of another simulation six
 # have more, 0.23 to 0.62, and four of these were not known as one mass; of ten with a mode or a
-# hand nine have less than 0.001, and are as before.
+# hand nine have less than 0.001, and keep their cut-off.
 _MOST_COUNTS = 0.05
 _FEWEST_PERIODS = 54  # of the cut-off, in a recording: what inverse dynamics need
 
@@ -28,12 +28,6 @@ class SmoothMotion:
     velocity: Floats = field(repr=False)
     acceleration: Floats = field(repr=False)
     jerk: Floats = field(repr=False)
-
-
-def smoothed(signal: Floats, cutoff_hz: float, period_s: float) -> Floats:
-    """Zero-phase low-pass, Butterworth, order 4, forwards and backwards."""
-    low = butter(4, cutoff_hz, fs=1 / period_s, output="sos")
-    return np.asarray(sosfiltfilt(low, signal))
 
 
 def count_of(recording: Recording) -> float:
@@ -89,7 +83,7 @@ def at_rest(recording: Recording, cutoff_hz: float) -> Bools:
 
 def smooth_motion(recording: Recording, cutoff_hz: float) -> SmoothMotion:
     """Low-passed, and central differences."""
-    x = smoothed(recording.position, cutoff_hz, recording.period_s)
+    x = low_pass(recording.position, cutoff_hz, recording.period_s)
     v = np.gradient(x, recording.period_s)
     a = np.zeros_like(x)
     a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / recording.period_s**2

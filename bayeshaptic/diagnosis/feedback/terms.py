@@ -27,7 +27,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Column(Term):
-    """With the column itself.
+    """A term with the function that makes its column.
 
     Attributes
     ----------

@@ -116,7 +116,7 @@ class Chain:
         spend(_COST * size)
         first = forces(change).ravel()
         found, _ = gmres(
-            LinearOperator((size, size), rest), first, rtol=1e-3, restart=30, maxiter=1
+            LinearOperator((size, size), rest), first, rtol=_EXACT, restart=_TERMS, maxiter=1
         )
         lines = self.period.transform(found.reshape(shape))
         added = np.einsum("ah,ah->h", self.seen, lines)

@@ -128,7 +128,7 @@ def balance(
             converged = True
             break
         theta, strength = joint.ahead(approach, theta, strength)
-    # Of the parameters found: without forces those of the start were the only ones so far.
+    # At the fitted parameters: without forces the motions so far are those of the starting ones.
     motions, _ = _settle(model.system(theta), period, forces, strength, applied, following)
     return Balanced(
         model,

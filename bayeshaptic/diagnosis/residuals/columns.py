@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtri, stdtr
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.diagnosis.residuals.moved import drift, slow_velocity
+from bayeshaptic.diagnosis.residuals.moved import coasting, slow_velocity
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import (
@@ -213,7 +213,7 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
         rest = recording.position - recording.position.mean() - x
         v = v + slow_velocity(rest, recording.period_s)
     else:
-        v = v + drift(system, recording.position - x, recording.period_s)[1]
+        v = v + coasting(system, recording.position - x, recording.period_s)[1]
     return x, v
 
 

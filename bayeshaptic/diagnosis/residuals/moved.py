@@ -1,10 +1,11 @@
-"""How a device moves beside what its command does: drifting on, or because something moves it."""
+"""How a device moves beside what its command does: coasting, or because something moves it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.unforced import drifts, parts, slow_motion, slow_share
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass, slow_share
+from bayeshaptic.diagnosis.residuals.unforced import coasting_motions, parts
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.response.motion import linear_motion
@@ -20,7 +21,7 @@ _FEWEST = 4  # lines of an octave whose median tells a sensor's noise
 _LOUDER = 3.0
 
 
-def drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Floats, Floats]:
+def coasting(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Floats, Floats]:
     """Position and velocity of a free device from how it began and from a constant force.
 
     Nobody knows either, and the spectra do not; the position besides what the command does tells.
@@ -33,7 +34,7 @@ def drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Float
         The measured position less that of the command.
     period_s : float
     """
-    columns = drifts(system, len(besides), period_s)
+    columns = coasting_motions(system, len(besides), period_s)
     weights = parts(columns, besides)
     _, x, v = columns.T
     return columns @ weights, np.asarray(weights[1] * v + weights[2] * np.gradient(v, period_s))
@@ -41,7 +42,7 @@ def drift(system: LinearSystem, besides: Floats, period_s: float) -> tuple[Float
 
 def slow_velocity(position: Floats, period_s: float) -> Floats:
     """The velocity below the frequencies of hands, shape (N,)."""
-    return np.gradient(slow_motion(position, period_s, _edge_hz(period_s)), period_s)
+    return np.gradient(low_pass(position, _edge_hz(period_s), period_s), period_s)
 
 
 def moved_besides(fit: Fit, recording: Recording) -> float:
@@ -59,8 +60,8 @@ def moved_besides(fit: Fit, recording: Recording) -> float:
     period_s, system = recording.period_s, fit.model.system(fit.theta)
     x, v = linear_motion(system, recording.force - recording.force.mean(), period_s)
     besides = recording.position - x
-    drifted, along = drift(system, besides, period_s)
-    left = besides - drifted
+    coasted, along = coasting(system, besides, period_s)
+    left = besides - coasted
     if recording.sensed is not None and recording.sensed.derivatives:
         power = _beside_noise(left, recording)
     else:

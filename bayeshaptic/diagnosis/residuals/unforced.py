@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.linalg import lstsq
-from scipy.signal import butter, sosfiltfilt
 
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.response.system import LinearSystem
@@ -22,7 +22,7 @@ from bayeshaptic.types import Floats
 # the true parameters of held LHIfAMs that rub, under steps, log likelihoods rise from 128 and 1,556
 # to 252 and 1,601 when the edge goes from 20 Hz (and half the order) to 30; on the coarse encoder
 # of PHANToMs they fall from 58 and 27 to -19 and -48, and are 43 and 38 at 16 Hz.
-HAND_ORDER, _LEAST_HZ, _MOST_HZ, _NOISE = 4, 14.0, 30.0, 0.01
+_LEAST_HZ, _MOST_HZ, _NOISE = 14.0, 30.0, 0.01
 _ALIKE = 1e-14  # squares: motions that differ by a ten-millionth are one
 
 
@@ -39,25 +39,14 @@ def hand_edge_hz(position: Floats, period_s: float) -> float:
     count = increment_unit(position)
     if count is None:
         return most
-    velocity = float(np.std(np.gradient(slow_motion(position, period_s, most), period_s)))
+    velocity = float(np.std(np.gradient(low_pass(position, most, period_s), period_s)))
     # Rounding is white: its velocity up to an edge f has (2 pi)^2 2 T f^3 / 3 of its variance.
     unit = count / np.sqrt(12) * 2 * np.pi * np.sqrt(2 * period_s / 3)
     return float(np.clip((_NOISE * velocity / unit) ** (2 / 3), min(_LEAST_HZ, most), most))
 
 
-def slow_motion(motion: Floats, period_s: float, edge_hz: float) -> Floats:
-    """What of a motion is slow: of a hand below its edge, shape (N,)."""
-    low = butter(HAND_ORDER, edge_hz, fs=1 / period_s, output="sos")
-    return np.asarray(sosfiltfilt(low, motion))
-
-
-def slow_share(frequency_hz: Floats, edge_hz: float) -> Floats:
-    """What `slow_motion` keeps at frequencies in Hz, any shape."""
-    return np.asarray(1 / (1 + (frequency_hz / edge_hz) ** (2 * HAND_ORDER)))
-
-
-def drifts(system: LinearSystem, samples: int, period_s: float) -> Floats:
-    """Standing still, and what a constant force and a push do, shape (N, 3)."""
+def coasting_motions(system: LinearSystem, samples: int, period_s: float) -> Floats:
+    """Of a free device: standing still, and what a constant force and a push do, shape (N, 3)."""
     steady = np.ones(samples)
     return np.stack([steady, *linear_motion(system, steady, period_s)], axis=1)
 
@@ -85,6 +74,6 @@ def fitted_motion(fit: Fit, recording: Recording, acted: Floats | float) -> Floa
     left = recording.position - known
     if fit.model.held:
         edge_hz = hand_edge_hz(recording.position + acted, period_s)
-        return np.asarray(acted + known + slow_motion(left, period_s, edge_hz))
-    columns = drifts(system, len(left), period_s)
+        return np.asarray(acted + known + low_pass(left, edge_hz, period_s))
+    columns = coasting_motions(system, len(left), period_s)
     return np.asarray(acted + known + columns @ parts(columns, left))

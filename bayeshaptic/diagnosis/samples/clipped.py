@@ -6,6 +6,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
+from bayeshaptic.recordings.signals.runs import runs
 from bayeshaptic.types import Bools, Floats
 
 # A motion that comes from rest has gone a quarter of the way in half of the time; one that comes
@@ -76,13 +77,12 @@ def at_rest(position: Floats, force: Floats, there: Bools, unit: float) -> Bools
     unit : float
         What positions differ by at least.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there, [0]])))
     long = 20  # samples on an extreme from which on it may be a pause
-    runs = [run for run in zip(edges[::2], edges[1::2], strict=True) if run[1] - run[0] >= long]
+    stays = [run for run in zip(*runs(there), strict=True) if run[1] - run[0] >= long]
     changes = np.abs(np.diff(force, prepend=force[0]))
     usual = float(np.median(changes[~there])) if not there.all() else 0.0
     rests = []
-    for first, stop in runs:
+    for first, stop in stays:
         half = (stop - first) // 2
         ends = position[max(first - half, 0) : first][::-1], position[stop : stop + half]
         away = (np.abs(end - position[first]) / unit for end in ends)
@@ -90,7 +90,7 @@ def at_rest(position: Floats, force: Floats, there: Bools, unit: float) -> Bools
         rests.append(bool(quiet) and any(_from_rest(distance) for distance in away))
     resting = np.zeros(len(position), dtype=bool)
     if np.mean(rests or [False]) > _MOST_RESTS:
-        for first, stop in runs:
+        for first, stop in stays:
             resting[first:stop] = True
     return resting
 

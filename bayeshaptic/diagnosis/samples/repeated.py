@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Samples
+from bayeshaptic.recordings.signals.runs import runs
 
 
 def held(samples: Samples) -> tuple[Bools, float]:
@@ -46,10 +47,7 @@ def held(samples: Samples) -> tuple[Bools, float]:
 
 def _obvious(position: Floats, fast: float) -> Bools:
     """Runs of equal samples in the middle of a fast motion that goes on as before."""
-    steps = np.diff(position)
-    still = np.concatenate([[False], steps == 0, [False]])
-    edges = np.flatnonzero(np.diff(still.astype(np.int8)))
-    first, last = edges[::2], edges[1::2]  # of the equal samples
+    first, last = runs(np.diff(position) == 0)  # of the equal samples
     inner = (first >= 3) & (last + 4 < len(position))
     first, last = first[inner], last[inner]
     speed = (position[first] - position[first - 3] + position[last + 4] - position[last + 1]) / 6

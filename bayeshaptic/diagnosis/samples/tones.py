@@ -28,8 +28,9 @@ _HALF = 20  # lines to each side
 # without noise has tones of a hundredth of that.
 _ROUNDING = 1e-9
 # Power of the force at a line, over the median of those around it, from where on what is left there
-# may be a response that is not quite the device's: sweeps that nearly repeat had tones in 27 of 40,
-# none since, and a hum is seen in 25 of 40 (39 before).  Noise reaches it at a line in a million.
+# may be a response that is not quite the device's: sweeps that nearly repeat have tones in 27 of 40
+# without this rule and in none with it; a hum is seen in 25 of 40, in 39 without.  Noise reaches it
+# at a line in a million.
 _PEAK = 20.0
 
 

@@ -38,16 +38,15 @@ _STARTS = 6  # of the sieve, from which a candidate is fitted in full
 _REST, _FAR = 0.25, 3.0
 
 
-def untraced(state: State, tests: tuple[Test, ...]) -> Traced:
+def untraced(state: State) -> Traced:
     """What the base model leaves, before anything is tried.
 
     Parameters
     ----------
     state : State
         The base model fitted to all lines.
-    tests : tuple of Test
-        Of what it leaves.
     """
+    tests = residual_tests(state.fit, state.etfe)
     return Traced(*acceptance.verdict_of((), tests), state, tests, tests, path=(state,))
 
 

@@ -62,7 +62,7 @@ def with_discrepancy(
     left = flagged if traced.verdict == UNEXPLAINED else set()
     if "linear" in left and not traced.state.etfe.direct:
         limit = _with_linear(limit, posterior, fit, rng)
-    elif traced.state.etfe.direct and _notices(traced, "linear"):
+    elif traced.state.etfe.direct and _is_noticed(traced, "linear"):
         # Windows that feedback biases do not show how the response deviates.
         rest = _rest(base, fit, traced, "linear")
         factor = np.exp(rest * rng.uniform(-1.0, 1.0, size=len(limit.samples)))
@@ -108,10 +108,10 @@ def changing_at_limit(limit: CriticalStiffness, fit: Fit, traced: Traced) -> flo
     return max((changing_share(fit, traced.state.etfe, frequency) for frequency in at), default=0.0)
 
 
-def _notices(traced: Traced, family: str) -> bool:
-    """Whether something is left that only a threshold raised for a force taken off lets pass.
+def _is_noticed(traced: Traced, family: str) -> bool:
+    """Whether a test of the class would be flagged but for the allowance for a force taken off.
 
-    That is for going on, and says nothing of what it may do.
+    It decides whether to widen, not by how much.
     """
     return any(test.family == family and test.noticed for test in traced.after)
 

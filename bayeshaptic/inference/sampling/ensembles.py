@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.inference.sampling.proposal import Proposal, acceptance, fitted, generator_of
+from bayeshaptic.inference.sampling.several_peaks import SeveralPeaks
 from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.types import Floats, LogDensity
 
@@ -22,10 +23,14 @@ _IDLE = 2  # rounds without a gain
 # Of the moves that are independent proposals; the others are differences, which help where the
 # proposal misses something and gain little elsewhere.
 _WARM, _FROZEN = 0.6, 0.95
+_TOGETHER = 0.8  # of those over several peaks, where proposals miss more
+
+
+P = TypeVar("P", Proposal, SeveralPeaks)
 
 
 @dataclass
-class Ensembles:
+class Ensembles(Generic[P]):
     """Four ensembles of 64 walkers, advanced together: one call of the density moves them all.
 
     They begin apart, each at draws of its own, and never see each other.
@@ -34,7 +39,7 @@ class Ensembles:
     ----------
     density : callable
         Log density of points of shape (B, P).
-    proposal : Proposal
+    proposal : Proposal or SeveralPeaks
     share : float
         Of the moves that are independent proposals; the others are differences.
     positions : ndarray, shape (ensembles * walkers, P)
@@ -45,7 +50,7 @@ class Ensembles:
     """
 
     density: LogDensity
-    proposal: Proposal
+    proposal: P
     share: float
     positions: Floats
     state: Any
@@ -90,6 +95,11 @@ class Ensembles:
         )
         self.sampler._random.set_state(self.state)
 
+    @property
+    def refittable(self) -> bool:
+        """Whether what they propose is one proposal, which more draws may better."""
+        return isinstance(self.proposal, Proposal)
+
     def advance(self, steps: int, every: int = 1) -> tuple[Floats, Floats]:
         """Go on until `steps` more are kept, `every` so many one.
 
@@ -119,7 +129,7 @@ def warmed_up(
     peak: Floats,
     redraw: Redraw | None = None,
     most_steps: float = np.inf,
-) -> Ensembles:
+) -> Ensembles[Proposal]:
     """Ensembles that have forgotten their starts, with one proposal, refitted and frozen.
 
     Each begins at its own draws of a `first` proposal, so that R-hat between them can see a second
@@ -159,9 +169,39 @@ def warmed_up(
     return ensembles
 
 
+def joined(
+    density: LogDensity,
+    peaks: Sequence[Ensembles[Proposal]],
+    held: Floats,
+    seed: np.random.SeedSequence,
+) -> Ensembles[SeveralPeaks]:
+    """Ensembles over several peaks, warmed up about each by itself.
+
+    Walkers are shared out by how much of the density each peak has `held`: logarithms, (K,).
+    """
+    own, last = seed.spawn(2)
+    rng = np.random.default_rng(own)
+    proposal = SeveralPeaks.of(tuple(one.proposal for one in peaks), held)
+    ends = np.cumsum(np.exp(held - np.logaddexp.reduce(held)))
+    starts = []
+    for ensemble in range(ENSEMBLES):
+        places = (np.arange(WALKERS) + rng.uniform()) / WALKERS  # systematic: no peak by chance
+        which = np.minimum(np.searchsorted(ends, places), len(peaks) - 1)
+        own_walkers = slice(ensemble * WALKERS, (ensemble + 1) * WALKERS)
+        starts.append(
+            np.stack([peaks[k].positions[own_walkers][place] for place, k in enumerate(which)])
+        )
+    state = np.random.RandomState(np.random.MT19937(last)).get_state()
+    redraw = peaks[0].redraw
+    ensembles = Ensembles(density, proposal, _TOGETHER, np.concatenate(starts), state, redraw)
+    settling = 8
+    ensembles.advance(settling)
+    return ensembles
+
+
 def refitted(
-    ensembles: Ensembles, chains: Floats, values: Floats, rng: np.random.Generator
-) -> Ensembles:
+    ensembles: Ensembles[Proposal], chains: Floats, values: Floats, rng: np.random.Generator
+) -> Ensembles[Proposal]:
     """The ensembles where they are, with a proposal fitted to their `chains` (E, S, W, P).
 
     `values` are the log densities there, (E, S, W).
@@ -172,7 +212,7 @@ def refitted(
     return _with(ensembles, own)
 
 
-def _with(ensembles: Ensembles, proposal: Proposal) -> Ensembles:
+def _with(ensembles: Ensembles[Proposal], proposal: Proposal) -> Ensembles[Proposal]:
     return replace(ensembles, proposal=proposal, share=_FROZEN)
 
 

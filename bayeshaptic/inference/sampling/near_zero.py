@@ -13,17 +13,18 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bayeshaptic.inference.coordinates import Coordinates, sampling_coordinates
+from bayeshaptic.inference.coordinates import Coordinates, is_wide, sampling_coordinates
 from bayeshaptic.inference.fit import Fit, weighted_residuals
-from bayeshaptic.models import LogNormal, MaybeZero, NearZero, Prior, draw
+from bayeshaptic.models import MaybeZero, NearZero, Prior, draw
 from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.numerics.truncated_normal import spread_above
 from bayeshaptic.types import Floats
 
 Redraw = Callable[[Floats, np.random.Generator], tuple[Floats, Floats]]
 """From points (B, P) to proposed points, with log density of proposing the way back over there."""
 _MAY_BE_ZERO = (MaybeZero, NearZero)  # priors
-_WIDE = 1.0  # log standard deviation of a prior that does not know how large a damper is
 # Standard deviations from zero, from which a parameter is sampled as it is: one that may be zero,
 # and one whose size no prior knows, of whose posterior 2 % lie next to zero then.
 _SEEN, _SEEN_WIDE = 5.0, 3.5
@@ -46,11 +47,12 @@ def with_near_zero(here: Coordinates, fit: Fit) -> Coordinates:
     far = values / _errors(slope)
     found = {index: prior for index, prior in found.items() if far[index] < _enough(prior)}
     rising = sorted(found, key=lambda index: values[index])
-    beside, small = _split(slope, values, rising)
+    beside, small = _split(slope, values, found, rising)
     # What follows further than makes sense; then the largest may be far from zero.
     while small and np.abs(_followed(slope, small) @ values[small]).max() > _LONGEST:
         rising = [index for index in rising if index != small[-1]]
-        beside, small = _split(slope, values, rising)  # what is not small follows the others anew
+        # What is not small follows the others anew.
+        beside, small = _split(slope, values, found, rising)
     if not small:
         return here
     small = sorted(small)
@@ -80,8 +82,7 @@ def _candidates(here: Coordinates, fit: Fit) -> dict[int, Prior]:
     found: dict[int, Prior] = {}
     for index, name in enumerate(fit.model.names):
         prior, damps = fit.model.prior(name), fit.model.parameter(name).dimension == "damping"
-        wide = isinstance(prior, LogNormal) and prior.log_sd > _WIDE
-        if isinstance(prior, _MAY_BE_ZERO) or (wide and damps and not here.log[index]):
+        if isinstance(prior, _MAY_BE_ZERO) or (is_wide(prior) and damps and not here.log[index]):
             found[index] = prior
     return found
 
@@ -106,9 +107,27 @@ def resolved(fit: Fit) -> Fit:
     if not open_:
         return fit
     here = sampling_coordinates(fit.model, fit.theta, fit.sd)
-    seen = dict(zip(fit.model.names, _errors(_slope(here, fit)) * here.scale, strict=True))
+    seen = dict(zip(fit.model.names, _room(here, fit) * here.scale, strict=True))
     known = {name: replace(prior, seen=float(seen[name])) for name, prior in open_.items()}
     return replace(fit, model=fit.model.with_prior(known))
+
+
+def _room(here: Coordinates, fit: Fit) -> Floats:
+    """Standard deviations of coordinates, shape (P,), no more than walls leave room for.
+
+    Of two dampers whose sum alone is known each may be anything up to that, and no more.  What
+    walls leave is the deviation of the normal distribution that they cut off, in those of half a
+    normal: that is what is left of one beside its own wall.
+    """
+    root = _root(_slope(here, fit))
+    errors = np.linalg.norm(root, axis=1)
+    walled = ~here.log & (here.low == 0)
+    if walled.any():
+        values, draws = fit.theta[walled] / here.scale[walled], 1000
+        left = spread_above(here.low[walled], values, root[walled], draws)
+        half = np.sqrt(1 - 2 / np.pi)
+        errors[walled] = np.minimum(errors[walled], left / half)
+    return np.asarray(errors)
 
 
 def _slope(here: Coordinates, fit: Fit) -> Floats:
@@ -118,25 +137,48 @@ def _slope(here: Coordinates, fit: Fit) -> Floats:
     return slope / np.sqrt(max(1.0, fit.reduced_chi_square))
 
 
-def _split(slope: Floats, values: Floats, rising: list[int]) -> tuple[int | None, list[int]]:
-    """The largest of the small ones, where none is seen but their sum is, and the others."""
-    if len(rising) < 2:
-        return None, rising
-    *smaller, largest = rising
-    follow = _followed(slope, smaller)[largest]
+def _split(
+    slope: Floats, values: Floats, found: dict[int, Prior], rising: list[int]
+) -> tuple[int | None, list[int]]:
+    """Which are small, and one that is seen beside them because their sum is.
+
+    The smallest first: those follow that are not seen where the ones so far are given.
+    """
+    small: list[int] = []
+    for index in rising:
+        if values[index] < _enough(found[index]) * _errors(_given(slope, small))[index]:
+            small.append(index)
+    if not small:
+        return None, small
+    follow, errors = _followed(slope, small), _errors(_given(slope, small))
+    beside, nearest = None, np.inf
+    for index in rising:
+        whole = values[index] - follow[index] @ values[small]
+        if index in small or not (follow[index] < 0).all() or whole <= _SEEN * errors[index]:
+            continue
+        end = whole / -follow[index].min()  # of the small one that takes most of it
+        if end < nearest:
+            beside, nearest = index, end
+    return beside, small
+
+
+def _given(slope: Floats, small: list[int]) -> Floats:
+    """The slopes where the small ones are known."""
     known = slope.copy()
-    known[:, smaller] = 0.0
-    whole = values[largest] - follow @ values[smaller]
-    if (follow < 0).all() and whole > _SEEN * _errors(known)[largest]:
-        return largest, smaller
-    return None, rising
+    known[:, small] = 0.0
+    return known
 
 
 def _errors(slope: Floats) -> Floats:
     """Standard deviations of coordinates, shape (P,), those without a slope aside."""
+    return np.asarray(np.linalg.norm(_root(slope), axis=1))
+
+
+def _root(slope: Floats) -> Floats:
+    """A root of the covariance of coordinates, shape (P, P)."""
     # Of the triangle, not of its square: that has lost what is known worst to rounding.
     triangle = np.linalg.qr(np.concatenate([slope, np.eye(slope.shape[1])]), mode="r")
-    return np.asarray(np.linalg.norm(np.linalg.inv(triangle), axis=1))
+    return np.asarray(np.linalg.inv(triangle))
 
 
 def _followed(slope: Floats, small: list[int]) -> Floats:
@@ -152,13 +194,17 @@ def start_of(here: Coordinates, fit: Fit) -> Floats:
     """The fit in the coordinates `here`, shape (P,), inside the support.
 
     The small ones begin at a quantile of their priors, because zero is an end: at one where the
-    data are not yet against it by more than they are against draws of the posterior.
+    data are not yet against it by more than they are against draws of the posterior, or, where
+    priors lie far above all that the data allow, as near to zero as a fit may go.
     """
     lost = len(fit.theta)  # log likelihood; half of it is what draws lose
-    for begin in (0.3, 0.1, 0.03, 0.01):
+    quantiles = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-5, 1e-7, 1e-9)
+    for begin in quantiles:
         phi = inside(here, fit, begin)
-        if fit.likelihood(here.natural(phi[None]))[0] > fit.log_likelihood - lost:
-            break
+        if np.isfinite(phi).all():
+            theta = here.natural(phi[None])
+            if fit.likelihood(theta)[0] > fit.log_likelihood - lost:
+                break
     return phi
 
 
@@ -182,6 +228,15 @@ def _on_every_scale(prior: Prior) -> Prior:
     if isinstance(prior, MaybeZero):
         return NearZero(prior.scale, max(prior.floor, 1e-12 * prior.scale))
     return prior
+
+
+def reached(here: Coordinates, theta: Floats) -> NDArray[np.bool_]:
+    """Which vectors, shape (B, P), lie where the small ones are small; shape (B,).
+
+    Where one is not, the others would be measured from far away.
+    """
+    small = theta[:, list(here.near_zero)]
+    return np.asarray(np.all(np.abs(small @ here.follow.T) < _LONGEST, axis=1))
 
 
 def redrawing(here: Coordinates, fit: Fit) -> Redraw | None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.numerics.mixture import StudentMixture, student
@@ -64,6 +67,19 @@ class Proposal:
         jitter = 1e-5
         step += jitter * generator.standard_normal(walkers.shape)
         return walkers + step, np.zeros(count)
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """All of it, for a checkpoint."""
+        parts = (self.straightening, self.mixture)
+        kept = {f.name: getattr(part, f.name) for part in parts for f in fields(part)}
+        return {**kept, "archive": self.archive}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Proposal:
+        """What `to_arrays` kept."""
+        straightening = Straightening(**{f.name: arrays[f.name] for f in fields(Straightening)})
+        mixture = StudentMixture(**{f.name: arrays[f.name] for f in fields(StudentMixture)})
+        return cls(straightening, mixture, arrays["archive"])
 
 
 def fitted(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,8 @@ from bayeshaptic.inference.sampling.ensembles import (
     refitted,
 )
 from bayeshaptic.inference.sampling.near_zero import Redraw
-from bayeshaptic.inference.sampling.proposal import Proposal
+from bayeshaptic.inference.sampling.several_peaks import restored
 from bayeshaptic.inference.stopping import Rule, Verdict
-from bayeshaptic.numerics.mixture import StudentMixture
-from bayeshaptic.numerics.straightening import Straightening
 from bayeshaptic.types import Floats, LogDensity, Progress
 
 _FIRST_STEPS = 32  # before chains are looked at for the first time
@@ -47,7 +45,7 @@ class Run:
     refits : int
     """
 
-    ensembles: Ensembles
+    ensembles: Ensembles[Any]
     rng: np.random.Generator
     chains: Floats = field(default_factory=lambda: np.empty(0))
     values: Floats = field(default_factory=lambda: np.empty(0))
@@ -84,7 +82,8 @@ class Run:
         steps, every, few = self.steps, self.every, _MIXED * self.values.size
         slow = verdict.diagnostics.ess < few
         refits = 4
-        if slow and self.refits < refits and 2 * every * steps <= affordable * every:
+        can = self.ensembles.refittable
+        if slow and can and self.refits < refits and 2 * every * steps <= affordable * every:
             self.ensembles = refitted(self.ensembles, self.chains, self.values, self.rng)
             self.chains, self.values = np.empty(0), np.empty(0)
             self.more, self.every, self.refits = 2 * every * steps, 1, self.refits + 1
@@ -100,7 +99,6 @@ class Run:
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """All of it but the density, for a checkpoint."""
-        proposal = self.ensembles.proposal
         numbers = {
             "share": self.ensembles.share,
             **{name: getattr(self, name) for name in ("more", "every", "refits")},
@@ -108,11 +106,8 @@ class Run:
         }
         kind, words, *others = self.ensembles.state
         numbers["state"] = [kind, np.asarray(words).tolist(), *others]
-        straight = {f.name: getattr(proposal.straightening, f.name) for f in fields(Straightening)}
         return {
-            **straight,
-            **{f.name: getattr(proposal.mixture, f.name) for f in fields(StudentMixture)},
-            "archive": proposal.archive,
+            **self.ensembles.proposal.to_arrays(),
             "positions": self.ensembles.positions,
             "chains": self.chains,
             "values": self.values,
@@ -125,15 +120,13 @@ class Run:
     ) -> Run:
         """What `to_arrays` kept, of the same `density` and `redraw`."""
         numbers = json.loads(str(arrays["numbers"]))
-        mixture = StudentMixture(**{f.name: arrays[f.name] for f in fields(StudentMixture)})
-        straightening = Straightening(**{f.name: arrays[f.name] for f in fields(Straightening)})
         kind, words, *others = numbers["state"]
         rng = np.random.default_rng()
         rng.bit_generator.state = numbers["rng"]
         return cls(
             Ensembles(
                 density,
-                Proposal(straightening, mixture, arrays["archive"]),
+                restored(arrays),
                 numbers["share"],
                 arrays["positions"],
                 (kind, np.array(words, dtype=np.uint32), *others),

@@ -7,7 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.models.response.dynamic_link import Index
-from bayeshaptic.models.response.spanning import GROUND, Edges, merged, spanning_trees, with_edge
+from bayeshaptic.models.response.spanning import (
+    GROUND,
+    Edges,
+    ends_of,
+    merged,
+    node_of,
+    signs_of,
+    spanning_trees,
+    with_edge,
+)
 from bayeshaptic.numerics.polynomial import Polynomial, add
 from bayeshaptic.types import Floats
 
@@ -92,18 +101,11 @@ class Mechanism:
     def mutual(self, first: Pair, second: Pair) -> Polynomial:
         """Numerator, over `transfer`'s denominator, of the stretch of one pair by another's force.
 
-        Reciprocal: either may be the one that a force pushes apart.  By the effective compliances
-        R of the network, (R_il + R_jk - R_ik - R_jl) / 2 for the pairs ij and kl.
+        Reciprocal: either may be the one that a force pushes apart; see `signs_of`.
         """
-        (i, j), (k, m) = ((GROUND if node is None else node for node in p) for p in (first, second))
-        edges = self._edges()
-        if (i, j) == (k, m):
-            return spanning_trees(merged(edges, (i, j)))
-        signs = {(i, m): 0.5, (j, k): 0.5, (i, k): -0.5, (j, m): -0.5}
-        total = np.zeros((1, self.batch))
-        for pair, sign in signs.items():
-            if pair[0] != pair[1]:
-                total = add(total, sign * spanning_trees(merged(edges, pair)))
+        edges, total = self._edges(), np.zeros((1, self.batch))
+        for pair, sign in signs_of(ends_of(first), ends_of(second)).items():
+            total = add(total, sign * spanning_trees(merged(edges, pair)))
         return total
 
     def transfer(self) -> tuple[Polynomial, Polynomial]:
@@ -121,8 +123,8 @@ class Mechanism:
         for number, mass in enumerate(self.masses):
             edges = with_edge(edges, number, GROUND, np.stack([zero, zero, mass]))
         for link in self.links:
-            second = GROUND if link.second is None else link.second
-            edges = with_edge(edges, link.first, second, np.stack([link.stiffness, link.damping]))
+            both = np.stack([link.stiffness, link.damping])
+            edges = with_edge(edges, link.first, node_of(link.second), both)
         return edges
 
     def state_matrix(self) -> Floats:

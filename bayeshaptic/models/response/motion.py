@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.models.response.filters import filtered
-from bayeshaptic.models.response.sampled import phi
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.types import Complexes, Floats
@@ -109,3 +108,10 @@ def modal_motion(
 def _residues(system: LinearSystem, poles: Complexes, mass: int) -> Complexes:
     numerator, denominator = filtered(*system.mechanism.transfer_to(mass), system.filters)
     return residues(numerator, denominator[-1], poles)[0]
+
+
+def phi(x: Complexes) -> Complexes:
+    """(e^x - 1) / x, and 1 at x = 0."""
+    small = np.abs(x) < 1e-8
+    safe = np.where(small, 1.0, x)
+    return np.where(small, 1.0 + 0.5 * x, np.expm1(safe) / safe)

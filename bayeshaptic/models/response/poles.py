@@ -7,22 +7,19 @@ import numpy as np
 from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
-from bayeshaptic.models.response.transfer import transfer, transfer_with_link
+from bayeshaptic.models.response.transfer import transfer
 from bayeshaptic.numerics.partial_fractions import moved_apart, residues
 from bayeshaptic.numerics.polynomial import Polynomial, roots
 from bayeshaptic.types import Complexes, Floats
 
 
-def poles_and_residues(
-    mechanism: Mechanism, filters: Filters, link: DynamicLink | None = None
-) -> tuple[Complexes, Complexes]:
+def poles_and_residues(mechanism: Mechanism, filters: Filters) -> tuple[Complexes, Complexes]:
     """Poles and residues without the delay, each of shape (B, n).
 
     Poles that coincide are moved apart, but for two at zero: their residues blow up.
     """
-    parts = transfer(mechanism) if link is None else transfer_with_link(mechanism, link)
-    top, bottom = (polynomial.T for polynomial in parts)
-    p = moved_apart(poles_of(mechanism, bottom, filters, link))
+    top, bottom = (polynomial.T for polynomial in transfer(mechanism))
+    p = moved_apart(poles_of(mechanism, bottom, filters))
     numerator, denominator = filtered(top, bottom, filters)
     return p, residues(numerator, denominator[-1], p)
 

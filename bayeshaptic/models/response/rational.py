@@ -1,9 +1,9 @@
 """Sampled response of a mechanism behind filters, for large batches: compiled.
 
-The formulas are those of `sampled.py` and `filtered.py`; `tests/plain_response.py` is the same in
-plain NumPy.  What takes one number a row is prepared for the whole batch; what takes one a
-frequency is left to `kernels/rational.py`, a vector at a time, so that no result depends on the
-batch around it.
+The formulas are those of `alias_tables.py`, filters are those of `filters.py`;
+`tests/plain_response.py` is the same in plain NumPy.  What takes one number a row is prepared for
+the whole batch; what takes one a frequency is left to `kernels/rational.py`, a vector at a time, so
+that no result depends on the batch around it.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from bayeshaptic.models.response.alias_tables import HIGH, ORDER, REACH, alias_tables
 from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.kernels.arrays import RationalArrays
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_of
-from bayeshaptic.models.response.sampled import HIGH, ORDER, REACH, alias_tables
 from bayeshaptic.models.response.transfer import transfer, transfer_with_link
 from bayeshaptic.numerics.polynomial import Polynomial, roots
 from bayeshaptic.types import Complexes, Floats, Ints
@@ -94,7 +94,7 @@ def _expanded(
 
 
 def fastest_of(numerator: Polynomial, denominator: Polynomial, period_s: float) -> Floats:
-    """|p_max| T of ratios of polynomials, shape (B,), as `sampled.fastest_pole` reads it."""
+    """|p_max| T of ratios of polynomials, shape (B,), as their series in 1/s tell it."""
     return _expanded(numerator.T, denominator.T, period_s)[3]
 
 

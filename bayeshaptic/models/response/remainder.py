@@ -30,7 +30,6 @@ from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
 from bayeshaptic.models.response.filters import Filter
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.rational import fastest_of
-from bayeshaptic.models.response.sampled import nodes_at
 from bayeshaptic.models.response.transfer import compliances
 from bayeshaptic.numerics.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Bools, Complexes, Floats, Ints
@@ -258,8 +257,7 @@ def sampled_remainder(
     """Delta G at frequencies of shape (L,), with hold and delay; shape (B, L)."""
     from bayeshaptic.models.response.kernels.remainder import hold_and_delay
 
-    nodes = nodes_at(frequency_hz, period_s)
-    omega = np.asarray(nodes.s.imag, float)
+    omega = 2 * np.pi * np.asarray(frequency_hz, float)
     theta = omega * period_s
     total = remainder.on_axis(omega)
     top = float(np.max(theta))
@@ -283,7 +281,7 @@ def sampled_remainder(
         if first > 1:
             total[:, rows] += _shared_alias_sums(part, theta, late, period_s, 1, first - 1)
     out = np.empty((len(delay_s), len(theta)), complex)
-    hold = np.ascontiguousarray(nodes.hold / period_s)
+    hold = np.ascontiguousarray(-np.expm1(-(1j * omega) * period_s) / period_s)
     turns = np.ascontiguousarray(delay_s / period_s)
     hold_and_delay(theta, _real(hold), turns, _real(np.ascontiguousarray(total)), _real(out))
     return out

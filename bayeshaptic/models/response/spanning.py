@@ -25,6 +25,29 @@ Edges = Mapping[Edge, Polynomial]
 P = TypeVar("P")
 
 
+def node_of(mass: int | None) -> int:
+    """A mass as a node of the network; None is the ground."""
+    return GROUND if mass is None else mass
+
+
+def ends_of(pair: tuple[int | None, int | None]) -> Edge:
+    """Two masses as nodes."""
+    return node_of(pair[0]), node_of(pair[1])
+
+
+def signs_of(first: Edge, second: Edge) -> dict[Edge, float]:
+    """Which nodes are made one for the stretch of one pair by another's force, with its factor.
+
+    By the effective compliances R of the network, (R_il + R_jk - R_ik - R_jl) / 2 for the pairs ij
+    and kl.
+    """
+    (i, j), (k, m) = first, second
+    if (i, j) == (k, m):
+        return {first: 1.0}
+    signs = {(i, m): 0.5, (j, k): 0.5, (i, k): -0.5, (j, m): -0.5}
+    return {pair: sign for pair, sign in signs.items() if pair[0] != pair[1]}
+
+
 @dataclass(frozen=True)
 class Algebra(Generic[P]):
     """How polynomials are added and multiplied: numbers, or a record of what is to be done."""

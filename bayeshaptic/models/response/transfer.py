@@ -19,7 +19,10 @@ from bayeshaptic.models.response.spanning import (
     GROUND,
     Algebra,
     Edge,
+    ends_of,
     merged,
+    node_of,
+    signs_of,
     spanning_trees,
     with_edge,
 )
@@ -83,7 +86,7 @@ class _Recorder:
 
 def transfer(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """What `Mechanism.transfer` gives, the batch first: shapes (B, degree + 1)."""
-    drive = _ends(mechanism.drive)
+    drive = ends_of(mechanism.drive)
     numerator, denominator = _trees(mechanism, (drive, _WHOLE))
     return numerator, denominator
 
@@ -95,7 +98,7 @@ def compliances(
 
     Each of shape (degree + 1, B).
     """
-    parts = [_parts(_ends(first), _ends(second)) for first, second in couples]
+    parts = [signs_of(ends_of(first), ends_of(second)) for first, second in couples]
     merges = tuple(dict.fromkeys(pair for part in parts for pair in part))
     *found, denominator = (p.T for p in _trees(mechanism, (*merges, _WHOLE)))
     known = dict(zip(merges, found, strict=True))
@@ -113,7 +116,7 @@ def transfer_with_link(mechanism: Mechanism, link: DynamicLink) -> tuple[Floats,
     the link's ends made one: a sum over spanning trees again, without a subtraction.
     """
     assert link.ratio is not None
-    drive, ends = _ends(mechanism.drive), _ends((link.first, link.second))
+    drive, ends = ends_of(mechanism.drive), ends_of((link.first, link.second))
     both: tuple[Merge, ...] = () if set(drive) == set(ends) else ((drive, ends),)
     top, bottom, more_bottom, *more_top = (
         p.T for p in _trees(mechanism, (drive, _WHOLE, ends, *both))
@@ -125,20 +128,11 @@ def transfer_with_link(mechanism: Mechanism, link: DynamicLink) -> tuple[Floats,
     return top.T, add(bottom, multiply(above, more_bottom)).T
 
 
-def _parts(first: Edge, second: Edge) -> dict[Edge, float]:
-    """Which nodes are made one for a compliance, and with which factor; see `Mechanism.mutual`."""
-    (i, j), (k, m) = first, second
-    if (i, j) == (k, m):
-        return {first: 1.0}
-    signs = {(i, m): 0.5, (j, k): 0.5, (i, k): -0.5, (j, m): -0.5}
-    return {pair: sign for pair, sign in signs.items() if pair[0] != pair[1]}
-
-
 def _trees(mechanism: Mechanism, merges: tuple[Merge, ...]) -> list[Floats]:
     """The sum over the spanning trees with nodes made one, (B, degree + 1) for each merge."""
     from bayeshaptic.models.response.kernels.transfer import run
 
-    pairs = tuple((link.first, _node(link.second)) for link in mechanism.links)
+    pairs = tuple((link.first, node_of(link.second)) for link in mechanism.links)
     record = recorded(len(mechanism.masses), pairs, merges)
     edges = np.zeros((mechanism.batch, len(record.edges), _EDGE))
     for number, mass in enumerate(mechanism.masses):
@@ -182,11 +176,3 @@ def _merged(edges: Mapping[Edge, int], merge: Merge, algebra: Algebra[int]) -> M
     if set(first) & set(second):
         return merged(edges, tuple({*first, *second}), algebra)
     return merged(merged(edges, first, algebra), second, algebra)
-
-
-def _ends(pair: Mass) -> Edge:
-    return _node(pair[0]), _node(pair[1])
-
-
-def _node(mass: int | None) -> int:
-    return GROUND if mass is None else mass

@@ -17,6 +17,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
+from bayeshaptic.recordings.signals.runs import longest, runs
 from bayeshaptic.recordings.signals.sweeps import moves_until
 from bayeshaptic.types import Bools, Floats
 
@@ -52,29 +53,22 @@ _USUAL = (
 )
 
 
-def refuse_too_little(recording: Recording) -> None:
-    """Refuse a recording that says too little of the device.
+class TooLittle(NamedTuple):
+    """Why a recording says too little, and what to do."""
 
-    Parameters
-    ----------
-    recording : Recording
-        In open loop; of one with feedback no stiffness is recommended anyway.
-
-    Raises
-    ------
-    InputError
-        With the reason, and what to do.
-    """
-    refuse_where_told(recording, too_little(recording))
+    reason: str
+    cure: str
 
 
 def too_little(recording: Recording) -> tuple[Notice, ...]:
     """The warning that a recording in open loop says too little, and what to do; or none."""
-    reasons = (look(recording) for look in _LOOKS)
-    reason = next((reason for reason in reasons if reason is not None), None)
-    if reason is None:
+    looks = (look(recording) for look in _LOOKS)
+    found = next((found for found in looks if found is not None), None)
+    if found is None:
         return ()
-    return (Notice("warning", TOO_LITTLE, f"Too little to find a stiffness from: {reason}."),)
+    told = TooLittle(f"{TOO_LITTLE} to find a stiffness from: {found.reason}", found.cure)
+    text = f"{told.reason[0].upper()}{told.reason[1:]}; {told.cure}."
+    return (Notice("warning", TOO_LITTLE, text, about=told),)
 
 
 def says_nothing_of_the_actuator(recording: Recording) -> list[Notice]:
@@ -96,19 +90,11 @@ def says_nothing_of_the_actuator(recording: Recording) -> list[Notice]:
     return [Notice("warning", "two levels", text)]
 
 
-class TooLittle(NamedTuple):
-    """Why a recording says too little, and what to do."""
-
-    reason: str
-    cure: str
-
-
 def told_too_little(notices: Iterable[Notice]) -> TooLittle | None:
     """What a warning says of a recording that says too little; None without one."""
     for notice in notices:
         if (notice.level, notice.topic) == ("warning", TOO_LITTLE):
-            reason, _, cure = notice.text.rstrip(".").partition("; ")
-            return TooLittle(reason[0].lower() + reason[1:], cure)
+            return TooLittle(*notice.about)
     return None
 
 
@@ -125,29 +111,30 @@ def refuse_where_told(recording: Recording | None, notices: Iterable[Notice]) ->
         raise InputError(f"{where}: {told.reason}; {told.cure}")
 
 
-def _short(recording: Recording) -> str | None:
+def _short(recording: Recording) -> TooLittle | None:
     seconds = recording.duration_s
     if seconds >= SHORTEST_S or find_repetition(recording.force) is not None:
         return None
-    return (
-        f"{seconds:.3g} s, and at least {SHORTEST_S:g} s are needed of a force that does not "
-        f"repeat; {_USUAL}"
+    reason = (
+        f"{seconds:.3g} s, and at least {SHORTEST_S:g} s are needed of a force that does not repeat"
     )
+    return TooLittle(reason, _USUAL)
 
 
-def _few_steps(recording: Recording) -> str | None:
+def _few_steps(recording: Recording) -> TooLittle | None:
     changes = np.abs(np.diff(recording.force)) > 1e-9 * np.ptp(recording.force)
     count = int(np.count_nonzero(changes))
     if count >= FEWEST_CHANGES:
         return None
     times = "once" if count == 1 else f"{count} times"
-    return (
+    reason = (
         f"the force changes {times} in {recording.duration_s:.3g} s, and a step says next to "
-        f"nothing of the response above a few hertz; {_USUAL}"
+        "nothing of the response above a few hertz"
     )
+    return TooLittle(reason, _USUAL)
 
 
-def few_tones(recording: Recording) -> str | None:
+def few_tones(recording: Recording) -> TooLittle | None:
     """Why so few tones as the force has say too little; None where there are enough."""
     force = recording.force - recording.force.mean()
     power = np.abs(np.fft.rfft(force * np.hanning(len(force)))) ** 2
@@ -159,23 +146,26 @@ def few_tones(recording: Recording) -> str | None:
         return None
     hertz = ", ".join(f"{tone.mean() / recording.duration_s:.3g}" for tone in tones)
     what = "a single tone" if len(tones) == 1 else f"{len(tones)} tones"
-    return (
+    reason = (
         f"the force is {what} ({hertz} Hz), and a response at {FEWEST_TONES} frequencies is the "
-        f"least from which masses and springs can be told apart; {_USUAL}"
+        "least from which masses and springs can be told apart"
     )
+    return TooLittle(reason, _USUAL)
 
 
-def _no_force(recording: Recording) -> str | None:
+def _no_force(recording: Recording) -> TooLittle | None:
     force = recording.force
-    idle = _long(force == 0, round(_IDLE_S / recording.period_s))
+    idle = np.zeros(len(force), dtype=bool)
+    for first, stop in zip(*runs(force == 0), strict=True):
+        idle[first:stop] = stop - first >= round(_IDLE_S / recording.period_s)
     if np.mean(idle) <= MOST_IDLE:
         return None
-    first, stop = _longest(~idle)
+    first, stop = longest(~idle)
     if stop - first < max(FEWEST_SAMPLES, SHORTEST_S / recording.period_s):
         cure = "excite the device all the time, and record again"
     else:
         cure = f"read the longest part with force alone, --rows {first + 1}:{stop}, or record again"
-    return f"the force is zero for {100 * np.mean(idle):.0f} % of the recording; {cure}"
+    return TooLittle(f"the force is zero for {100 * np.mean(idle):.0f} % of the recording", cure)
 
 
 def share_at_rest(recording: Recording) -> float:
@@ -205,7 +195,7 @@ def _resting(recording: Recording) -> tuple[Floats, Bools]:
     return position, np.ptp(position, axis=1) <= 1.01 * step
 
 
-def _standstill(recording: Recording) -> str | None:
+def _standstill(recording: Recording) -> TooLittle | None:
     position, resting = _resting(recording)
     still = np.mean(resting)
     if still <= MOST_IDLE or moves_until(recording):
@@ -216,34 +206,33 @@ def _standstill(recording: Recording) -> str | None:
     )
     mostly = 0.5  # of the standstill, at an end of the range
     if np.mean(cut_off[resting]) > mostly:
-        return (
+        return TooLittle(
             f"the position stays at {ends.low:.4g} or {ends.high:.4g} {recording.position_unit} "
             f"for {100 * still:.0f} % of the recording: it was cut off there by its sensor, or the "
-            "device leans on a stop; widen the range, or keep the device in its middle, and record "
-            "again"
+            "device leans on a stop",
+            "widen the range, or keep the device in its middle, and record again",
         )
-    return (
+    return TooLittle(
         f"the position stands still for {100 * still:.0f} % of the recording: dry friction holds "
-        "the device, or the motion is smaller than a count of the encoder; excite it two or three "
-        "times as strongly, so that it keeps moving, and record again"
+        "the device, or the motion is smaller than a count of the encoder",
+        "excite it two or three times as strongly, so that it keeps moving, and record again",
     )
 
 
-def _unanswered(recording: Recording) -> str | None:
+def _unanswered(recording: Recording) -> TooLittle | None:
     if find_repetition(recording.force) is not None:
         return None  # its lines are few, and their scatter between the periods says more
     follows = rough_response(recording).follows
     if follows >= LEAST_COHERENCE:
         return None
-    return (
+    return TooLittle(
         "the position hardly answers to the force: in the octave where it answers best their "
-        f"coherence is {follows:.2f} (1 is all, {LEAST_COHERENCE:g} the least to go on); check the "
-        "columns, excite the device two or three times as strongly, and record longer"
+        f"coherence is {follows:.2f} (1 is all, {LEAST_COHERENCE:g} the least to go on)",
+        "check the columns, excite the device two or three times as strongly, and record longer",
     )
 
 
-# Each says what is too little and, behind a semicolon, what to do.
-_LOOKS: tuple[Callable[[Recording], str | None], ...] = (
+_LOOKS: tuple[Callable[[Recording], TooLittle | None], ...] = (
     _short,
     _few_steps,
     few_tones,
@@ -251,21 +240,3 @@ _LOOKS: tuple[Callable[[Recording], str | None], ...] = (
     _standstill,
     _unanswered,
 )
-
-
-def _long(flags: Bools, least: int) -> Bools:
-    """Only the runs of at least so many samples."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    kept = np.zeros(len(flags), dtype=bool)
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        kept[start:stop] = stop - start >= least
-    return kept
-
-
-def _longest(flags: Bools) -> tuple[int, int]:
-    """The longest run: its first index, and the one behind its last; (0, 0) where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
-    if len(edges) == 0:
-        return 0, 0
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    return int(edges[2 * longest]), int(edges[2 * longest + 1])

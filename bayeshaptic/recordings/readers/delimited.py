@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers.layout import NUMBER, THOUSANDS, find_layout
+from bayeshaptic.recordings.readers.layout import NUMBER, find_layout
+from bayeshaptic.recordings.readers.numbers import THOUSANDS
 from bayeshaptic.recordings.readers.reader import MOST_TEXT, Arrays, Reader
 from bayeshaptic.types import Floats
 

@@ -16,8 +16,6 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.units import is_unit
 
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.I)
-# What may be a number whose thousands are parted.
-THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 
 Fields = list[str]
 

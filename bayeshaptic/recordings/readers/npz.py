@@ -10,14 +10,8 @@ import numpy as np
 from numpy.lib import format as npy
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.recordings.readers.reader import (
-    NO_NUMBERS,
-    Arrays,
-    Reader,
-    is_signal,
-    refuse_size,
-    vectors,
-)
+from bayeshaptic.recordings.readers.numbers import NO_NUMBERS
+from bayeshaptic.recordings.readers.reader import Arrays, Reader, is_signal, refuse_size, vectors
 
 
 def read_npz(path: Path) -> Arrays:

@@ -20,8 +20,6 @@ MOST_NUMBERS = 50_000_000
 MOST_TEXT = 200_000_000
 
 Arrays = dict[str, NDArray[Any]]
-# In the place of an array of something else, which is refused only where it is asked for.
-NO_NUMBERS = "no real numbers"
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,9 @@ NO_POWER = 1e-10
 # Of the sampling rate: there what lies between the samples of a velocity is a quarter of the loop's
 # response, and at 0.44 most of it. Fits to what a model makes of that are fits to itself.
 _OF_A_VELOCITY = 0.3
+# Windows on each side that are judged together, so that an antiresonance or one noisy window does
+# not end the range.
+_NEIGHBOURS = 4
 
 
 def choose_band(spectra: RandomSpectra, name: str) -> tuple[float, float]:
@@ -96,7 +99,7 @@ def driven_range(frequency_hz: NDArray[Any], power: NDArray[Any]) -> tuple[int, 
     return low, high
 
 
-def responds_until(excess: NDArray[Any], reach: int = 4) -> int | None:
+def responds_until(excess: NDArray[Any]) -> int | None:
     """The last window in which the response stands out of the noise.
 
     Only the upper end is judged: at the lower end, where a hand wanders, even a faint answer is
@@ -106,16 +109,13 @@ def responds_until(excess: NDArray[Any], reach: int = 4) -> int | None:
     ----------
     excess : ndarray, shape (W,)
         How far the response stands out, in standard deviations of what noise alone gives.
-    reach : int
-        Neighbours on each side that are judged together, so that an antiresonance or one noisy
-        window does not end the range.
 
     Returns
     -------
     int or None
         None where nothing stands out by four standard deviations.
     """
-    reach = min(reach, (len(excess) - 1) // 2)
+    reach = min(_NEIGHBOURS, (len(excess) - 1) // 2)
     kernel = np.ones(2 * reach + 1)
     total = np.convolve(excess, kernel, mode="same")
     count = np.convolve(np.ones_like(excess), kernel, mode="same")

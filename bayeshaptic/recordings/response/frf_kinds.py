@@ -13,7 +13,6 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.types import Complexes, Floats
 
-SAMPLED = "gain_db"
 # Time derivatives of the position in each.
 STRUCTURAL = {"receptance_db": 0, "mobility_db": 1, "accelerance_db": 2}
 PER_TIME = {0: ("",), 1: ("/s",), 2: ("/s^2", "/s2", "/s/s")}

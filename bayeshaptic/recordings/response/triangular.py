@@ -6,8 +6,12 @@ import numpy as np
 
 from bayeshaptic.types import Complexes
 
+# Of the largest diagonal: those below belong to columns that the ones before them make up for, and
+# their unknowns are zero.
+_LEAST = 1e-12
 
-def back_substituted(triangle: Complexes, target: Complexes, least: float = 1e-12) -> Complexes:
+
+def back_substituted(triangle: Complexes, target: Complexes) -> Complexes:
     """Solve R x = z, from the last unknown to the first.
 
     Parameters
@@ -15,9 +19,6 @@ def back_substituted(triangle: Complexes, target: Complexes, least: float = 1e-1
     triangle : complex ndarray, shape (..., k, k)
         Upper triangular.
     target : complex ndarray, shape (..., k)
-    least : float
-        Diagonals below this share of the largest belong to columns that those before them make up
-        for: their unknowns are zero.
 
     Returns
     -------
@@ -25,7 +26,7 @@ def back_substituted(triangle: Complexes, target: Complexes, least: float = 1e-1
     """
     diagonal = np.diagonal(triangle, axis1=-2, axis2=-1)
     size = np.abs(diagonal)
-    told = size > least * size.max(axis=-1, keepdims=True)
+    told = size > _LEAST * size.max(axis=-1, keepdims=True)
     inverse = np.where(told, 1 / np.where(told, diagonal, 1.0), 0.0)
     found = np.zeros_like(target)
     for row in reversed(range(target.shape[-1])):

@@ -12,6 +12,9 @@ from bayeshaptic.recordings.response.local_polynomial import NODES
 from bayeshaptic.recordings.response.triangular import back_substituted
 from bayeshaptic.recordings.response.windows import Windows
 
+_REACH = 2  # neighbours on each side: nodes for five coefficients, three times over
+_ROUNDS = 2  # of weights
+
 
 def unit_mass(frequency_hz: NDArray[Any]) -> NDArray[Any]:
     """The response of 1 kg, 1/s^2: inertia, damper and spring have a parabola as ratio to it."""
@@ -78,7 +81,7 @@ class LocalRational:
         )
 
 
-def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> LocalRational:
+def fit_local_rational(windows: Windows) -> LocalRational:
     """Fit the rational reference to the nodes of each window and its neighbours.
 
     Linearised least squares, its weights renewed with the denominator in each round.
@@ -87,9 +90,6 @@ def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> Loc
     ----------
     windows : Windows
         Three nodes a window, compressed with `unit_mass` as reference.
-    reach : int
-        Neighbours on each side.
-    rounds : int
     """
     count = len(windows.lines)
     design = windows.design * unit_mass(windows.frequency_hz)[:, None, :]
@@ -98,8 +98,8 @@ def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> Loc
     freedom = windows.lines[:, None] - 3
     power = np.sum(np.abs(inverse) ** 2, axis=-1) * windows.scatter[:, None] / freedom
 
-    size = min(2 * reach + 1, count)
-    first = np.clip(np.arange(count) - reach, 0, count - size)
+    size = min(2 * _REACH + 1, count)
+    first = np.clip(np.arange(count) - _REACH, 0, count - size)
     near = first[:, None] + np.arange(size)
     frequency, ratio, sd = (
         values[near].reshape(count, -1)
@@ -110,7 +110,7 @@ def fit_local_rational(windows: Windows, reach: int = 2, rounds: int = 2) -> Loc
     powers = _powers((frequency - centre[:, None]) / scale[:, None])
     columns = np.concatenate([powers + 0j, -ratio[..., None] * powers[..., 1:]], axis=-1)
     denominator = np.concatenate([np.ones((count, 1)), np.zeros((count, 2))], axis=1) + 0j
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         weight = 1 / (sd * np.abs(np.einsum("wij,wj->wi", powers, denominator)))
         both = np.concatenate([columns, ratio[..., None]], axis=-1) * weight[..., None]
         triangle = np.asarray(np.linalg.qr(both, mode="r"))

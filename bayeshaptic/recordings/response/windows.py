@@ -89,7 +89,10 @@ class Windows:
         )
 
     def after(self, others: Windows) -> Windows:
-        """With others in the place of as many of the lowest; of windows no model was fitted to."""
+        """The windows with the lowest ones replaced by `others`.
+
+        Of windows that no model was fitted to.
+        """
         count = len(others.lines)
         return self._joined(others, lambda own, other: np.concatenate([other, own[count:]]))
 

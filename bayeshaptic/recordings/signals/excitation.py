@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
+from bayeshaptic.recordings.signals.runs import longest
+
 # Excited lines lie at most 50 dB below the strongest.
 EXCITED = 1e-5
 
@@ -64,9 +66,9 @@ def find_repetition(
     candidates = _candidates(centred)
     for period in candidates:
         same = np.abs(centred[period:] - centred[:-period]) <= tolerance * sd
-        start, run = _longest_run(same)
-        stop = start + run + period
-        enough = run >= period and stop - start >= samples / 2
+        start, end = longest(same)
+        stop = end + period
+        enough = end - start >= period and stop - start >= samples / 2
         if enough and centred[start:stop].std() > 0.1 * sd:
             return Repetition(start, stop, int(period))
     for period in candidates if noise > 0 else ():
@@ -116,16 +118,6 @@ def _candidates(centred: NDArray[Any], most: int = 200) -> NDArray[np.int64]:
     best = np.flatnonzero(peak)
     best = best[np.argsort(-similarity[best], kind="stable")[:most]]
     return np.sort(lags[best])
-
-
-def _longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    """Start and length of the longest run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    if len(edges) == 0:
-        return 0, 0
-    starts, lengths = edges[::2], edges[1::2] - edges[::2]
-    longest = int(np.argmax(lengths))
-    return int(starts[longest]), int(lengths[longest])
 
 
 def excited_lines(period: NDArray[Any], noise: NDArray[Any] | float = 0.0) -> NDArray[np.int64]:

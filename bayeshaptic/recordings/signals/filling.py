@@ -171,9 +171,7 @@ def _regression(design: Floats, target: Floats, ridge: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(*stacked, rcond=1e-13)[0])
 
 
-def fit_predictor(
-    position: Floats, force: Floats, missing: Bools, order: int = ORDER
-) -> Predictor | None:
+def fit_predictor(position: Floats, force: Floats, missing: Bools) -> Predictor | None:
     """The regression over all samples that are there, with all of their past.
 
     Parameters
@@ -181,7 +179,6 @@ def fit_predictor(
     position, force : ndarray, shape (N,)
         Without a force, zeros, it is a regression of a signal on itself.
     missing : ndarray of bool, shape (N,)
-    order : int
 
     Returns
     -------
@@ -189,33 +186,33 @@ def fit_predictor(
         None where there are too few such samples.
     """
     gaps = np.concatenate([[0], np.cumsum(missing)])
-    rows = np.arange(order, len(position))
-    rows = rows[gaps[rows + 1] == gaps[rows - order]]
-    columns = 2 * order + 2
+    rows = np.arange(ORDER, len(position))
+    rows = rows[gaps[rows + 1] == gaps[rows - ORDER]]
+    columns = 2 * ORDER + 2
     rows_a_column = 8
     if len(rows) < rows_a_column * columns:
         return None
     most_rows = 20_000  # a regression on more gains nothing
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), most_rows)).astype(int)]
     centre = float(position[~missing].mean())
-    lags = np.arange(order + 1)
+    lags = np.arange(ORDER + 1)
     tiny = np.finfo(float).tiny
     sizes = (np.ptp(position[~missing]), max(np.abs(force).max(), tiny))
     design = np.empty((len(rows), columns))
-    design[:, :order] = (position[rows[:, None] - lags[1:]] - centre) / sizes[0]
-    design[:, order:-1] = force[rows[:, None] - lags] / sizes[1]
+    design[:, :ORDER] = (position[rows[:, None] - lags[1:]] - centre) / sizes[0]
+    design[:, ORDER:-1] = force[rows[:, None] - lags] / sizes[1]
     design[:, -1] = 1.0
     target = (position[rows] - centre) / sizes[0]
     # Where the force has no power its coefficients are anything; they had better be zero.
     ridge = np.zeros(columns)
     unseen = 1e-8  # power of the force, over all of it, below which nothing is learnt from it
-    ridge[order:-1] = np.sqrt(unseen) * np.linalg.norm(design[:, order])
+    ridge[ORDER:-1] = np.sqrt(unseen) * np.linalg.norm(design[:, ORDER])
     found = _regression(design, target, ridge)
     spread = 1.4826 * float(np.median(np.abs(target - design @ found)))
-    past = np.concatenate([[1.0], -found[:order]])
+    past = np.concatenate([[1.0], -found[:ORDER]])
     return Predictor(
         past,
-        found[order:-1] * sizes[0] / sizes[1],
+        found[ORDER:-1] * sizes[0] / sizes[1],
         float(found[-1] * sizes[0] + centre * past.sum()),
         spread * sizes[0],
     )

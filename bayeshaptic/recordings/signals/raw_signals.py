@@ -1,4 +1,4 @@
-"""Facts that the raw samples show, before any estimate: resolution, held samples, clipping."""
+"""Facts that the raw samples show, before any estimate: resolution, clipping."""
 
 from __future__ import annotations
 
@@ -11,27 +11,6 @@ from numpy.typing import NDArray
 # A clipped extreme holds more samples than this, and this many times those of the level beside it.
 CLIPPED_SAMPLES = 30
 CLIPPED_RATIO = 3
-
-
-@dataclass(frozen=True)
-class Repeats:
-    """Runs of exactly equal samples.
-
-    Attributes
-    ----------
-    start : ndarray of int, shape (R,)
-        Index of each run's first sample.
-    length : ndarray of int, shape (R,)
-        Samples in the run.
-    catch_up : ndarray, shape (R,)
-        The increment after the run over the usual one there (mean magnitude of the ten increments
-        on either side): about one where the signal rested, about `length` where it was held while
-        it moved; nan at the ends.
-    """
-
-    start: NDArray[np.intp]
-    length: NDArray[np.intp]
-    catch_up: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -102,39 +81,6 @@ def _refine(steps: NDArray[np.float64], unit: float) -> float | None:
             return unit if np.abs(part / unit - counts).mean() < 0.08 else None
         # Grow by what the unit's own error allows, but at least to the next increment.
         reach = max(2 * reach, 1.01 * float(steps[len(part)]) / unit)
-
-
-def repeats(signal: NDArray[Any], shortest: int = 3) -> Repeats:
-    """Runs of at least `shortest` exactly equal samples.
-
-    Parameters
-    ----------
-    signal : ndarray, shape (N,)
-    shortest : int
-        At least 2.
-
-    Returns
-    -------
-    Repeats
-    """
-    steps = np.diff(np.asarray(signal, dtype=float))
-    still = np.concatenate([[False], steps == 0, [False]])
-    edges = np.flatnonzero(np.diff(still.astype(np.int8)))
-    start, length = edges[::2], edges[1::2] - edges[::2] + 1
-    start, length = start[length >= shortest], length[length >= shortest]
-    catch_up = np.full(len(start), np.nan)
-    total = np.concatenate([[0.0], np.cumsum(np.abs(steps))])
-    for i, (first, count) in enumerate(zip(start, length, strict=True)):
-        after = first + count - 1  # index of the first increment that is not zero
-        before = max(0, first - 10)
-        end = min(len(steps), after + 11)
-        if first == 0 or after + 1 >= end:
-            continue
-        around = (total[first] - total[before]) + (total[end] - total[after + 1])
-        usual = around / (first - before + end - after - 1)
-        if usual > 0:
-            catch_up[i] = abs(steps[after]) / usual
-    return Repeats(start, length, catch_up)
 
 
 def clipping(signal: NDArray[Any]) -> Clipping:

@@ -31,15 +31,13 @@ class Stretch:
         Samples from the first switch to the last.
     middle : float
         The place between those of the switches up and down: the set point.
-    switches : int
     at_places : int
-        How many of them come where the position first passes their place.
+        How many of the switches come where the position first passes their place.
     """
 
     first: int
     stop: int
     middle: float
-    switches: int
     at_places: int
 
 
@@ -81,7 +79,7 @@ def _stretch(position: Floats, at: NDArray[np.int_], up: NDArray[np.bool_]) -> S
         count = _at_places(position, at, up, lag, places)
         if count > best:
             best, middle = count, (places[0] + places[1]) / 2
-    return Stretch(int(at[0]), int(at[-1]), middle, len(at) - 1, best)
+    return Stretch(int(at[0]), int(at[-1]), middle, best)
 
 
 def _at_places(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import scale
+from bayeshaptic.quantities import minus, scale
 from bayeshaptic.report.figures import style
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float)
     axes.text(
         0.97,
         0.95,
-        f"{rank_correlation:+.2f}".replace("-", "\N{MINUS SIGN}"),
+        minus(f"{rank_correlation:+.2f}"),
         transform=axes.transAxes,
         ha="right",
         va="top",
@@ -145,7 +145,7 @@ def _map(figure: Figure, matrix: NDArray[Any], names: tuple[str, ...]) -> None:
     dark = 0.85  # from which black on the colour cannot be read
     for i in marks:
         for j in range(i):
-            text = f"{10 * matrix[i, j]:.0f}".replace("-0", "0").replace("-", "\N{MINUS SIGN}")
+            text = minus(f"{10 * matrix[i, j]:.0f}".replace("-0", "0"))
             look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": style.SMALL - 1.5}
             look["color"] = "white" if abs(matrix[i, j]) > dark else style.DATA
             axes.text(j, i, text, **look)

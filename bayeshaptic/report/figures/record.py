@@ -51,9 +51,9 @@ def draw(result: Result) -> Figure:
     return figure
 
 
-def extent(values: NDArray[Any], buckets: int = _BUCKETS) -> NDArray[Any]:
-    """Lowest and highest sample of each of `buckets` equal parts, shape (2, B)."""
-    count = min(buckets, len(values))
+def extent(values: NDArray[Any]) -> NDArray[Any]:
+    """Lowest and highest sample of each of the equal parts that are drawn, shape (2, B)."""
+    count = min(_BUCKETS, len(values))
     parts = np.array_split(values, count)
     return np.array([[part.min() for part in parts], [part.max() for part in parts]])
 

@@ -35,8 +35,8 @@ def draw(result: Result) -> Figure:
     return figure
 
 
-def rank_histogram(chains: NDArray[Any], bins: int = RANK_BINS) -> NDArray[Any]:
-    """Shares of each ensemble's draws in `bins` ranks of all draws, over the share expected.
+def rank_histogram(chains: NDArray[Any]) -> NDArray[Any]:
+    """Shares of each ensemble's draws in `RANK_BINS` ranks of all draws, over the share expected.
 
     Parameters
     ----------
@@ -44,13 +44,13 @@ def rank_histogram(chains: NDArray[Any], bins: int = RANK_BINS) -> NDArray[Any]:
 
     Returns
     -------
-    ndarray, shape (E, bins)
+    ndarray, shape (E, RANK_BINS)
         1 everywhere when all ensembles sample the same density (Vehtari et al., 2021).
     """
     flat = chains.reshape(len(chains), -1)
     rank = np.argsort(np.argsort(flat, axis=None)).reshape(flat.shape)
-    share = [np.histogram(row, bins, (0, flat.size))[0] for row in rank]
-    return np.array(share) * bins / flat.shape[1]
+    share = [np.histogram(row, RANK_BINS, (0, flat.size))[0] for row in rank]
+    return np.array(share) * RANK_BINS / flat.shape[1]
 
 
 def _trace(axes: Axes, chains: NDArray[Any], name: str) -> None:

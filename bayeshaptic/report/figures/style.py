@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bayeshaptic.quantities import minus
 from bayeshaptic.report.figures.drawing.png import png
 from bayeshaptic.report.figures.hover import panels
 
@@ -171,7 +172,7 @@ def plain(value: float, _: object = None) -> str:
         factor = f"{float(digits):g}"
         raised = f"10{str(int(power)).translate(_RAISED)}"
         text = raised if factor == "1" else f"{factor}·{raised}"
-    return text.replace("-", "\N{MINUS SIGN}")
+    return minus(text)
 
 
 def short(name: str) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.quantities import percent, pure, quantity
+from bayeshaptic.quantities import minus, percent, pure, quantity
 from bayeshaptic.report.figures.style import short
 from bayeshaptic.report.listed import listed
 
@@ -127,7 +127,7 @@ def _raise(found: Sequence[Elasticities]) -> str:
         middle = one.median
         order = sorted(middle, key=lambda name: -abs(middle[name]))
         parts = [
-            f"{middle[name]:+.2g} % for {short(name)}".replace("-", "\N{MINUS SIGN}")
+            minus(f"{middle[name]:+.2g} % for {short(name)}")
             for name in order[:3]
             if abs(middle[name]) > _FLAT
         ]
@@ -153,7 +153,7 @@ def _sweep(one: Sweep) -> str:
     if abs(end / now - 1) < _FLAT:
         text = f"{what} leaves the limit where it is."
     else:
-        step = f"{_DB * np.log(end / now):+.1f} dB".replace("-", "\N{MINUS SIGN}")
+        step = minus(f"{_DB * np.log(end / now):+.1f} dB")
         text = (
             f"{what} makes the limit {quantity(end / now, '', digits=2)} times what it is ({step})."
         )

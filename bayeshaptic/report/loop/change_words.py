@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.quantities import estimate, pure, quantity, scale
+from bayeshaptic.quantities import estimate, minus, pure, quantity, scale
 from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.report.numbers.unstated import unstated
 
@@ -45,9 +45,10 @@ def error_change(closed: Closed) -> str:
     where = " in the worst part" if part(closed) else ""
     same = 0.005  # relative change of an error that is not worth a word
     if abs(after / before - 1) < same:
-        return f"left the {what} at {_times(after)} times the noise{where}"
+        return f"left the {what} at {quantity(after, '')} times the noise{where}"
     verb = "cut" if after < before else "raised"
-    return f"{verb} the {what} from {_times(before)} to {_times(after)} times the noise{where}"
+    old, new = quantity(before, ""), quantity(after, "")
+    return f"{verb} the {what} from {old} to {new} times the noise{where}"
 
 
 def noise_change(closed: Closed) -> str:
@@ -81,7 +82,7 @@ def limit_change(closed: Closed) -> str:
     row = scale((old, new), unit)
     gap = abs(new - old) / 5
     old_text, new_text = (row.number(value, gap, least=3) for value in (old, new))
-    change = f"{step:+.1f} dB".replace("-", "\N{MINUS SIGN}")
+    change = minus(f"{step:+.1f} dB")
     return f"K_CR moved from {old_text} to {new_text} {row.unit} ({change})"
 
 
@@ -89,8 +90,3 @@ def moved(closed: Closed) -> str:
     """The same as a sentence of its own."""
     text = limit_change(closed)
     return text.replace("K_CR", "With that the median limit", 1)
-
-
-def _times(error: float) -> str:
-    """Three digits, also where they are zeros."""
-    return quantity(error, "")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.effects.library import effect_class
-from bayeshaptic.quantities import estimate, percent, quantity, scale
+from bayeshaptic.quantities import estimate, minus, percent, quantity, scale
 from bayeshaptic.report.loop.change_words import part
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
@@ -239,7 +239,7 @@ def _score(value: float) -> str:
     if not math.isfinite(value):
         return _DASH
     text = f"{value + 0.0:,.1f}" if abs(value) < 99.95 else f"{value:,.0f}"
-    return text.replace("-", "\N{MINUS SIGN}")
+    return minus(text)
 
 
 def _number(value: float | None, suffix: str, places: int | None = None) -> str:
@@ -248,4 +248,4 @@ def _number(value: float | None, suffix: str, places: int | None = None) -> str:
         return _DASH
     if places is None:
         return quantity(value, "") + suffix
-    return f"{round(value, places) + 0.0:.{places}f}".replace("-", "\N{MINUS SIGN}") + suffix
+    return minus(f"{round(value, places) + 0.0:.{places}f}") + suffix

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bayeshaptic.quantities import estimate, percent, quantity
+from bayeshaptic.quantities import estimate, minus, percent, quantity
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -68,4 +68,4 @@ def amount(strength: float, unit: str) -> str:
 
 def db(shift: float) -> str:
     """With its sign."""
-    return f"{round(shift, 3) + 0.0:+.3f}".replace("-", "\N{MINUS SIGN}").replace("+0.000", "0.000")
+    return minus(f"{round(shift, 3) + 0.0:+.3f}").replace("+0.000", "0.000")

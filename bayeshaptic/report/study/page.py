@@ -13,6 +13,7 @@ from bayeshaptic.report.study import tables as study_tables
 from bayeshaptic.report.study.assumptions import assumptions
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.words import configurations, hands, hidden, missing, people
+from bayeshaptic.report.tables import crossings
 
 if TYPE_CHECKING:
     from bayeshaptic.report.figures.style import Drawn
@@ -70,6 +71,7 @@ def render_study(
         people=people(study),
         people_caption=_people_caption(study),
         correlations=study_tables.correlations(study.population) if study.population else (),
+        crossings=crossings(study.new_person[0].limit) if study.new_person else (),
         configurations=configurations(study),
         hidden=hidden(study),
         parts=tuple(parts),

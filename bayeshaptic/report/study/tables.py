@@ -18,7 +18,7 @@ from bayeshaptic.stability.tail import ENOUGH_BELOW
 
 if TYPE_CHECKING:
     from bayeshaptic.inference.population.population import Population
-    from bayeshaptic.stability.cases import Case, DeviceLimit
+    from bayeshaptic.stability.cases import DeviceLimit
     from bayeshaptic.stability.critical import CriticalStiffness
     from bayeshaptic.study.analysed import Analysed
     from bayeshaptic.study.analysis import StudyAnalysis
@@ -144,7 +144,7 @@ def unstated(study: StudyAnalysis) -> str:
 
 
 def binding(study: StudyAnalysis) -> Rows:
-    """Every case: (case, group, median in dB, 90 % interval, probability that it binds)."""
+    """Every case: (case, median in dB, 90 % interval, probability that it binds)."""
     assert study.limit is not None
     cases = {case.label: case for case in study.cases}
     rows = []
@@ -216,14 +216,6 @@ def correlations(found: Population) -> Rows:
             rows.append((abs(middle), (f"{names[i]}, {names[j]}", middle, low, high)))
     strongest = sorted(rows, key=lambda row: -row[0])[:3]
     return tuple((pair, *(pure(v, 2) for v in values)) for _, (pair, *values) in strongest)
-
-
-def crossings(cases: Sequence[Case]) -> Rows:
-    """What limits a person not yet seen: (crossing, median frequency, probability)."""
-    return tuple(
-        (c.label, quantity(c.frequency_hz, "Hz", digits=4), percent(c.probability))
-        for c in cases[0].limit.crossings
-    )
 
 
 def provenance(study: StudyAnalysis) -> Rows:

@@ -101,21 +101,6 @@ class PoleResponse:
         values(*tables, self.exact, loops, angles, out)
         return out
 
-    def terms(self, rows: Ints, theta: Floats) -> Complexes:
-        """The contribution of each pole, shape (n, M, k); their sum is `at` in plain NumPy."""
-        half = np.exp(0.5j * theta)
-        back = np.conj(half) ** 2
-        point = 2j * np.sin(0.5 * theta) * half if self.exact else 1j * theta
-        direct, late, centre = (
-            table[rows].T[:, :, None] for table in (self.direct, self.late, self.centre)
-        )
-        terms = direct + late * back
-        terms /= point - centre
-        delay = self.delay[rows]
-        if np.any(delay):
-            terms *= np.exp(-1j * theta * delay[:, None])
-        return terms
-
     def at_ends(self) -> tuple[Floats, Floats]:
         with np.errstate(divide="ignore", invalid="ignore"):
             static = -(self.residues / self.poles).sum(axis=1).real

@@ -1,7 +1,7 @@
 """Terms and values of a `PoleResponse`, compiled.
 
-In plain NumPy `sampled.from_poles` is the same, and of the values `PoleResponse.terms`.  It
-contains `held_pole.py` of the sampled response, and is to be compiled anew where that is changed.
+In plain NumPy `from_poles` of `tests/plain_response.py` is the same.  It contains
+`held_pole.py` of the sampled response, and is to be compiled anew where that is changed.
 """
 
 from __future__ import annotations

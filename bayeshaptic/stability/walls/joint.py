@@ -78,21 +78,16 @@ class JointRegion:
         return np.unique(np.concatenate([steps, known]))
 
 
-def joint_region(
-    cases: Sequence[Any], damping: Damping | None = None, draws: int = DRAWS
-) -> JointRegion:
-    """The region of one case or several.
+def joint_region(cases: Sequence[Any], draws: int = DRAWS) -> JointRegion:
+    """The region of one case or several, of backward differences.
 
     Parameters
     ----------
     cases : sequence of Case
-    damping : Backward or LowPass, optional
-        By default the backward difference.
     draws : int
         Of each case.
     """
-    kind = damping or Backward()
-    regions = tuple(kb_region(case, kind, draws=draws) for case in cases)
+    regions = tuple(kb_region(case, Backward(), draws=draws) for case in cases)
     return JointRegion(regions, tuple(case.label for case in cases))
 
 

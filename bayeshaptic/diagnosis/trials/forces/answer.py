@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.unforced import slow_share
+from bayeshaptic.diagnosis.residuals.low_pass import slow_share
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.types import Complexes, Floats
 
@@ -35,7 +35,7 @@ class Answer:
     moved : complex ndarray, shape (R, 2)
         What a damper and a spring of one would add there, with the opposite sign.
     edge_hz : float
-        Up to where a motion is slow: `slow_motion`.
+        Up to where a motion is slow: `low_pass`.
     """
 
     system: LinearSystem

@@ -15,11 +15,12 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from bayeshaptic.diagnosis.residuals.unforced import HAND_ORDER
+from bayeshaptic.diagnosis.residuals.low_pass import ORDER
 from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.recordings.checks.sufficiency import standstill
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.runs import runs
 from bayeshaptic.types import Floats
 
 # A hand wanders below this; what it does above falls so steeply that the velocity's whole band
@@ -89,9 +90,9 @@ def _rests(recording: Recording) -> list[tuple[int, int]]:
     count, length = standstill(recording)
     position = recording.position
     span = maximum_filter1d(position, length) - minimum_filter1d(position, length)
-    still = maximum_filter1d((span <= 1.01 * count).astype(int), length)
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], still, [0]])))
-    return list(zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True))
+    still = maximum_filter1d((span <= 1.01 * count).astype(int), length) > 0
+    starts, stops = runs(still)
+    return list(zip(starts.tolist(), stops.tolist(), strict=True))
 
 
 def _knots(recording: Recording) -> list[Floats]:
@@ -114,7 +115,5 @@ def _pulses(knots: Floats, samples: int) -> Iterator[Floats]:
 
 def _fast_velocity(motion: Floats, period_s: float, edge_hz: float) -> Floats:
     """The velocity of a motion, shape (N, ...), between where hands wander and the edge."""
-    band = butter(
-        HAND_ORDER, [_WANDERS_HZ, edge_hz], btype="bandpass", fs=1 / period_s, output="sos"
-    )
+    band = butter(ORDER, [_WANDERS_HZ, edge_hz], btype="bandpass", fs=1 / period_s, output="sos")
     return np.asarray(np.gradient(sosfiltfilt(band, motion, axis=0), period_s, axis=0))

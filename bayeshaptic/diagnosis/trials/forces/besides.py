@@ -1,4 +1,4 @@
-"""The motion that neither the command nor forces make: a hand's, or a free device's drift.
+"""The motion that neither the command nor forces make: a hand's, or a free device's coasting.
 
 It is read off the encoder: what is measured, less what command and forces do.  Forces act in it,
 so that what they do and it must be found together.  One read off beside what forces did in the
@@ -19,7 +19,8 @@ import numpy as np
 from numpy.linalg import lstsq
 from scipy.fft import next_fast_len
 
-from bayeshaptic.diagnosis.residuals.unforced import parts, slow_motion, slow_share
+from bayeshaptic.diagnosis.residuals.low_pass import low_pass, slow_share
+from bayeshaptic.diagnosis.residuals.unforced import parts
 from bayeshaptic.diagnosis.trials.forces.at_rest import AtRest
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.types import Floats
@@ -80,7 +81,7 @@ class Hand:
 
     def of(self, left: Floats) -> Floats:
         hand = left if self.rests is None else self.rests.smoothest(left)
-        return slow_motion(hand, self.period_s, self.edge_hz)
+        return low_pass(hand, self.edge_hz, self.period_s)
 
     def off(self, taken: Floats, rest: Floats) -> Floats:
         return self.of(taken + rest) - taken
@@ -110,14 +111,14 @@ class HandAfar(Hand):
 
 
 @dataclass(frozen=True)
-class Drift:
+class Coasting:
     """A free device's: how it began to move, and a constant force.
 
     Attributes
     ----------
     own, usual : ndarray, shape (N, 2 or 3)
-        `drifts` of the mechanism without forces, and of that with what they do on the average;
-        as many as are `remembered`.
+        `coasting_motions` of the mechanism without forces, and of that with what they do on the
+        average; as many as are `remembered`.
     mean : float
         Of the command: a force that is constant, and no other, as long as nothing else is known.
     """
@@ -165,7 +166,7 @@ class Nothing:
 
 
 def remembered(columns: Floats) -> Floats:
-    """`drifts` without the push where that is forgotten within a hundredth of the recording.
+    """`coasting_motions` without the push where a hundredth of the recording forgets that.
 
     It cannot be told from standing elsewhere then; but where forces are taken for less than they
     are it goes far.

@@ -60,7 +60,7 @@ def _with_the_simplest(bench: ForceBench, start: Point, index: int) -> Point:
 
 
 def _likeliest(bench: ForceBench, known: Point, index: int, instead: list[Acting]) -> Point:
-    """Of forces in the place of one of a point's the one that fits best."""
+    """The point whose force number `index` is replaced by whichever of `instead` fits best."""
     before, after = known.forces[:index], known.forces[index + 1 :]
     points = [
         bench.point((*before, one, *after), known.theta, expected=known.motion) for one in instead

@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.residuals.unforced import drifts, hand_edge_hz
+from bayeshaptic.diagnosis.residuals.unforced import coasting_motions, hand_edge_hz
 from bayeshaptic.diagnosis.trials.forces.at_rest import AtRest, at_rest
 from bayeshaptic.diagnosis.trials.forces.besides import (
     Besides,
-    Drift,
+    Coasting,
     Hand,
     HandAfar,
     Nothing,
@@ -93,11 +93,13 @@ class Simulation:
         return None if rests is None else replace(self, rests=rests)
 
     @cached_property
-    def _usual_drifts(self) -> Floats:
-        return remembered(self._drifts(self.usual))
+    def _usual_coasting(self) -> Floats:
+        return remembered(self._coasting(self.usual))
 
-    def _drifts(self, theta: Floats) -> Floats:
-        return drifts(self.model.system(theta), self.recording.samples, self.recording.period_s)
+    def _coasting(self, theta: Floats) -> Floats:
+        return coasting_motions(
+            self.model.system(theta), self.recording.samples, self.recording.period_s
+        )
 
     def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
         """Position and velocity at places, on the fine grid, beside the forces that are there."""
@@ -203,8 +205,8 @@ class Simulation:
             return kind(self.recording.period_s, self.edge_hz, own, usual, self.rests)
         if not _against_ground(places):
             return Nothing()  # that a spring between the masses would know of
-        kept, mean = self._usual_drifts.shape[1], float(self.recording.force.mean())
-        return Drift(self._drifts(theta)[:, :kept], self._usual_drifts, mean)
+        kept, mean = self._usual_coasting.shape[1], float(self.recording.force.mean())
+        return Coasting(self._coasting(theta)[:, :kept], self._usual_coasting, mean)
 
     def _linear(self, theta: Floats, command: Floats, places: tuple[Place, ...]) -> Floats:
         """What a command does to the masses at places: positions and velocities, (M, 2, N * s).

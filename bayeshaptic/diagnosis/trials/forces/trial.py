@@ -18,7 +18,7 @@ from bayeshaptic.recordings.response.etfe import Etfe
 
 
 def force_trial(bench: ForceBench, point: Point) -> Trial:
-    """What a force would mean, and those before it beside it."""
+    """The trial of the point's last force, with those before it as they are beside it."""
     theta = polish(bench.model, point.windows, point.theta)
     fit = summarise(bench.model, point.windows, theta)
     accepted = _accepted(bench, point)
@@ -56,7 +56,8 @@ def _accepted(bench: ForceBench, point: Point) -> tuple[Accepted, ...]:
                 title=law.title + _where(law),
                 estimates=_estimates(bench.model, change.acting, sd),
                 change=change,
-                # What it leaves open is in the new one's; what another law would make of it is not.
+                # What the earlier force leaves open is counted in the new one's; what another law
+                # of it would change is not.
                 limit_log_sd=one.limit_log_sd if one.ties else 0.0,
             )
         found.append(one)

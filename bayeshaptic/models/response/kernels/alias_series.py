@@ -1,4 +1,4 @@
-"""Coefficients of the series over aliases, with the formulas of `../sampled.py`.
+"""Coefficients of the series over aliases, with the formulas of `../alias_tables.py`.
 
 Kernels elsewhere contain it: they are to be compiled anew where it is changed.
 """

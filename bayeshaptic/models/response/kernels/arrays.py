@@ -31,7 +31,7 @@ class RationalArrays(NamedTuple):
     high : ndarray of int
         Nodes where the nearest aliases are taken by themselves.
     bernoulli, binomials, economy : ndarray
-        See `sampled.alias_tables`.
+        See `alias_tables.alias_tables`.
     """
 
     numerator: Floats

@@ -1,4 +1,4 @@
-"""The compiled part of `../rational.py`, with the formulas of `../sampled.py`.
+"""The compiled part of `../rational.py`, with the formulas of `../alias_tables.py`.
 
 Some rows of the batch at a time, which have one delay: their responses at all nodes are made in a
 few small arrays, and written out or put into the windows of a likelihood.  A function that is given

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.causality.news import News, news
+from bayeshaptic.recordings.signals.causality.innovations import innovations_answer
 from bayeshaptic.recordings.signals.causality.prediction import Share, predict
 from bayeshaptic.recordings.signals.excitation import Repetition, find_repetition
 from bayeshaptic.recordings.signals.sweeps import is_sweep
@@ -32,8 +32,8 @@ NOTABLE_CORRELATION = 0.02
 SIGNIFICANT = 5.0
 # From here on a recording is not called open loop either.
 DOUBTFUL = 4.0
-# Chi-square of the answer to news from which on it is feedback, and from which on it may be: in 115
-# open loops it stays below 27.
+# Chi-square of the innovations' answer from which on it is feedback, and from which on it may be:
+# in 115 open loops it stays below 27.
 _ANSWERS, _MAY_ANSWER = 40.0, 30.0
 # So is a correlation as strong as this that comes and goes.
 _STRONG = 0.8
@@ -63,8 +63,8 @@ class Causality:
         Share of the force's one-step prediction error (variance) that the past position removes, on
         data that was not used to fit the prediction; about zero or slightly negative in an open
         loop. Once for each floor below which errors are none.
-    news : News
-        How the force's news answer to earlier ones of the position.
+    innovations : float
+        Chi-square of the answer of the force's innovations to earlier ones of the position.
     answer : Share
         Share of the position's prediction error that the past force removes.
     same_sample, next_sample : Share
@@ -86,7 +86,7 @@ class Causality:
     """
 
     feedback: tuple[Share, ...]
-    news: News
+    innovations: float
     answer: Share
     same_sample: Share
     next_sample: Share
@@ -159,8 +159,8 @@ class Causality:
             return f"the past position removes {share} of the error of predicting it"
         if self.at_limits > _MOST_AT_LIMIT and not self._against(DOUBTFUL):
             return f"it is at its limits in {100 * self.at_limits:.0f} % of the samples"
-        if not self._against(DOUBTFUL) and self.news.evidence > _MAY_ANSWER:
-            chance = f"chi-square {self.news.evidence:.0f}, where chance gives some 7"
+        if not self._against(DOUBTFUL) and self.innovations > _MAY_ANSWER:
+            chance = f"chi-square {self.innovations:.0f}, where chance gives some 7"
             return f"what is new in it answers to what was new in the position before ({chance})"
         instant, when = min(
             (self.same_sample, "the same"), (self.next_sample, "the next"), key=lambda s: s[0].z
@@ -172,7 +172,7 @@ class Causality:
 
     def _position_drives(self, z: float) -> bool:
         least = _ANSWERS if z >= SIGNIFICANT else _MAY_ANSWER
-        answers = self.news.evidence > least
+        answers = self.innovations > least
         return (self._past_drives(z) or self._against(z) or answers) and not self.repeats
 
     def _against(self, z: float) -> bool:
@@ -245,7 +245,7 @@ def _causality(force: Floats, position: Floats, stretches: int) -> Causality:
     of_position = predict(position, force, stretches=stretches)
     return Causality(
         feedback=tuple(of_force.past(floor) for _, _, floor in _LADDER),
-        news=news(of_force, of_position) if saturates < _MOST_AT_LIMIT else News(0.0),
+        innovations=innovations_answer(of_force, of_position) if saturates < _MOST_AT_LIMIT else 0,
         answer=of_position.past(_FLOOR),
         same_sample=of_force.same_instant(),
         next_sample=of_force.next_instant(),

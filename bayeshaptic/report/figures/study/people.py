@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
     from bayeshaptic.study.analysis import StudyAnalysis
 
+_LABEL = 30  # characters of a line in the legend
 _NARROWEST_DB = 0.2  # of the axis: a population that does not differ is not to look as if it did
 
 
@@ -88,10 +89,10 @@ def _references(axes: Axes, study: StudyAnalysis) -> None:
         )
 
 
-def _wrapped(label: str, width: int = 30) -> str:
+def _wrapped(label: str) -> str:
     import textwrap
 
-    return "\n".join(textwrap.wrap(label, width))
+    return "\n".join(textwrap.wrap(label, _LABEL))
 
 
 def _users(axes: Axes, study: StudyAnalysis) -> None:

@@ -1,4 +1,4 @@
-"""Whether what is new in the force answers to what was new in the position before.
+"""Whether the force's innovations, what is new in it, answer to those of the position before.
 
 Where both are predicted as well as their pasts allow, nothing of the one that is left may be
 correlated with the other one's past (L. D. Haugh, *JASA* 71, 1976). A past that one prediction
@@ -7,8 +7,6 @@ so that far less than a share of the force can be seen than by comparing two pre
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,26 +18,13 @@ from bayeshaptic.types import Floats
 _SPANS = ((1, 2), (2, 3), (3, 5), (5, 9), (9, 17), (17, 33))
 _LAST = _SPANS[-1][1]
 # A force that is predicted to less than this (of its increments' power), or not at all, has
-# nothing new in it that chance made; nor has one whose news come in jumps, or foretell each other.
+# nothing new in it that chance made; nor has one whose innovations come in jumps, or foretell each
+# other.
 _FAINTEST, _STRONGEST = 2.5e-3, 1.2
 
 
-@dataclass(frozen=True)
-class News:
-    """The answer of the force's news to those of the position.
-
-    Attributes
-    ----------
-    evidence : float
-        Chi-square of six spans of delay, and of an answer against the motion within the sample;
-        zero where the force is not such that it can be told.
-    """
-
-    evidence: float
-
-
-def news(of_force: Prediction, of_position: Prediction) -> News:
-    """Correlate the force's news with earlier ones of the position.
+def innovations_answer(of_force: Prediction, of_position: Prediction) -> float:
+    """How the force's innovations answer to earlier ones of the position.
 
     Parameters
     ----------
@@ -48,13 +33,15 @@ def news(of_force: Prediction, of_position: Prediction) -> News:
 
     Returns
     -------
-    News
+    float
+        Chi-square of six spans of delay, and of an answer against the motion within the sample;
+        zero where the force is not such that it can be told.
     """
     force, position = (within_the_usual(e) for e in (of_force.own, of_position.full))
     in_jumps = 0.1
     usual = 1 - _power(force) / max(_power(of_force.own), np.finfo(float).tiny) < in_jumps
     if not (usual and _FAINTEST < _power(of_force.own) < _STRONGEST and _is_white(force)):
-        return News(0.0)
+        return 0.0
     force, position = force - force.mean(), position - position.mean()
     # Row k of the force among those of the position.
     at = np.searchsorted(of_position.rows, of_force.rows)
@@ -63,7 +50,7 @@ def news(of_force: Prediction, of_position: Prediction) -> News:
     summed = np.concatenate([[0.0], np.cumsum(position)])
     found = [_z(force * (summed[at - low + 1] - summed[at - high + 1])) for low, high in _SPANS]
     against = min(_z(force * position[at]), 0.0)
-    return News(float(np.sum(np.square([*found, against]))))
+    return float(np.sum(np.square([*found, against])))
 
 
 def _power(signal: Floats) -> float:
