@@ -15,7 +15,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.coordinates import Coordinates, coordinates, reach
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
-from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.numerics.gauss_newton import jacobian, root_of_covariance
 from bayeshaptic.quantities import quantity, scale
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
@@ -261,15 +261,10 @@ def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) 
     covariance = np.full((model.size, model.size), np.nan)
     inner = np.flatnonzero(~bound)
     # A direction that the data do not see at all gets a width of 50 coordinate units, not zero.
-    curvature = slope[:, inner].T @ slope[:, inner] + np.eye(len(inner)) / 50.0**2
-    try:
-        within = np.linalg.inv(curvature)
-    except np.linalg.LinAlgError:  # of a model that is far off, some directions are all rounding
-        within = np.linalg.pinv(curvature, hermitian=True)
     stretch = np.where(here.log, theta, here.scale)[inner]
-    covariance[np.ix_(inner, inner)] = within * np.outer(stretch, stretch) * max(1.0, chi_square)
-    with np.errstate(invalid="ignore"):  # nan where rounding left nothing of a variance
-        sd = np.sqrt(np.diag(covariance))
+    root = stretch[:, None] * root_of_covariance(slope[:, inner], widest=50.0)
+    covariance[np.ix_(inner, inner)] = (root @ root.T) * max(1.0, chi_square)
+    sd = np.sqrt(np.diag(covariance))
     return Fit(
         model,
         theta,

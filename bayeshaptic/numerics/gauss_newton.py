@@ -48,6 +48,22 @@ def _differences(shifted: Floats, at: Floats) -> Floats:
     return shifted
 
 
+def root_of_covariance(slope: Floats, widest: float = 1.0) -> Floats:
+    """A root of the covariance of parameters, shape (P, P): root @ root.T.
+
+    Of the triangle of the slopes, not of its square: that has lost what is known worst to rounding.
+
+    Parameters
+    ----------
+    slope : ndarray, shape (N, P)
+        Of residuals of unit variance.
+    widest : float
+        Standard deviation, beside the data's, of a direction that they do not see.
+    """
+    known = np.concatenate([slope, np.eye(slope.shape[1]) / widest])
+    return np.asarray(np.linalg.inv(np.linalg.qr(known, mode="r")))
+
+
 def minimise(
     residuals: Residuals,
     start: Floats,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from bayeshaptic.inference.coordinates import Coordinates, is_wide, sampling_coordinates
 from bayeshaptic.inference.fit import Fit, weighted_residuals
 from bayeshaptic.models import MaybeZero, NearZero, Prior, draw
-from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.numerics.gauss_newton import jacobian, root_of_covariance
 from bayeshaptic.numerics.truncated_normal import spread_above
 from bayeshaptic.types import Floats
 
@@ -119,7 +119,7 @@ def _room(here: Coordinates, fit: Fit) -> Floats:
     walls leave is the deviation of the normal distribution that they cut off, in those of half a
     normal: that is what is left of one beside its own wall.
     """
-    root = _root(_slope(here, fit))
+    root = root_of_covariance(_slope(here, fit))
     errors = np.linalg.norm(root, axis=1)
     walled = ~here.log & (here.low == 0)
     if walled.any():
@@ -171,14 +171,7 @@ def _given(slope: Floats, small: list[int]) -> Floats:
 
 def _errors(slope: Floats) -> Floats:
     """Standard deviations of coordinates, shape (P,), those without a slope aside."""
-    return np.asarray(np.linalg.norm(_root(slope), axis=1))
-
-
-def _root(slope: Floats) -> Floats:
-    """A root of the covariance of coordinates, shape (P, P)."""
-    # Of the triangle, not of its square: that has lost what is known worst to rounding.
-    triangle = np.linalg.qr(np.concatenate([slope, np.eye(slope.shape[1])]), mode="r")
-    return np.asarray(np.linalg.inv(triangle))
+    return np.asarray(np.linalg.norm(root_of_covariance(slope), axis=1))
 
 
 def _followed(slope: Floats, small: list[int]) -> Floats:
