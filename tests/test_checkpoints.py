@@ -137,7 +137,9 @@ def test_an_interrupted_report_goes_on(tmp_path: Path, monkeypatch: pytest.Monke
         jobs_recording.report_recording(job, None)
     assert [path.suffix for path in kept.iterdir()] == [".state"]
     with monkeypatch.context() as patch:
-        patch.setattr("bayeshaptic.inference.sampler.warmed_up_about_peaks", None)  # it is not needed
+        patch.setattr(
+            "bayeshaptic.inference.sampler.warmed_up_about_peaks", None
+        )  # it is not needed
         jobs_recording.report_recording(job, None)
     assert not kept.exists()
     quiet, resumed = (one.analysis.limit.samples for one in found)

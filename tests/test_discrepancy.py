@@ -15,6 +15,7 @@ from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.traced import Traced, share_left
 from bayeshaptic.diagnosis.trials.all_lines import _leaves_little
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, _further, drift_trials
+from bayeshaptic.diagnosis.widening.deviation import Deviation, evidence, matern, merged
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
@@ -298,3 +299,33 @@ def test_crossings_of_a_bent_response_are_told_apart_by_their_frequency(monkeypa
     assert second.label.startswith("rigid body at") and second.frequency_hz < 9
     assert second.probability == pytest.approx(0.3, abs=0.05)
     assert np.all(wide.frequency_hz[wide.group == 1] < 9)
+
+
+def test_lines_of_one_place_are_one_in_what_a_deviation_may_be():
+    """Thousands of lines take their cube; sizes and lengths are as probable as with all of them."""
+    rng = np.random.default_rng(8)
+    log_f = np.sort(rng.uniform(0.0, 1.5, 450))
+    own = 0.05**2 * matern(log_f[:, None] - log_f[None, :], 0.4)
+    normal = rng.standard_normal((2, 2, len(log_f)))
+    noise = 0.02 * rng.uniform(0.5, 2.0, len(log_f))
+    smooth = np.linalg.cholesky(own + 1e-12 * np.eye(len(log_f))) @ (
+        normal[0, 0] + 1j * normal[0, 1]
+    )
+    value = (smooth + noise * (normal[1, 0] + 1j * normal[1, 1])) / np.sqrt(2)
+    found = Deviation(log_f, value, noise**2)
+    few, _ = merged(found, np.zeros((len(log_f), 0)))
+    assert len(few.log_f) < 160
+    at = np.full(len(log_f), 1.0)  # told apart by less than a hundredth of a decade
+    alike, _ = merged(replace(found, log_f=at), np.zeros((len(log_f), 0)))
+    assert len(alike.log_f) == 1 and alike.variance == pytest.approx(1 / np.sum(1 / noise**2))
+    cases, weight = evidence(found)
+    plain = []
+    for size, length in cases:
+        root = np.linalg.cholesky(
+            size**2 * matern(log_f[:, None] - log_f[None, :], length) + np.diag(noise**2)
+        )
+        white = np.linalg.solve(root, value)
+        plain.append(-np.sum(np.abs(white) ** 2) - 2 * np.log(np.diag(root)).sum())
+    exact = np.exp(np.array(plain) - max(plain))
+    # The same cases hold nearly all; within a place the process changes by a hundredth of its size.
+    assert np.abs(weight - exact / exact.sum()).sum() < 0.1

@@ -12,6 +12,7 @@ from bayeshaptic.types import Complexes, Floats
 
 _SIZES = np.geomspace(3e-4, 1.0, 12)
 _LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
+_ONE_PLACE = 0.01  # decades, over which none of these changes; windows are further apart
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,23 @@ def deviation(fit: Fit) -> Deviation:
     return Deviation(log_f, value, fit.likelihood.noise_variance / size)
 
 
+def merged(found: Deviation, slopes: Complexes) -> tuple[Deviation, Complexes]:
+    """The deviation with lines of one place as one, and the `slopes`, shape (W, C), with it.
+
+    A periodic recording may have thousands of lines, and what is done with a deviation takes their
+    cube.
+    """
+    place = np.floor((found.log_f - found.log_f.min()) / _ONE_PLACE).astype(int)
+    kinds, own = np.unique(place, return_inverse=True)
+    if len(kinds) == len(own):
+        return found, slopes
+    sums = np.zeros((len(kinds), len(own)))
+    sums[own, np.arange(len(own))] = 1 / found.variance
+    whole = sums.sum(axis=1)
+    sums /= whole[:, None]
+    return Deviation(sums @ found.log_f, sums @ found.value, 1 / whole), sums @ slopes
+
+
 def matern(distance: Floats, length: float) -> Floats:
     """Correlation of a process that is differentiable once."""
     scaled = np.sqrt(3) * np.abs(distance) / length
@@ -86,8 +104,9 @@ def evidence(
     slopes : complex ndarray, shape (W, C), optional
         What moves by a standard normal number each, and takes up a part of the deviation.
     """
-    between = found.log_f[:, None] - found.log_f[None, :]
     taken_up = np.zeros((len(found.log_f), 0)) if slopes is None else slopes
+    found, taken_up = merged(found, taken_up)
+    between = found.log_f[:, None] - found.log_f[None, :]
     both = np.column_stack([found.value, taken_up])
     cases, logs = [], []
     for length in _LENGTHS:

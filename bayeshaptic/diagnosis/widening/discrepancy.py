@@ -16,7 +16,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.residuals.excess import changing_share, noise_besides
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced, share_left
-from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern
+from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern, merged
 from bayeshaptic.diagnosis.widening.forces_left import forces_left
 from bayeshaptic.diagnosis.widening.friction import with_friction_for_damping
 from bayeshaptic.effects.laws import variables
@@ -211,7 +211,7 @@ def _with_linear(
     assert period is not None
     grid = 1500
     frequency = np.geomspace(0.05 * fit.frequency_hz.min(), 0.5 / period, grid)
-    bend = deviation(fit)
+    bend, _ = merged(deviation(fit), np.zeros((len(fit.windows.frequency_hz), 0)))
     # Below the band the mechanism alone speaks; above it the deviation may go on.
     beyond = np.arange(bend.log_f[-1] + 0.05, np.log10(frequency[-1]), 0.05)
     knots = np.concatenate([bend.log_f, beyond])

@@ -27,6 +27,7 @@ from bayeshaptic.types import Complexes, Floats
 BENDS = 0.2
 """How far what acts as noise bends the response, over what it scatters in a line."""
 _SMOOTH = 0.4  # decades
+_NEGLIGIBLE = 1e-6  # probability of a size and a length
 
 
 def with_rest(
@@ -78,7 +79,8 @@ def _bends(fit: Fit, left: Collection[str], taken_up: Complexes) -> Floats:
     if "linear" in left:
         smooth = replace(found, variance=found.variance + found.jumps)
         for (size, length), weight in zip(*evidence(smooth, taken_up), strict=True):
-            bent += weight * size**2 * matern(between, length)
+            if weight > _NEGLIGIBLE:
+                bent += weight * size**2 * matern(between, length)
     if set(left) - {"linear"}:
         share = BENDS * np.minimum(_scatter(fit), 1.0)
         bent += share[:, None] * share * matern(between, _SMOOTH)

@@ -75,6 +75,7 @@ def _conditional_widths(density: Density, phi: Floats) -> Floats:
     """How far each coordinate alone can move before the fit suffers, shape (P,)."""
     residuals = weighted_residuals(density.likelihood, density.coordinates)
     slope = jacobian(residuals, phi[None])[0]
+    slope = np.where(np.isfinite(slope), slope, 0.0)  # beside the end of what has a response
     return 1 / np.sqrt(1 + np.sum(slope**2, axis=0))
 
 
