@@ -12,7 +12,8 @@ from bayeshaptic.types import Complexes, Floats
 
 _SIZES = np.geomspace(3e-4, 1.0, 12)
 _LENGTHS = (0.05, 0.15, 0.4, 1.2)  # decades
-_ONE_PLACE = 0.01  # decades, over which none of these changes; windows are further apart
+_MANY = 500  # lines, from which on those within so many decades are one
+_ONE_PLACE = 0.01
 
 
 @dataclass(frozen=True)
@@ -70,21 +71,22 @@ def deviation(fit: Fit) -> Deviation:
     return Deviation(log_f, value, fit.likelihood.noise_variance / size)
 
 
-def merged(found: Deviation, slopes: Complexes) -> tuple[Deviation, Complexes]:
-    """The deviation with lines of one place as one, and the `slopes`, shape (W, C), with it.
+def merged(found: Deviation) -> tuple[Deviation, Floats]:
+    """The deviation with lines of one place as one, and the means that make it, shape (K, W).
 
     A periodic recording may have thousands of lines, and what is done with a deviation takes their
-    cube.
+    cube.  Over a hundredth of a decade none of the lengths that it may have changes.
     """
+    count = len(found.log_f)
+    if count < _MANY:
+        return found, np.eye(count)
     place = np.floor((found.log_f - found.log_f.min()) / _ONE_PLACE).astype(int)
     kinds, own = np.unique(place, return_inverse=True)
-    if len(kinds) == len(own):
-        return found, slopes
-    sums = np.zeros((len(kinds), len(own)))
-    sums[own, np.arange(len(own))] = 1 / found.variance
-    whole = sums.sum(axis=1)
-    sums /= whole[:, None]
-    return Deviation(sums @ found.log_f, sums @ found.value, 1 / whole), sums @ slopes
+    means = np.zeros((len(kinds), count))
+    means[own, np.arange(count)] = 1 / found.variance
+    whole = means.sum(axis=1)
+    means /= whole[:, None]
+    return Deviation(means @ found.log_f, means @ found.value, 1 / whole), means
 
 
 def matern(distance: Floats, length: float) -> Floats:
@@ -105,7 +107,8 @@ def evidence(
         What moves by a standard normal number each, and takes up a part of the deviation.
     """
     taken_up = np.zeros((len(found.log_f), 0)) if slopes is None else slopes
-    found, taken_up = merged(found, taken_up)
+    found, means = merged(found)
+    taken_up = means @ taken_up
     between = found.log_f[:, None] - found.log_f[None, :]
     both = np.column_stack([found.value, taken_up])
     cases, logs = [], []

@@ -211,7 +211,7 @@ def _with_linear(
     assert period is not None
     grid = 1500
     frequency = np.geomspace(0.05 * fit.frequency_hz.min(), 0.5 / period, grid)
-    bend, _ = merged(deviation(fit), np.zeros((len(fit.windows.frequency_hz), 0)))
+    bend, _ = merged(deviation(fit))
     # Below the band the mechanism alone speaks; above it the deviation may go on.
     beyond = np.arange(bend.log_f[-1] + 0.05, np.log10(frequency[-1]), 0.05)
     knots = np.concatenate([bend.log_f, beyond])
