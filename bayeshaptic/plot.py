@@ -19,14 +19,14 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import InputError
 from bayeshaptic.report.figures import (
     answer,
+    crossings as crossings_figure,
+    marginals as marginals_figure,
+    pairs as pairs_figure,
+    residuals as residuals_figure,
+    response as response_figure,
     stiffness,
     style,
 )
-from bayeshaptic.report.figures import crossings as crossings_figure
-from bayeshaptic.report.figures import marginals as marginals_figure
-from bayeshaptic.report.figures import pairs as pairs_figure
-from bayeshaptic.report.figures import residuals as residuals_figure
-from bayeshaptic.report.figures import response as response_figure
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.figures.on_axes import axes_of, fit_legends, is_narrow, stacked
 from bayeshaptic.report.figures.walls import kb

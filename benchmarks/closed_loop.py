@@ -22,8 +22,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
-from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG
-from bayeshaptic.inference.time_domain.uneven import Way
+from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG, Way
 from bayeshaptic.inference.time_domain.widths import FREEDOM
 from bayeshaptic.models import rigid
 from bayeshaptic.recordings import recording_from_arrays

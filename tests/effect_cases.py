@@ -17,8 +17,7 @@ from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.read import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.rig import Bench, Effect, WhiteNoise, simulate
-from bayeshaptic.rig import register as on_the_bench
+from bayeshaptic.rig import Bench, Effect, WhiteNoise, register as on_the_bench, simulate
 from bayeshaptic.rig.dynamics.structure import Relaxation, Structure
 
 

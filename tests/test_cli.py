@@ -29,8 +29,7 @@ from bayeshaptic.devices import device_names
 from bayeshaptic.diagnosis.analyse import analyse
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
-from bayeshaptic.jobs import batch
-from bayeshaptic.jobs import recording as recording_job
+from bayeshaptic.jobs import batch, recording as recording_job
 from bayeshaptic.report import summary_json
 from bayeshaptic.report.headline import Headline
 from bayeshaptic.report.reported import Reported

@@ -13,8 +13,7 @@ from scipy.signal import chirp
 
 from bayeshaptic.diagnosis import loop as closing
 from bayeshaptic.diagnosis.loop import Loop, trace
-from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
-from bayeshaptic.diagnosis.residuals.residual import smooth_columns
+from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest, smooth_columns
 from bayeshaptic.diagnosis.state import Accepted, State, Trial, compared_errors, held_out_rms
 from bayeshaptic.diagnosis.traced import Traced
 from bayeshaptic.diagnosis.trials import linear, windows

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import kstest, multivariate_t
-from scipy.stats import t as student_t
+from scipy.stats import kstest, multivariate_t, t as student_t
 
 from bayeshaptic.inference.sampling.ensembles import warmed_up
 from bayeshaptic.inference.sampling.proposal import fitted as fitted_proposal

@@ -16,8 +16,7 @@ from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
 from bayeshaptic.diagnosis.state import FIT, State, Trial, log_likelihoods, share, weights
 from bayeshaptic.diagnosis.trials import beside
 from bayeshaptic.diagnosis.trials.beside import beside_tests
-from bayeshaptic.diagnosis.trials.forces import called_for as tried
-from bayeshaptic.diagnosis.trials.forces import search, slopes
+from bayeshaptic.diagnosis.trials.forces import called_for as tried, search, slopes
 from bayeshaptic.diagnosis.trials.forces.along import Along
 from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.search import _damped, _scan
@@ -29,8 +28,7 @@ from bayeshaptic.diagnosis.trials.other_laws import found_anew, reconsidered
 from bayeshaptic.diagnosis.trials.windows import WindowTrials
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.linear.attached_mass import SecondMode
-from bayeshaptic.effects.nonlinear.friction import CoulombFriction
-from bayeshaptic.effects.nonlinear.friction import StribeckFriction as StribeckLaw
+from bayeshaptic.effects.nonlinear.friction import CoulombFriction, StribeckFriction as StribeckLaw
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box

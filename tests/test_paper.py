@@ -14,18 +14,16 @@ import bayeshaptic as bh
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
-from paper import (  # noqa: E402
-    evidence,
-    hypotheses,
-    identification,
-    margins,
-    relays,
-    residuals,
-    rule_map,
-    tables,
+from paper import evidence, hypotheses, identification, margins, relays, residuals, rule_map, tables  # noqa: E402
+from paper.published import (  # noqa: E402
+    BIN_HZ,
+    CASES,
+    LEVER_M,
+    TABLES,
+    delay_s,
+    relays as published_relays,
+    values,
 )
-from paper.published import BIN_HZ, CASES, LEVER_M, TABLES, delay_s, values  # noqa: E402
-from paper.published import relays as published_relays  # noqa: E402
 from paper.relay_data import RelayData  # noqa: E402
 
 

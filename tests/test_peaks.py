@@ -9,12 +9,7 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.inference.sampling.ensembles import joined, warmed_up
-from bayeshaptic.inference.sampling.several_peaks import (
-    SeveralPeaks,
-    covered,
-    log_held,
-    restored,
-)
+from bayeshaptic.inference.sampling.several_peaks import SeveralPeaks, covered, log_held, restored
 from bayeshaptic.numerics.mixture import student
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.types import Floats

@@ -25,10 +25,10 @@ from bayeshaptic.recordings import (
     read_frf,
     read_measurement,
     read_recording,
+    readers as registry,
     recording_from_arrays,
     register_reader,
 )
-from bayeshaptic.recordings import readers as registry
 from bayeshaptic.recordings.readers import apart
 from bayeshaptic.recordings.readers.matlab_sizes import refuse_sizes
 

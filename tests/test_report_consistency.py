@@ -18,12 +18,13 @@ from one_truth import check_page, numbers_of, page_of, same, words_only
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.next_experiment import Experiment
 from bayeshaptic.report import write_report
-from bayeshaptic.report.figures.study import configurations as study_configurations
-from bayeshaptic.report.figures.study import limit as study_limit
-from bayeshaptic.report.figures.study import people as study_people
+from bayeshaptic.report.figures.study import (
+    configurations as study_configurations,
+    limit as study_limit,
+    people as study_people,
+)
 from bayeshaptic.report.guidance.words import _next, experiment_rows
-from bayeshaptic.report.study import tables
-from bayeshaptic.report.study import write as study_write
+from bayeshaptic.report.study import tables, write as study_write
 from bayeshaptic.report.study.words import configurations
 from bayeshaptic.stability.guidance.shares import VarianceShares
 

@@ -22,11 +22,15 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.files import remove_dead_drafts
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Outcome
-from bayeshaptic.jobs.index import FILES as INDEX_FILES
-from bayeshaptic.jobs.index import row_of, write_index
+from bayeshaptic.jobs.index import FILES as INDEX_FILES, row_of, write_index
 from bayeshaptic.jobs.job import Job, Settings, refuse_file
-from bayeshaptic.jobs.manifest import NAME as MANIFEST
-from bayeshaptic.jobs.manifest import ManifestEntry, manifest_entry, read_manifest, write_manifest
+from bayeshaptic.jobs.manifest import (
+    NAME as MANIFEST,
+    ManifestEntry,
+    manifest_entry,
+    read_manifest,
+    write_manifest,
+)
 from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.report.draft import refuse_to_replace

@@ -20,9 +20,9 @@ from bayeshaptic.models.structures import (
     QUANTITIES,
     RIGID,
     Structure,
+    chain as chain_of_masses,
     structure_named,
 )
-from bayeshaptic.models.structures import chain as chain_of_masses
 
 # How well a device file is believed, as log standard deviations: configurations, assembly and
 # above all people differ.

@@ -6,14 +6,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.models.prior import (
-    HalfNormal,
-    LogNormal,
-    LogUniform,
-    Normal,
-    Prior,
-    Uniform,
-)
+from bayeshaptic.models.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 from bayeshaptic.models.prior_of_zero import MaybeZero, NearZero
 from bayeshaptic.models.structures import structure_named
 

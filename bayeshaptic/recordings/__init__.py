@@ -7,11 +7,7 @@ from bayeshaptic.recordings.read import read_recording, recording_from_arrays
 from bayeshaptic.recordings.readers import Reader, register_reader
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.frf_table import read_frf
-from bayeshaptic.recordings.signals.raw_signals import (
-    Clipping,
-    clipping,
-    increment_unit,
-)
+from bayeshaptic.recordings.signals.raw_signals import Clipping, clipping, increment_unit
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.recordings.study_file import read_study
 

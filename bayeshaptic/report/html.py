@@ -14,9 +14,12 @@ from bayeshaptic.report.assumptions import assumptions, priors
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
 from bayeshaptic.report.figures.style import Drawn
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.loop import change_words, force_words
-from bayeshaptic.report.loop import tables as loop_tables
-from bayeshaptic.report.loop import words as loop_words
+from bayeshaptic.report.loop import (
+    change_words,
+    force_words,
+    tables as loop_tables,
+    words as loop_words,
+)
 from bayeshaptic.report.loop.motion_words import motion_words
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 from bayeshaptic.report.numbers.unstated import unstated

@@ -11,16 +11,15 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
-from bayeshaptic.report.guidance.section import FIGURES as ADVICE
-from bayeshaptic.report.guidance.section import guidance_section
+from bayeshaptic.report.guidance.section import FIGURES as ADVICE, guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.hidden.section import hidden_section
 from bayeshaptic.report.html import render
 from bayeshaptic.report.numbers.unstated import unstated
 from bayeshaptic.report.page.section import Section
 from bayeshaptic.report.summary import summary_json
-from bayeshaptic.report.walls.section import FIGURES as WALLS
 from bayeshaptic.report.walls.section import (
+    FIGURES as WALLS,
     case_of,
     friction_of,
     limits_section,

@@ -16,13 +16,7 @@ import scipy.optimize
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.rig.dynamics.plant import Array, Plant
-from bayeshaptic.rig.dynamics.propagate import (
-    generator,
-    layout,
-    period_map,
-    split_delay,
-    stretches,
-)
+from bayeshaptic.rig.dynamics.propagate import generator, layout, period_map, split_delay, stretches
 from bayeshaptic.rig.dynamics.step_tables import delay_lookup
 from bayeshaptic.rig.setup import Setup
 

@@ -18,13 +18,7 @@ from bayeshaptic.stability.cases import FREE, HELD, NEW_PERSON, Case, DeviceLimi
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.configuration_limits import ConfigurationLimits, configuration_limits
-from bayeshaptic.study.recorded_cases import (
-    place_of,
-    posterior,
-    recorded,
-    signature,
-    widening,
-)
+from bayeshaptic.study.recorded_cases import place_of, posterior, recorded, signature, widening
 from bayeshaptic.types import Progress
 
 

@@ -33,10 +33,10 @@ from benchmarks.strangers.draw import (
     Case,
     Draw,
     base_of,
+    begun as drawn,
     hand_of,
     states_of,
 )
-from benchmarks.strangers.draw import begun as drawn
 
 STEPS = 16  # a period
 COMMANDED = ("velocity", "differences")

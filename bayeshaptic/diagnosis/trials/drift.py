@@ -12,14 +12,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.drift import drift_tests
-from bayeshaptic.diagnosis.state import (
-    Accepted,
-    Estimate,
-    State,
-    Trial,
-    fit_part,
-    log_likelihoods,
-)
+from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, fit_part, log_likelihoods
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.linear.extra_delay import ExtraDelay
 from bayeshaptic.effects.linear.gain import Gain

@@ -15,12 +15,7 @@ from bayeshaptic.inference.population.below import draw_below
 from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.population import Population
-from bayeshaptic.inference.population.reweighting import (
-    ALONE,
-    Reweighted,
-    redescribed,
-    reweight,
-)
+from bayeshaptic.inference.population.reweighting import ALONE, Reweighted, redescribed, reweight
 from bayeshaptic.inference.population.sampler import sample_level
 from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior

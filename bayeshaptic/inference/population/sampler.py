@@ -10,12 +10,7 @@ import numpy as np
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
 from bayeshaptic.inference.population.walkers import EVERY, Walkers
-from bayeshaptic.inference.sampling.ensembles import (
-    ENSEMBLES,
-    WALKERS,
-    Ensembles,
-    refitted,
-)
+from bayeshaptic.inference.sampling.ensembles import ENSEMBLES, WALKERS, Ensembles, refitted
 from bayeshaptic.numerics.mixture import student
 from bayeshaptic.types import Floats
 

@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.inference.sampling.ensembles import (
-    ENSEMBLES,
-    WALKERS,
-    Ensembles,
-    refitted,
-)
+from bayeshaptic.inference.sampling.ensembles import ENSEMBLES, WALKERS, Ensembles, refitted
 from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.inference.sampling.several_peaks import restored
 from bayeshaptic.inference.stopping import Rule, Verdict

@@ -9,15 +9,7 @@ import numpy as np
 
 from bayeshaptic.devices import Device
 from bayeshaptic.inference.time_domain.fit import MotionFit
-from bayeshaptic.models import (
-    LogNormal,
-    MaybeZero,
-    Model,
-    Normal,
-    Parameter,
-    Prior,
-    build_model,
-)
+from bayeshaptic.models import LogNormal, MaybeZero, Model, Normal, Parameter, Prior, build_model
 from bayeshaptic.models.build import delay_prior
 from bayeshaptic.models.prior_of_zero import SPIKE_OF_MOTOR
 from bayeshaptic.recordings.recording import Recording

@@ -21,8 +21,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial import Chebyshev
-from numpy.polynomial import Polynomial as PowerSeries
+from numpy.polynomial import Chebyshev, Polynomial as PowerSeries
 from scipy.special import bernoulli, comb, factorial
 
 from bayeshaptic.types import Floats

@@ -6,15 +6,9 @@ import numpy as np
 
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.recordings.checks.against_device import (
-    against_response,
-    compare_resolution,
-)
+from bayeshaptic.recordings.checks.against_device import against_response, compare_resolution
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
-from bayeshaptic.recordings.checks.units_in_doubt import (
-    degrees,
-    whole_numbers,
-)
+from bayeshaptic.recordings.checks.units_in_doubt import degrees, whole_numbers
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording

@@ -28,13 +28,7 @@ from bayeshaptic.recordings.columns import (
 from bayeshaptic.recordings.overview.roles import ColumnFacts, guess_roles, says
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.units import (
-    base_unit,
-    says_volts,
-    unit_by_name,
-    unit_in_name,
-    units_of,
-)
+from bayeshaptic.recordings.units import base_unit, says_volts, unit_by_name, unit_in_name, units_of
 
 # What turns counts and volts into them.
 _FACTORS = {

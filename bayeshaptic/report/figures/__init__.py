@@ -22,11 +22,13 @@ from bayeshaptic.report.figures import (
     sampler,
     stiffness,
 )
-from bayeshaptic.report.figures.loop import force as loop_force
-from bayeshaptic.report.figures.loop import inverse as loop_inverse
-from bayeshaptic.report.figures.loop import residual as loop_residual
-from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
-from bayeshaptic.report.figures.loop import tests as loop_tests
+from bayeshaptic.report.figures.loop import (
+    force as loop_force,
+    inverse as loop_inverse,
+    residual as loop_residual,
+    stiffness as loop_stiffness,
+    tests as loop_tests,
+)
 from bayeshaptic.report.figures.style import Drawn, drawn
 from bayeshaptic.report.numbers.unstated import unstated
 

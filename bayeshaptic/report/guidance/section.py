@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.inference.next_experiment import Experiment, next_experiment
-from bayeshaptic.report.figures.guidance import shares as guidance_shares
-from bayeshaptic.report.figures.guidance import sweeps as guidance_sweeps
+from bayeshaptic.report.figures.guidance import shares as guidance_shares, sweeps as guidance_sweeps
 from bayeshaptic.report.guidance.words import experiment_rows, words
 from bayeshaptic.report.page.section import Section, section
 from bayeshaptic.stability.guidance.guidance import Guidance, guidance

@@ -5,14 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import percent, quantity, spread_of
-from bayeshaptic.report.numbers.hidden import (
-    FEW,
-    interval_of,
-    moves,
-    reach,
-    size,
-    strength,
-)
+from bayeshaptic.report.numbers.hidden import FEW, interval_of, moves, reach, size, strength
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

@@ -7,11 +7,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.traced import CONSISTENT, UNEXPLAINED
 from bayeshaptic.effects.library import effect_class
-from bayeshaptic.quantities import (
-    pretty_unit,
-    pure,
-    scale,
-)
+from bayeshaptic.quantities import pretty_unit, pure, scale
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import is_certain
 from bayeshaptic.report.listed import listed

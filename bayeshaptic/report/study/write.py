@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
-from bayeshaptic.report.guidance.section import FIGURES as ADVICE
-from bayeshaptic.report.guidance.section import guidance_section
+from bayeshaptic.report.guidance.section import FIGURES as ADVICE, guidance_section
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.page import render_study
 from bayeshaptic.report.study.population_json import population_json
-from bayeshaptic.report.walls.section import FIGURES as WALLS
-from bayeshaptic.report.walls.section import limits_section, table_of
+from bayeshaptic.report.walls.section import FIGURES as WALLS, limits_section, table_of
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis

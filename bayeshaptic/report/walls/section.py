@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.report.figures.walls import curve as limits_curve
-from bayeshaptic.report.figures.walls import kb as limits_kb
+from bayeshaptic.report.figures.walls import curve as limits_curve, kb as limits_kb
 from bayeshaptic.report.numbers.rules import rules_of
 from bayeshaptic.report.page.section import Section, section
 from bayeshaptic.report.walls.words import rule_rows, width_rows, words

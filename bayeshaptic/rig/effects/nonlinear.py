@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayeshaptic.rig.dynamics.laws import Drag as DragLaw
-from bayeshaptic.rig.dynamics.laws import Gap, PowerSpring, Ripple
+from bayeshaptic.rig.dynamics.laws import Drag as DragLaw, Gap, PowerSpring, Ripple
 from bayeshaptic.rig.dynamics.structure import FRAME, NodeLaw, Structure
 from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 

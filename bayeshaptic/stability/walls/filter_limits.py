@@ -11,11 +11,7 @@ import numpy as np
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Damping
 from bayeshaptic.stability.walls.fitted_tail import effective_of, fitted_boundary
-from bayeshaptic.stability.walls.joint import (
-    JointRegion,
-    Lowest,
-    lowest,
-)
+from bayeshaptic.stability.walls.joint import JointRegion, Lowest, lowest
 from bayeshaptic.stability.walls.region import INSIDE
 from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.stability.walls.tail import Tail, lower_tail

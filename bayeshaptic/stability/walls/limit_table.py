@@ -19,11 +19,7 @@ from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.tail import quantiles
 from bayeshaptic.stability.walls.damping import Damping
 from bayeshaptic.stability.walls.filter_limits import FilterLimits, filter_limits
-from bayeshaptic.stability.walls.joint import (
-    filtered,
-    joint_region,
-    usual_dampings,
-)
+from bayeshaptic.stability.walls.joint import filtered, joint_region, usual_dampings
 from bayeshaptic.stability.walls.region import DRAWS
 from bayeshaptic.types import Floats
 from bayeshaptic.version import __version__

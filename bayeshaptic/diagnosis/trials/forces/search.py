@@ -12,12 +12,7 @@ from bayeshaptic.diagnosis.trials.forces.fit import fit_force
 from bayeshaptic.diagnosis.trials.forces.hints import PARTS, STANDS_OUT, Hint, departures, hints
 from bayeshaptic.diagnosis.trials.forces.nested import fit_nested
 from bayeshaptic.effects.nonlinear.internal_force import Place
-from bayeshaptic.effects.nonlinear.protocol import (
-    Acting,
-    CommandEffect,
-    Motion,
-    NonlinearEffect,
-)
+from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.types import Floats

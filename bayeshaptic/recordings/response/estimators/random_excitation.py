@@ -20,10 +20,7 @@ from bayeshaptic.recordings.response.estimators.instrument import (
 from bayeshaptic.recordings.response.estimators.lines import LOW_END_WINDOWS, Lines
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.estimators.ringing import ringing_poles
-from bayeshaptic.recordings.response.local_polynomial import (
-    ENOUGH_LINES,
-    default_minimum_lines,
-)
+from bayeshaptic.recordings.response.local_polynomial import ENOUGH_LINES, default_minimum_lines
 from bayeshaptic.recordings.response.points import Points
 from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.recordings.response.window_reference import LocalRational, fit_local_rational

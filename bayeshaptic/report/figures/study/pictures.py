@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bayeshaptic.report.figures.study import configurations as study_configurations
-from bayeshaptic.report.figures.study import limit as study_limit
-from bayeshaptic.report.figures.study import people as study_people
+from bayeshaptic.report.figures.study import (
+    configurations as study_configurations,
+    limit as study_limit,
+    people as study_people,
+)
 from bayeshaptic.report.figures.style import Drawn, drawn
 
 if TYPE_CHECKING:
