@@ -87,6 +87,25 @@ def test_a_base_that_gives_and_damping_that_changes_are_seen(bench: Bench) -> No
     assert motion.converged
 
 
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        (lambda u, most: most * np.arctanh(u / most), "another share of large commands"),
+        (lambda u, _: u / np.where(u > 0, 1.1, 0.9), "one way than the other"),
+    ],
+)
+def test_a_motor_that_does_not_give_what_is_commanded_is_seen(given: Any, why: str) -> None:
+    """As if less or more had been given: in the record that is another command."""
+    recording = replace(in_loop(4.0, 0.0, 2e-6), feedback=None)
+    assert with_laws(recording, None)[2] == ()
+    most = 2 * float(np.abs(recording.force).max())
+    commanded = replace(recording, force=given(recording.force, most))
+    motion, _, doubts = with_laws(commanded, None)
+    assert len(doubts) == 1 and why in doubts[0]
+    mass = NAMES.index("m")
+    assert motion.values[mass] > 1.01 * TRUTH["m"]  # and with it a limit that is too high
+
+
 def test_a_score_is_the_strength_that_a_fit_finds(bench: Bench) -> None:
     faint = stepped(bench.with_effect("drag", coefficient=5.0), 4.0)
     motion = fit_motion(faint, FOLLOWER)

@@ -1,4 +1,7 @@
-"""Forces that no single mass with friction has: damping that fades, and what changes with time."""
+"""Forces that no single mass with friction has.
+
+Damping that fades, what changes with time, and a motor that does not give what is commanded.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ def unlike_one_mass(recording: Recording, path: SmoothMotion) -> Iterator[tuple[
     """Each force, shape (N,), after why a limit of one mass does not go with it."""
     yield from _fading(recording, path)
     yield from _changing(recording, path)
+    yield from _out_of_proportion(recording.force)
 
 
 def _fading(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
@@ -44,3 +48,13 @@ def _changing(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, F
         ("gain from force to motion", recording.force),
     ):
         yield f"the {name} changes in the course of the recording", grows * force
+
+
+def _out_of_proportion(command: Floats) -> Iterator[tuple[str, Floats]]:
+    """What a motor gives more or less of larger commands, and of those one way."""
+    size = float(np.sqrt(np.mean(command**2))) or 1.0
+    saturates = (
+        "the motor gives another share of large commands than of small ones, as where it saturates"
+    )
+    yield saturates, command * (command / size) ** 2
+    yield "the motor gives another share of commands one way than the other", np.abs(command)
