@@ -36,7 +36,7 @@ from bayeshaptic.types import Floats
 
 # Student's t of eight degrees of freedom: 1 in 1,000 for each of some twenty forces.  With `_WORTH`
 # a law joins in 5 of 199 loops with a force along the way that is no law, something speaks against
-# a limit in 3 (benchmarks/closed_loop.py); neither in any of 20 clean ones of benchmarks/strangers.
+# a limit in 6 (benchmarks/closed_loop.py); neither in any of 20 clean ones of benchmarks/strangers.
 _SEEN = 5.04
 # Of the error's power, that a force must take away: steps of a sample leave up to 0.08 of an error
 # as small as the encoder's to a law that has joined.
