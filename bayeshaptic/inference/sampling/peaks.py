@@ -14,7 +14,7 @@ from bayeshaptic.inference.sampling.ensembles import Ensembles, joined, warmed_u
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.inference.sampling.near_zero import Redraw, reached, start_of
 from bayeshaptic.inference.sampling.proposal import Proposal
-from bayeshaptic.inference.sampling.several_peaks import covered, log_held
+from bayeshaptic.inference.sampling.several_peaks import covered, log_held, log_mean, log_weights
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.types import Floats, LogDensity
@@ -97,9 +97,9 @@ def _candidates(
     for start in _others(density, fit, own)[:_LOOKED_AT]:
         peak, first = laplace(density, start)
         draws = first.sample(np.random.default_rng(0), 200)
-        weights = counted(draws) - first.log_density(draws)
-        held = float(np.logaddexp.reduce(weights) - np.log(len(draws)))
-        found.append(_Candidate(peak, first, held, draws[np.argsort(weights)[-20:]]))
+        weights = log_weights(counted(draws), first.log_density(draws))
+        best = draws[np.argsort(weights)[-20:]]
+        found.append(_Candidate(peak, first, log_mean(weights), best))
     return sorted(found, key=lambda one: one.held, reverse=True)
 
 

@@ -108,8 +108,20 @@ def log_held(density: LogDensity, proposal: Proposal) -> float:
     """Log of how much of the density lies where a proposal draws, by weighted draws."""
     y = proposal.mixture.sample(np.random.default_rng(0), 1000)
     volume = np.linalg.slogdet(proposal.straightening.whiten)[1]
-    weights = density(proposal.straightening.bent(y)) - proposal.mixture.log_density(y) - volume
-    return float(np.logaddexp.reduce(weights)) - float(np.log(len(y)))
+    proposed = proposal.mixture.log_density(y) + volume
+    return log_mean(log_weights(density(proposal.straightening.bent(y)), proposed))
+
+
+def log_weights(density: Floats, proposed: Floats) -> Floats:
+    """Of draws by their log densities, shape (B,); -inf where there is none of either."""
+    with np.errstate(invalid="ignore"):
+        weights = density - proposed
+    return np.where(np.isfinite(weights), weights, -np.inf)
+
+
+def log_mean(weights: Floats) -> float:
+    """Log of the mean of weights of which the logarithms are given."""
+    return float(np.logaddexp.reduce(weights)) - float(np.log(len(weights)))
 
 
 def covered(proposal: Proposal, points: Floats) -> NDArray[np.bool_]:
