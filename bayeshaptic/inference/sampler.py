@@ -81,6 +81,7 @@ def sample(
     emcee ensembles of 64 walkers then run until R-hat between ensembles is below 1.01 and every
     parameter has `ess` effective draws, bulk and tail.  They are looked at where they have grown by
     up to four times.
+    Where the fit shows other peaks, each has a proposal, and walkers, of its own.
 
     Parameters
     ----------

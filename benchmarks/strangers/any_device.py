@@ -26,13 +26,11 @@ from benchmarks.strangers.draw import (
     as_logged,
     base_of,
     effects_of,
-    forces_of,
-    hand_of,
-    motion_of,
     size_of,
     states_of,
 )
-from benchmarks.strangers.motion import STEPS, Forces
+from benchmarks.strangers.motion import STEPS
+from benchmarks.strangers.recordings import simulated
 
 PERIODS_S = (1e-4, 2.5e-4, 5e-4, 1e-3, 1e-3, 2e-3, 4e-3, 1 / 1500, 1 / 300)
 EXCITATIONS = ("white", "white", "binary", "multisine", "sweeps", "coloured")
@@ -59,7 +57,8 @@ def make(seed: int, clean: bool = False) -> Case | None:
     delay_s = max(round(delay_s / period_s * STEPS), 1) / STEPS * period_s
     device = states_of(draw, sizes)
     force = _force(draw, int(draw.between(4000, 50_000)), period_s)
-    made = _simulated(draw, sizes, device, force, period_s, delay_s)
+    way = 10 ** rng.uniform(-3.3, -1)  # half a millimetre or milliradian to a hundred
+    made = simulated(draw, sizes, device, force, period_s, delay_s, way)
     if made is None:
         return None
     force, motion, forces = made
@@ -132,30 +131,6 @@ def _force(draw: Draw, count: int, period_s: float) -> Array:
         top = max(top, 2 * low)
         force = sosfilt(butter(order, [2 * low, 2 * top], "band", output="sos"), noise)
     return np.asarray(force / force.std() * 10 ** rng.uniform(-3, 3))
-
-
-def _simulated(
-    draw: Draw,
-    sizes: dict[str, tuple[float, ...]],
-    device: States,
-    force: Array,
-    period_s: float,
-    delay_s: float,
-) -> tuple[Array, Array, Forces] | None:
-    """Force, motion, and the forces in it: a command that moves it by half to a hundred mm."""
-    motion = motion_of(draw, sizes, device, len(force), period_s, delay_s)
-    hand = hand_of(draw, len(force), period_s, force.std())
-    linear = motion.under(force, hand, Forces())
-    if linear is None:
-        return None
-    larger = 10 ** draw.rng.uniform(-3.3, -1) / linear.std()
-    force, hand, linear = larger * force, larger * hand, larger * linear
-    forces = forces_of(draw, tuple(sizes), force, linear, period_s)
-    made = motion.under(force, hand, forces)
-    far = 100.0
-    if made is None or np.abs(made).max() > far * linear.std():
-        return None
-    return force, made, forces
 
 
 def _limit(device: States, mass: float, period_s: float, delay_s: float) -> float:

@@ -45,10 +45,10 @@ def make(seed: int) -> Case | None:
     device = states_of(draw, sizes)
     seconds, excitation = draw.between(6, 40), str(rng.choice(EXCITATIONS))
     force = _force(draw, excitation, seconds, period_s)
-    made = _simulated(draw, sizes, device, force, period_s, delay_s)
+    made = simulated(draw, sizes, device, force, period_s, delay_s)
     if made is None:
         return None
-    motion, forces = made
+    force, motion, forces = made
     # Somewhere along the way the motor gives that much more than was commanded.
     truth = device.critical_stiffness(period_s, delay_s) / (1 + forces.ripple)
     force, position, count = as_logged(draw, effects, force, motion, period_s)
@@ -91,23 +91,30 @@ def _force(draw: Draw, excitation: str, seconds: float, period_s: float) -> Arra
     return np.asarray(force * FORCE[draw.like] * draw.between(0.3, 3) / force.std())
 
 
-def _simulated(
+def simulated(
     draw: Draw,
     sizes: dict[str, tuple[float, ...]],
     device: States,
     force: Array,
     period_s: float,
     delay_s: float,
-) -> tuple[Array, Forces] | None:
-    """The motion, and the forces in it; first without them, for their scale."""
+    way: float | None = None,
+) -> tuple[Array, Array, Forces] | None:
+    """Force, motion, and the forces in it; first without them, for their scale.
+
+    The force, and what the hand pushes, are made larger until the motion is `way` large.
+    """
     motion = motion_of(draw, sizes, device, len(force), period_s, delay_s)
     hand = hand_of(draw, len(force), period_s, force.std())
     linear = motion.under(force, hand, Forces())
     if linear is None:
         return None
+    if way is not None:
+        larger = way / linear.std()
+        force, hand, linear = larger * force, larger * hand, larger * linear
     forces = forces_of(draw, tuple(sizes), force, linear, period_s)
     made = motion.under(force, hand, forces)
     far = 100.0
     if made is None or np.abs(made).max() > far * linear.std():
         return None
-    return made, forces
+    return force, made, forces
