@@ -19,6 +19,9 @@ from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.types import Floats, LogDensity
 
+# Of 24 held PHANToMs without a file (values changed by e^0.8, 12 s) 90 % intervals hold 216 of 264
+# parameters and 21 limits, about one peak 190 and 19; with how many, how idle and how slight, and
+# with what fits about as well, at half and twice their sizes 216 to 218 and 19 to 22.
 _MOST = 6  # peaks
 _IDLE = 2  # that turn out to be none, after which no more are looked for
 _SHARED = 0.5  # of walkers that lie where others have been: it is their peak
