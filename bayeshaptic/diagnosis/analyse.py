@@ -20,6 +20,7 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.inference.around_fit import draws_around
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.sampler import sample_around
+from bayeshaptic.inference.stopping import EveryParameter
 from bayeshaptic.models import Model
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.feedback import is_certain
@@ -109,11 +110,11 @@ def finish(
         posterior = sample_around(
             _with_noise(fit, scale),
             etfe,
-            seed=options.seed,
-            progress=options.within(0.1, 0.8).report,
-            most_evaluations=_MISFIT_EVALUATIONS if scale > 1 else most,
-            checkpoints=options.checkpoints,
-            **({"rule": watch} if options.ess is None else {"ess": options.ess}),
+            watch if options.ess is None else EveryParameter(fit.model, options.ess),
+            options.seed,
+            options.within(0.1, 0.8).report,
+            options.checkpoints,
+            _MISFIT_EVALUATIONS if scale > 1 else most,
         )
     with clock.stage("critical stiffness"):
         options.report(0.8, "critical stiffness")

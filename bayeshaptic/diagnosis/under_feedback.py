@@ -25,6 +25,7 @@ from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Tra
 from bayeshaptic.effects.measurement import MainsTone
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.sampler import sample_around
+from bayeshaptic.inference.stopping import EveryParameter
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
@@ -80,10 +81,10 @@ def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
     posterior = sample_around(
         fit,
         begun.etfe,
-        seed=options.seed,
-        progress=options.report,
-        checkpoints=options.checkpoints,
-        **({"rule": watch} if options.ess is None else {"ess": options.ess}),
+        watch if options.ess is None else EveryParameter(model, options.ess),
+        options.seed,
+        options.report,
+        options.checkpoints,
     )
     # What the response says is no part of this likelihood.
     posterior = replace(posterior, windows=None, etfe=None)

@@ -126,41 +126,44 @@ def sample(
         start = least_squares(model, etfe, seed=seed)
     elif start.etfe is not etfe or start.model != informed(model, etfe):
         start = least_squares(model, etfe, start=start.theta)
-    return sample_around(start, etfe, ess, seed, progress, most_evaluations, rule, checkpoints)
+    rule = rule or EveryParameter(start.model, ess)
+    return sample_around(start, etfe, rule, seed, progress, checkpoints, most_evaluations)
 
 
 @single_threaded
 def sample_around(
     fit: Fit,
     etfe: Etfe,
-    ess: float = DEFAULT_ESS,
-    seed: int = 0,
-    progress: Progress | bool | None = None,
+    rule: Rule,
+    seed: int,
+    progress: Progress | bool | None,
+    checkpoints: str | Path | None,
     most_evaluations: int = MOST_EVALUATIONS,
-    rule: Rule | None = None,
-    checkpoints: str | Path | None = None,
 ) -> Posterior:
-    """Draw from the posterior of the likelihood and the priors that `fit` has: see `sample`.
+    """Draw from the posterior of the likelihood and the priors that `fit` has, as they are.
+
+    `sample` is the door to it: it makes the fit, or makes it anew where it is of something else.
 
     Parameters
     ----------
     fit : Fit
     etfe : Etfe
         What the posterior is said to be of.
-    ess, seed, progress, most_evaluations, rule, checkpoints
+    rule : callable
+        What is asked for; it may look at more than the parameters, the limit say.
+    seed, progress, checkpoints, most_evaluations
         As of `sample`.
     """
     began = time.perf_counter()
     report = told(progress) or (lambda share, word: None)
     report(0.02, "finding the peak")
     fit = resolved(_converged(fit))
-    asked = rule or EveryParameter(fit.model, ess)
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     density = Density(fit.likelihood, here)
     origin = start_of(here, fit)
     counted = _Counted(density)
     redraw = redrawing(here, fit)
-    about = (seed, most_evaluations, getattr(asked, "key", None))
+    about = (seed, most_evaluations, getattr(rule, "key", None))
     checkpoint = _checkpoint(checkpoints, density, origin, about)
 
     def restore(arrays: Stored) -> Run:
@@ -181,7 +184,7 @@ def sample_around(
         run = Run(ensembles, np.random.default_rng(refit))
     verdict = run_until_done(
         run,
-        lambda phi: asked(here.natural(phi)),
+        lambda phi: rule(here.natural(phi)),
         lambda: most_evaluations - counted.count,
         report,
         keep,
