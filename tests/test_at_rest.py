@@ -18,7 +18,7 @@ from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
-from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.types import Floats
 from benchmarks.through_reference import make
 
@@ -63,7 +63,7 @@ def test_who_keeps_moving_has_no_rest() -> None:
 def test_friction_that_holds_a_held_device_is_not_taken_for_less() -> None:
     """A PHANToM that follows steps and rests for a quarter: fits ended at 0.87 of its friction."""
     case = make(153)
-    etfe = estimate_in_any_loop(replace(case.recording, reference=None))
+    etfe = estimate_by_direct_method(replace(case.recording, reference=None))
     fit = least_squares(build_model("grasped", "phantom", delay_s=case.bench.delay_s), etfe)
     assert etfe.unbroken is not None
     bench = ForceBench(State(etfe, fit), etfe.unbroken)

@@ -17,7 +17,7 @@ from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import Fit, summarise
 from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.spectra import RandomSpectra
@@ -35,7 +35,7 @@ def right(case: Case) -> tuple[Fit, Etfe]:
     held = "held" in case.what
     device = "phantom" if "phantom" in case.what else "lhifam"
     model = build_model("grasped" if held else "free", device, delay_s=case.bench.delay_s)
-    etfe = estimate_in_any_loop(replace(case.recording, reference=None))
+    etfe = estimate_by_direct_method(replace(case.recording, reference=None))
     truth = {**case.bench.values, "delay_s": case.bench.delay_s}
     theta = np.array([truth[name] for name in model.names])
     for _ in range(2):
@@ -70,7 +70,7 @@ def test_rounding_is_no_causal_change(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", COARSE)
 def test_a_hand_that_a_model_lacks_is_a_causal_change_there(seed: int) -> None:
-    etfe = estimate_in_any_loop(replace(make(seed).recording, reference=None))
+    etfe = estimate_by_direct_method(replace(make(seed).recording, reference=None))
     fit = least_squares(build_model("free", "phantom"), etfe)
     assert change(causal_tests(fit, etfe)).excess > 3
 
@@ -118,7 +118,7 @@ def test_a_position_that_nothing_rounds_is_looked_at_as_it_is() -> None:
     recording = make(408).recording
     rng = np.random.default_rng(1)
     position = recording.position + 1e-9 * rng.standard_normal(recording.samples)
-    etfe = estimate_in_any_loop(replace(recording, position=position, reference=None))
+    etfe = estimate_by_direct_method(replace(recording, position=position, reference=None))
     fit = least_squares(build_model("free", "phantom"), etfe)
     _, closer = causal._closer(fit, etfe, 0.0)
     assert np.array_equal(closer.spectra.position, etfe.spectra.position)  # type: ignore[attr-defined]
@@ -128,7 +128,7 @@ def test_a_damping_that_fades_is_a_change_in_time() -> None:
     """From 1.9 to 1.4 times what it ends at, in a loop of 7 s, and the gain stays what it is."""
     case = loops.make(95018)
     assert case is not None and set(case.effects) == {"stribeck", "warming up"}
-    etfe = estimate_in_any_loop(case.recording)
+    etfe = estimate_by_direct_method(case.recording)
     fit = least_squares(build_model("free", "phantom", delay_s=case.told["delay_s"]), etfe)
     found = {test.name: test for test in causal_tests(fit, etfe)}
     assert found["a steady change"].excess > 3 and found["a steady change"].family == "time-varying"

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals.causal import scores
 from bayeshaptic.recordings.read import recording_from_arrays
-from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
 
@@ -41,7 +41,7 @@ def loop(seed, held=False, friction=0.0, seconds=8.0, lacking=None, known=False)
 
 def test_every_line_counts_alike():
     _, _, recording = loop(1)
-    spectra = estimate_in_any_loop(recording).spectra
+    spectra = estimate_by_direct_method(recording).spectra
     windows = spectra.windows()
     width = np.diff(spectra.edges)
     assert width.sum() == (recording.samples - 1) // 2

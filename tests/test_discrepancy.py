@@ -13,7 +13,7 @@ from fake_analysis import _tests, fake_closed
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.traced import Traced, share_left
-from bayeshaptic.diagnosis.trials.all_lines import _leaves_little
+from bayeshaptic.diagnosis.trials.direct import _leaves_little
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, _further, drift_trials
 from bayeshaptic.diagnosis.widening.deviation import Deviation, evidence, matern, merged
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy

@@ -18,7 +18,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import driven_range
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
-from bayeshaptic.recordings.signals.innovations import command_innovations
+from bayeshaptic.recordings.signals.added_noise import command_innovations
 from bayeshaptic.recordings.through_reference import through_reference, too_weak
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop

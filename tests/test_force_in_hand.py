@@ -15,7 +15,7 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from benchmarks.through_reference import make
 
 SEED, SAMPLES = 4019, 6000  # a LHIfAM that follows noise under a PD controller
@@ -25,7 +25,7 @@ def test_friction_in_a_hand_is_found_in_a_loop() -> None:
     """From six tenths of it: fits went no further, whose slopes took what slides for history."""
     case = make(SEED)
     force, position = case.recording.force[:SAMPLES], case.recording.position[:SAMPLES]
-    etfe = estimate_in_any_loop(
+    etfe = estimate_by_direct_method(
         replace(case.recording, force=force, position=position, reference=None)
     )
     fit = least_squares(build_model("grasped", "lhifam", delay_s=case.bench.delay_s), etfe)

@@ -14,7 +14,7 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from benchmarks.through_reference import make
 
 
@@ -25,7 +25,7 @@ def test_the_mean_of_the_command_acts_as_the_rest_of_it_does(seed: int) -> None:
     From the command without its mean the motion was off by 114 and 17 counts.
     """
     case = make(seed)
-    etfe = estimate_in_any_loop(replace(case.recording, reference=None))
+    etfe = estimate_by_direct_method(replace(case.recording, reference=None))
     fit = least_squares(build_model("free", "lhifam", delay_s=case.bench.delay_s), etfe)
     assert etfe.unbroken is not None
     simulation = ForceBench(State(etfe, fit), etfe.unbroken).simulation

@@ -15,8 +15,8 @@ from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, fitted
 from bayeshaptic.diagnosis.base.best_base import traced_as_of_the_loop
 from bayeshaptic.diagnosis.base.opened import Opened, opened
-from bayeshaptic.diagnosis.by_all_lines import by_all_lines
 from bayeshaptic.diagnosis.closed import Closed, error_beside, limit_alone, model_error
+from bayeshaptic.diagnosis.direct_method import by_direct_method
 from bayeshaptic.diagnosis.feedback.explain import (
     ForceExplained,
     explain_force,
@@ -73,7 +73,7 @@ def close_loop(
     chosen = options_from(options, changes)
     prior = HiddenPrior.from_table(chosen.effects)
     found = opened(measurement_of(measurement, model, chosen), model, chosen.within(0.0, 0.5))
-    direct = by_all_lines(found, model, chosen)
+    direct = by_direct_method(found, model, chosen)
     if isinstance(direct, Closed):
         return with_average(direct, prior, chosen) if chosen.hidden else direct
     found = direct

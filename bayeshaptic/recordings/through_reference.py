@@ -10,9 +10,9 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.feedback import Feedback, has_feedback
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.added_noise import command_innovations
 from bayeshaptic.recordings.signals.causality.causality import causality
 from bayeshaptic.recordings.signals.controller import controller_reference
-from bayeshaptic.recordings.signals.innovations import command_innovations
 from bayeshaptic.types import Floats
 
 _INNOVATIONS = "innovations"  # what a note is about where these are the reference

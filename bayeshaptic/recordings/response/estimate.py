@@ -79,10 +79,10 @@ def estimate_etfe(
     return replace(_shown(recording, spectra, points, notices), period_lines=period_lines)
 
 
-def estimate_in_any_loop(recording: Recording) -> Etfe:
-    """The response at all lines, for fits that hold whatever loop it was recorded in.
+def estimate_by_direct_method(recording: Recording) -> Etfe:
+    """The response at all lines, for fits by the direct method, which feedback does not bias.
 
-    What a person sees of it, feedback biases; `DirectSpectra` says why a fit does not mind.
+    The response itself is biased where a person looks at it; `DirectSpectra` says why a fit is not.
 
     Parameters
     ----------

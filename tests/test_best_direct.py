@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bayeshaptic.diagnosis.base import best_in_any_loop
-from bayeshaptic.diagnosis.base.best_in_any_loop import traced_in_any_loop
+from bayeshaptic.diagnosis.base import best_direct
+from bayeshaptic.diagnosis.base.best_direct import traced_directly
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals import residual
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
-from bayeshaptic.diagnosis.trials import all_lines
+from bayeshaptic.diagnosis.trials import direct
 from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
 from bayeshaptic.numerics.spending import Meter
 from benchmarks.through_reference import make
@@ -56,25 +56,25 @@ def outcome(
         tried.append(base)
         return by_name[base]
 
-    monkeypatch.setattr(best_in_any_loop, "untraced", lambda state: state.fit.model.name)
-    monkeypatch.setattr(best_in_any_loop, "trace_by_all_lines", traced)
-    monkeypatch.setattr(best_in_any_loop, "stands", lambda one: one.verdict != UNEXPLAINED)
-    monkeypatch.setattr(best_in_any_loop, "criterion", lambda one, _: one.score)
-    monkeypatch.setattr(best_in_any_loop, "_limit", lambda one: one.limit)
-    monkeypatch.setattr(best_in_any_loop, "replace", _replaced)
-    monkeypatch.setattr(best_in_any_loop, "base_of", lambda begun, name: (None, fit(name)))
+    monkeypatch.setattr(best_direct, "untraced", lambda state: state.fit.model.name)
+    monkeypatch.setattr(best_direct, "trace_directly", traced)
+    monkeypatch.setattr(best_direct, "stands", lambda one: one.verdict != UNEXPLAINED)
+    monkeypatch.setattr(best_direct, "criterion", lambda one, _: one.score)
+    monkeypatch.setattr(best_direct, "_limit", lambda one: one.limit)
+    monkeypatch.setattr(best_direct, "replace", _replaced)
+    monkeypatch.setattr(best_direct, "base_of", lambda begun, name: (None, fit(name)))
     trial = SimpleNamespace(state=SimpleNamespace(fit=None)) if rubbing is not None else None
-    monkeypatch.setattr(best_in_any_loop, "trial_of", lambda *_: trial)
-    monkeypatch.setattr(best_in_any_loop, "information_criterion", lambda *_: rubbing)
+    monkeypatch.setattr(best_direct, "trial_of", lambda *_: trial)
+    monkeypatch.setattr(best_direct, "information_criterion", lambda *_: rubbing)
     monkeypatch.setattr(
-        best_in_any_loop, "with_trial", lambda other, _: (took.append(other), by_name[other])[1]
+        best_direct, "with_trial", lambda other, _: (took.append(other), by_name[other])[1]
     )
-    monkeypatch.setattr(best_in_any_loop, "State", lambda etfe, fit: SimpleNamespace(fit=fit))
+    monkeypatch.setattr(best_direct, "State", lambda etfe, fit: SimpleNamespace(fit=fit))
     scores = bare or {}
     candidates = {name: ScoredFit(fit(name), scores.get(name, 0.0)) for name in SIZES}
     choice = Choice(fit(chosen), "", candidates) if modelled else None
     begun: Any = SimpleNamespace(etfe=None, fit=fit(chosen), choice=choice)
-    begun, found = traced_in_any_loop(begun, Meter())
+    begun, found = traced_directly(begun, Meter())
     return begun.fit.model.name, found, tried
 
 
@@ -184,16 +184,16 @@ def test_of_two_that_stand_alike_the_lower_limit_is_taken(monkeypatch, behind, n
     assert found[0] == name
 
 
-def test_friction_is_tried_where_all_lines_see_something_linear_alone(monkeypatch) -> None:
+def test_friction_is_tried_where_the_direct_method_sees_something_linear_alone(monkeypatch) -> None:
     asked = []
-    monkeypatch.setattr(all_lines, "_linear_trials", lambda state, meter, tick: [])
+    monkeypatch.setattr(direct, "_linear_trials", lambda state, meter, tick: [])
     monkeypatch.setattr(
-        all_lines, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
+        direct, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
     )
     linear = residual.Test("causal change", "linear", 12.0, 5.0, None, "")
-    assert all_lines._trials(None, (linear,), Meter(), None) == []  # type: ignore[arg-type]
+    assert direct._trials(None, (linear,), Meter(), None) == []  # type: ignore[arg-type]
     assert "sign(v)" in asked[0]
-    all_lines._trials(
+    direct._trials(
         None, (residual.Test("gain in time", "time-varying", 9.0, 4.4, None, ""),), Meter(), None
     )  # type: ignore[arg-type]
     assert len(asked) == 1, "drift calls for no force"
@@ -204,12 +204,12 @@ def test_friction_is_tried_where_nothing_is_left_and_not_beside_what_leaves_noth
 ) -> None:
     asked = []
     monkeypatch.setattr(
-        all_lines, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
+        direct, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
     )
     noise = residual.Test("causal change", "linear", 2.0, 5.0, None, "")
     for accepted in ((), (SimpleNamespace(family="linear"),)):
         state = SimpleNamespace(accepted=accepted)
-        all_lines.trace_by_all_lines(SimpleNamespace(state=state, after=(noise,)), Meter())  # type: ignore[arg-type]
+        direct.trace_directly(SimpleNamespace(state=state, after=(noise,)), Meter())  # type: ignore[arg-type]
     assert len(asked) == 1 and "sign(v)" in asked[0]
 
 

@@ -1,4 +1,8 @@
-"""The loop closed on a recording that was made in one, whatever controller made it."""
+"""Closing the loop on a recording that was made in feedback, by the direct method.
+
+The direct method fits all lines of the spectrum alike, so that feedback does not bias the fit,
+whatever the controller was (`recordings/response/estimators/direct.py`).
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,13 @@ import numpy as np
 
 from bayeshaptic.diagnosis.analyse import NO_WITNESS, finish
 from bayeshaptic.diagnosis.analysis import Analysis
-from bayeshaptic.diagnosis.base.any_loop import against_any_loop, in_any_loop
 from bayeshaptic.diagnosis.base.begun import fitted
-from bayeshaptic.diagnosis.base.best_in_any_loop import traced_in_any_loop
+from bayeshaptic.diagnosis.base.best_direct import traced_directly
+from bayeshaptic.diagnosis.base.direct import against_direct, opened_directly
 from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.closed import Closed, limit_alone
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.diagnosis.trials.all_lines import stands
+from bayeshaptic.diagnosis.trials.direct import stands
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.diagnosis.widening.rivals import with_rivals
@@ -27,11 +31,12 @@ from bayeshaptic.numerics.spending import RATE, Meter, counting
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 
-def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
-    """By the direct method; or what was opened, and told what stands against that.
+def by_direct_method(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
+    """The closed loop by the direct method; or `found`, with a notice of what speaks against it.
 
-    One mass is followed in time instead, with its friction; whatever leaves more than noise beside
-    linear effects and dry friction goes the next way; of friction a small rest may stay.
+    The method is not for one mass, which is followed in time with its friction.  Its fit stands
+    where linear effects and dry friction leave noise, or next to it; where more is left, `found` is
+    handed back and analysed in another way.
 
     Parameters
     ----------
@@ -40,7 +45,7 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
         As asked for.
     options : Options
     """
-    lines = in_any_loop(found, options)
+    lines = opened_directly(found, options)
     if lines is None:
         return found
     try:
@@ -50,13 +55,13 @@ def by_all_lines(found: Opened, model: str | Model, options: Options) -> Closed 
     began = time.perf_counter()
     trying, meter = options.within(0.3, 0.5), Meter(options.budget_s * RATE)
     with counting(meter):
-        begun, traced = traced_in_any_loop(
+        begun, traced = traced_directly(
             begun, meter, lambda title: trying.report(0.5, f"trying {title}")
         )
     tracing_s = time.perf_counter() - began
     fit = traced.state.fit
     if not stands(traced) or fit.impossible:
-        against = against_any_loop(fit, traced.before, found.etfe.through_reference)
+        against = against_direct(fit, traced.before, found.etfe.through_reference)
         return replace(found, notices=(*found.notices, *against))
     if fit.model.name == "rigid":
         return found

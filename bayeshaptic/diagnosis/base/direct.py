@@ -1,4 +1,4 @@
-"""A recording in closed loop, whatever made it: any controller is as good."""
+"""Whether the direct method may read a recording made in closed loop, and what speaks against."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.recordings.response.estimate import estimate_in_any_loop
+from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 
 _WHATEVER = (
     "whatever controller made it: all lines of the spectrum are fitted, up to the Nyquist "
@@ -21,12 +21,12 @@ _WHATEVER = (
 )
 
 
-def in_any_loop(found: Opened, options: Options) -> Opened | None:
-    """What was opened, with the lines of the direct method; None where it is not for that.
+def opened_directly(found: Opened, options: Options) -> Opened | None:
+    """`found` with the spectra of the direct method; None where the method is not meant for it.
 
-    It is for recordings with feedback, or where that cannot be decided, also where a reference is
-    known: not for those in pieces, nor for a device that was declared to be one mass, which is
-    followed in time.
+    It is meant for recordings with feedback, and for those where feedback cannot be ruled out, also
+    where a reference is known.  It is not meant for recordings in pieces, for a band that was asked
+    for (it needs all lines), or for a device declared to be one mass, which is followed in time.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def in_any_loop(found: Opened, options: Options) -> Opened | None:
     if not (through or has_feedback(found.notices)) or told_too_little(found.notices):
         return None
     try:
-        etfe = estimate_in_any_loop(replace(recording, reference=None))
+        etfe = estimate_by_direct_method(replace(recording, reference=None))
     except InputError:
         return None
     how = "was" if through or is_certain(found.notices) else "may have been"
@@ -50,16 +50,16 @@ def in_any_loop(found: Opened, options: Options) -> Opened | None:
     return replace(found, etfe=etfe, notices=notices)
 
 
-def against_any_loop(fit: Fit, tests: Iterable[Test], through: bool) -> tuple[Notice, ...]:
-    """What stands against the fit there, of which nothing is read then.
+def against_direct(fit: Fit, tests: Iterable[Test], through: bool) -> tuple[Notice, ...]:
+    """What speaks against a fit by the direct method; nothing is read from that fit then.
 
     Parameters
     ----------
     fit : Fit
     tests : iterable of Test
     through : bool
-        Whether the device is read through a reference instead: of that nothing is asked but that
-        no force acts, which all lines show better than those that the reference moves.
+        Whether the device is read through a reference instead.  Then it matters only whether a
+        nonlinear force acts, which all lines show better than those that the reference moves.
     """
     flagged = [test for test in tests if test.flagged]
     if through:

@@ -1,10 +1,11 @@
-"""Which base model, of a recording in closed loop that lacks something.
+"""Choosing the base model by the direct method, where each of them may lack something.
 
-The base models are compared before anything is known of a force, and in a loop dry friction passes
-for a second mode, a hand or a base that gives.  So friction is asked for on the others, and where
-it is likelier there, or does not explain all that the chosen one leaves, they are tried with what
-they lack, too.  Nothing can be held out there, and a wrong model that leaves what looks like noise
-is a danger: what is the likeliest must stand by itself, and nothing stands in its place.
+Base models are compared before anything is known of a force, and in closed loop dry friction passes
+for a second mode, a hand or a base that gives.  So friction is tried on the other base models as
+well.  Where it is likelier there, or does not explain all that the chosen one leaves, the loop is
+closed on the others, too.  The direct method cannot hold windows out, so that a wrong model may
+leave what looks like noise: only the likeliest explanation counts, and where it does not stand by
+itself, no other takes its place.
 """
 
 from __future__ import annotations
@@ -18,13 +19,7 @@ from bayeshaptic.diagnosis.base.begun import Begun, base_of
 from bayeshaptic.diagnosis.base.best_base import criterion
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, Traced
-from bayeshaptic.diagnosis.trials.all_lines import (
-    rubs,
-    stands,
-    trace_by_all_lines,
-    untraced,
-    with_trial,
-)
+from bayeshaptic.diagnosis.trials.direct import rubs, stands, trace_directly, untraced, with_trial
 from bayeshaptic.diagnosis.trials.nonlinear import trial_of
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.inference.choose import UNDECIDED, Choice
@@ -36,9 +31,7 @@ from bayeshaptic.types import Tick
 _ONE_MASS = "rigid"
 
 
-def traced_in_any_loop(
-    begun: Begun, meter: Meter, tick: Tick | None = None
-) -> tuple[Begun, Traced]:
+def traced_directly(begun: Begun, meter: Meter, tick: Tick | None = None) -> tuple[Begun, Traced]:
     """The loop closed on the chosen base model, and on others that may be likelier with friction.
 
     Parameters
@@ -63,7 +56,7 @@ def traced_in_any_loop(
         return begun, own
     # Before the long ways on a base model that may be the wrong one.
     rubbing = _rubbing(begun, meter, tick) if begun.choice is not None else {}
-    own = trace_by_all_lines(own, meter, tick)
+    own = trace_directly(own, meter, tick)
     settled = own.verdict == CONSISTENT or (rubs(own) and own.verdict == EXPLAINED)
     if begun.choice is None or (settled and not _is_likelier(rubbing, own)):
         return begun, own
@@ -71,7 +64,7 @@ def traced_in_any_loop(
     for name in _rivals(begun.choice):
         etfe, fit = base_of(begun, name)
         other = untraced(State(etfe, fit))
-        found[name] = trace_by_all_lines(other, meter, tick)
+        found[name] = trace_directly(other, meter, tick)
         if name in rubbing and not found[name].state.accepted:  # there was nothing left for it
             found[name] = with_trial(other, rubbing[name])
     best = _likeliest(found)

@@ -50,7 +50,7 @@ def untraced(state: State) -> Traced:
     return Traced(*acceptance.verdict_of((), tests), state, tests, tests, path=(state,))
 
 
-def trace_by_all_lines(traced: Traced, meter: Meter, tick: Tick | None = None) -> Traced:
+def trace_directly(traced: Traced, meter: Meter, tick: Tick | None = None) -> Traced:
     """What is left explained by effects, as far as they convince; whether it `stands` comes next.
 
     Parameters
