@@ -14,7 +14,7 @@ from bayeshaptic.effects.library import effect_class
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import Model, build_model
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.rig import Bench, Effect, WhiteNoise, register as on_the_bench, simulate

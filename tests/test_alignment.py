@@ -13,8 +13,8 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.choose import choose_model
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.join import join_recordings
-from bayeshaptic.recordings.read import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate

@@ -19,7 +19,8 @@ from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
-from bayeshaptic.recordings.read import read_recording, recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
+from bayeshaptic.recordings.read import read_recording
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import (
     NOTABLE_SHARE,

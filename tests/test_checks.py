@@ -23,7 +23,7 @@ from bayeshaptic.recordings.checks import what_drives_what
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt, steps_of_a_turn
 from bayeshaptic.recordings.feedback import is_certain
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.units import is_assumed
 
 

@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals.causal import scores
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop

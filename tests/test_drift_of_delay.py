@@ -15,7 +15,7 @@ from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.report.headline import headline

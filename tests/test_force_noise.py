@@ -8,7 +8,7 @@ from test_wandering_mode import DELAY, KC, T, fitted, limit_of, recorded, step_o
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.residuals import excess
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
 

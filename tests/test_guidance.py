@@ -12,7 +12,7 @@ from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.next_experiment import information, next_experiment
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.cases import Case

@@ -15,7 +15,8 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.checks.sufficiency import LEAST_COHERENCE, refuse_where_told, too_little
-from bayeshaptic.recordings.read import read_recording, recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
+from bayeshaptic.recordings.read import read_recording
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.signals.rough_response import rough_response

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.residuals import excess
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.objections import why_none

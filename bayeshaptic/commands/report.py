@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.commands.talk import Talk
     from bayeshaptic.jobs.batch import report_source
     from bayeshaptic.jobs.job import Job
-    from bayeshaptic.recordings.read import recording_name
+    from bayeshaptic.recordings.from_columns import recording_name
 
     folder = arguments.output or Path(f"{recording_name(arguments.source)}-report")
     job = Job(arguments.source, folder, settings_from(arguments), command_line())

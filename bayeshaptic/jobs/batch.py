@@ -32,7 +32,7 @@ from bayeshaptic.jobs.manifest import (
     write_manifest,
 )
 from bayeshaptic.jobs.sources import find_sources
-from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.report.draft import refuse_to_replace
 from bayeshaptic.types import Executor, Progress
 

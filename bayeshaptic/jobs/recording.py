@@ -16,8 +16,8 @@ from bayeshaptic.faq import explained
 from bayeshaptic.inference.saved.checkpoint import kept_until_done
 from bayeshaptic.jobs.job import Job, checkpoints_of
 from bayeshaptic.provenance import provenance
+from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.recordings.measurement import read_measurement
-from bayeshaptic.recordings.read import recording_name
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.report.draft import refuse_to_replace

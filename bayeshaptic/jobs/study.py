@@ -17,7 +17,7 @@ from bayeshaptic.jobs.executors import Outcome
 from bayeshaptic.jobs.job import Job, checkpoints_of, refuse_file
 from bayeshaptic.jobs.recording import reported
 from bayeshaptic.provenance import provenance
-from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.recordings.study import Study
 from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.draft import refuse_to_replace

@@ -1,9 +1,10 @@
 """What was measured: recordings, studies, their readers and checks."""
 
 from bayeshaptic.recordings.checks.check import check_recording
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.measurement import read_measurement
-from bayeshaptic.recordings.read import read_recording, recording_from_arrays
+from bayeshaptic.recordings.read import read_recording
 from bayeshaptic.recordings.readers import Reader, register_reader
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.frf_table import read_frf

@@ -9,7 +9,8 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.columns import is_frequency_response, parse_columns, pick
 from bayeshaptic.recordings.cut import Cut, Span
-from bayeshaptic.recordings.read import Columns, recorded
+from bayeshaptic.recordings.from_columns import Said, recorded
+from bayeshaptic.recordings.read import Columns
 from bayeshaptic.recordings.readers import read_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -56,5 +57,5 @@ def read_measurement(
         return frf_from_arrays(path, arrays, mapping, period_s or default_period_s, kind=kind)
     if period_s is None and pick(arrays, "time", mapping, path, required=False) is None:
         period_s = default_period_s
-    cut = Cut(rows, seconds)
-    return recorded(path, arrays, mapping, period_s, encoder_resolution, name, kind, cut)
+    said = Said(mapping, period_s, encoder_resolution, name, kind, Cut(rows, seconds))
+    return recorded(path, arrays, said)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.errors import unique
-from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.report import tables, words
 from bayeshaptic.report.assumptions import assumptions, priors
 from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES

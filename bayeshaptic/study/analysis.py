@@ -23,7 +23,7 @@ from bayeshaptic.models import prior_from_table
 from bayeshaptic.models.prior_table import refuse_unknown
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks.sufficiency import refuse_where_told
-from bayeshaptic.recordings.read import recording_name
+from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayeshaptic.recordings.read import recording_from_arrays
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
 from bayeshaptic.types import Floats

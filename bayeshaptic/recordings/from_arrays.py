@@ -1,0 +1,128 @@
+"""A recording from arrays in memory: their lengths, values, times and units are checked here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayeshaptic.arguments import at_the_door
+from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.readers.numbers import as_numbers
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.timing import sampling_period
+from bayeshaptic.recordings.signals.turns import unwrapped
+from bayeshaptic.recordings.units import choose_units
+
+
+@at_the_door
+def recording_from_arrays(
+    force: ArrayLike,
+    position: ArrayLike,
+    period_s: float | None = None,
+    time: ArrayLike | None = None,
+    force_unit: str | None = None,
+    position_unit: str | None = None,
+    kind: str | None = None,
+    name: str = "recording",
+    encoder_resolution: float | None = None,
+    source: Path | None = None,
+    reference: ArrayLike | None = None,
+) -> Recording:
+    """A recording from arrays in memory.
+
+    Parameters
+    ----------
+    force, position : array_like, shape (N,)
+        Commanded force and measured position; (N, 1) and (1, N) will do.
+    period_s : float or None
+        Sampling period in seconds, or:
+    time : array_like, shape (N,), or None
+        Time stamps in seconds.
+    force_unit : {"N", "Nm", "A"} or None
+    position_unit : {"m", "rad"} or None
+    kind : {"translational", "rotational"} or None
+        Decides where the units are None; otherwise N and m.
+    name : str
+    encoder_resolution : float or None
+        One encoder count, in the position's unit.
+    source : Path or None
+        The file, for messages and reports.
+    reference : array_like, shape (N,), or None
+        What a controller followed, in any unit; used where the recording was made in closed loop.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        For arrays that differ in length, are empty or hold NaN or infinity (with the row, counted
+        from 1), and for time stamps that show no even sampling.
+    """
+    where = str(source) if source is not None else name
+    force = _signal(force, "force", where)
+    position = _signal(position, "position", where)
+    stamps = None if time is None else _signal(time, "time", where)
+    followed = None if reference is None else _signal(reference, "reference", where)
+    lengths = {"force": len(force), "position": len(position)}
+    if followed is not None:
+        lengths["reference"] = len(followed)
+    if stamps is not None:
+        lengths["time"] = len(stamps)
+    if len(set(lengths.values())) > 1:
+        counts = ", ".join(f"{role} has {length}" for role, length in lengths.items())
+        raise InputError(f"{where}: the arrays differ in length: {counts} samples")
+    if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
+        raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
+    timing = sampling_period(stamps, period_s, where)
+    unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind, where)
+    angle = unit_of_position == "rad"
+    position, notices = unwrapped(position, angle, encoder_resolution, where)
+    if timing.rows is not None:
+        from bayeshaptic.recordings.signals.gaps import put_back
+
+        force, position, followed = put_back(force, position, followed, timing.rows, where)
+    notices += timing.notices
+    if force_unit is None and position_unit is None:
+        text = (
+            f"No units were given: the force is taken to be in {unit_of_force}, the position in "
+            f"{unit_of_position}. Say otherwise with --columns, as in position=q[mm]."
+        )
+        notices += (Notice("note", "units", text, ("force", "position")),)
+    return Recording(
+        force=force,
+        position=position,
+        period_s=timing.period_s,
+        force_unit=unit_of_force,
+        position_unit=unit_of_position,
+        name=name,
+        encoder_resolution=encoder_resolution,
+        time_jitter=timing.jitter,
+        source=source,
+        notices=notices,
+        reference=followed,
+    )
+
+
+def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
+    """One signal: a vector of finite numbers of its own, so that nobody changes it from outside."""
+    if np.ma.isMaskedArray(values):
+        values = np.ma.filled(values.astype(float), np.nan)
+    signal = np.squeeze(as_numbers(np.array(values), f"{where}: {what}"))
+    if signal.ndim != 1 or signal.size == 0:
+        shape = np.shape(values)
+        raise InputError(
+            f"{where}: {what} must be one row of samples, not an array of shape {shape}"
+        )
+    bad = np.flatnonzero(~np.isfinite(signal))
+    if len(bad):
+        raise InputError(
+            f"{where}: {what} is {signal[bad[0]]} in row {bad[0] + 1} ({len(bad)} such rows); "
+            "fill them in, or read a part without them, with --rows A:B",
+            topic="rows",
+        )
+    signal.setflags(write=False)
+    return signal
