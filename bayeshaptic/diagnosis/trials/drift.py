@@ -100,10 +100,34 @@ def _start(state: State, model: Model) -> dict[str, float]:
     return start
 
 
-def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
+@dataclass(frozen=True)
+class _Course:
+    """The parameters that may drift, fitted to each part of the recording.
+
+    Attributes
+    ----------
+    start : mapping of str to float
+        Values in the whole recording.
+    model : Model
+        With all parameters known but those that may drift.
+    found : ndarray, shape (parts, P)
+        Their values in each part.
+    gains : ndarray, shape (2,)
+        Log likelihood that they gain, summed over the parts; see `log_likelihoods`.
+    excess : ndarray, shape (2,)
+        Reduced chi-squares above one, summed over the parts, before and after.
+    """
+
+    start: dict[str, float]
+    model: Model
+    found: Floats
+    gains: Floats
+    excess: Floats
+
+
+def _course(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> _Course:
     start = _start(state, model)
-    varying = tuple(name for name in model.names if name in kind.parameters)
-    known = {name: start[name] for name in model.names if name not in varying}
+    known = {name: start[name] for name in model.names if name not in kind.parameters}
     narrow = model.with_known(known)
     gains, excess = np.zeros(2), np.zeros(2)
     found = []
@@ -116,40 +140,47 @@ def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
         gains += after - before
         excess += [max(summarise(narrow, windows, way).reduced_chi_square - 1, 0) for way in ways]
         found.append(theta)
-    course = np.stack(found)
-    limits = critical_stiffness(narrow, course).samples
-    ends = critical_stiffness(narrow, _ends(course)).samples
+    return _Course(start, narrow, np.stack(found), gains, excess)
+
+
+def _try(state: State, kind: _Kind, model: Model, parts: list[Etfe]) -> Trial:
+    course = _course(state, kind, model, parts)
+    narrow, gains = course.model, course.gains
+    limits = critical_stiffness(narrow, course.found).samples
+    ends = critical_stiffness(narrow, _ends(course.found)).samples
     worst = int(np.argmin(limits))
-    further = _further(limits) if kind in (_DEVICE, _DELAY) else 0.0
-    size = len(varying) * (PARTS - 1)
-    estimates = _estimates(narrow, found) | {"worst_part": Estimate(worst + 1.0, 0.0, "")}
+    size = narrow.size * (PARTS - 1)
     accepted = Accepted(
         kind.name,
         kind.title,
         "time-varying",
-        f"letting {', '.join(varying)} differ between {PARTS} parts of the recording raises the "
-        f"log likelihood of windows it was not fitted to by {gains[1]:.0f}; the limit is that of "
-        f"part {worst + 1}",
-        estimates,
+        f"letting {', '.join(narrow.names)} differ between {PARTS} parts of the recording raises "
+        f"the log likelihood of windows it was not fitted to by {gains[1]:.0f}; the limit is that "
+        f"of part {worst + 1}",
+        _estimates(course) | {"worst_part": Estimate(worst + 1.0, 0.0, "")},
         limit_log_fall=0.0 if kind is _GAIN else _fall(limits, ends),
-        limit_log_further=further,
+        limit_log_further=_further(limits) if kind in (_DEVICE, _DELAY) else 0.0,
     )
     changed, good = state, thresholds.convincing(gains[0], gains[1], size)
     if good and kind is _GAIN:
-        changed, spread = _with_steady_gain(state, narrow, start)
+        changed, spread = _with_steady_gain(state, narrow, course.start)
         accepted = replace(accepted, limit_log_sd=spread)
-    elif good:  # the loop goes on with the worst part of the recording alone
-        best = start | dict(zip(narrow.names, found[worst], strict=True))
-        theta = np.array([best[name] for name in model.names])
-        fit = least_squares(model, parts[worst], start=theta)
-        changed = replace(state, etfe=parts[worst], fit=fit)
+    elif good:
+        changed = _in_part(state, model, parts[worst], course, worst)
     changed = replace(changed, accepted=(*state.accepted, accepted))
     # The state shows the worst part; the others count as well. A steady gain shows all of them, and
     # is one that drifts only if they are alike then.
-    all_along = bool(excess[1] <= min(_LEFT * excess[0], PARTS))
+    all_along = bool(course.excess[1] <= min(_LEFT * course.excess[0], PARTS))
     if kind is _GAIN:
         all_along = not good or _is_steady(state, changed)
     return Trial(accepted, changed, float(gains[0]), float(gains[1]), size, all_along)
+
+
+def _in_part(state: State, model: Model, part: Etfe, course: _Course, number: int) -> State:
+    """The state of one part of the recording, with which the loop goes on."""
+    best = course.start | dict(zip(course.model.names, course.found[number], strict=True))
+    theta = np.array([best[name] for name in model.names])
+    return replace(state, etfe=part, fit=least_squares(model, part, start=theta))
 
 
 def _is_steady(before: State, after: State) -> bool:
@@ -240,11 +271,11 @@ def _edge_error(gains: Floats) -> float:
     return float(np.sqrt(np.mean(np.diff(gains, 2) ** 2) / 6 * 2.5))
 
 
-def _estimates(model: Model, found: list[Floats]) -> dict[str, Estimate]:
+def _estimates(course: _Course) -> dict[str, Estimate]:
     """Last part over first, for every parameter that was free; of a delay, how much later."""
     estimates = {}
-    for i, name in enumerate(model.names):
-        first, last = float(found[0][i]), float(found[-1][i])
+    for i, name in enumerate(course.model.names):
+        first, last = float(course.found[0, i]), float(course.found[-1, i])
         if name in _DELAY.parameters:
             estimates["change_of_delay_s"] = Estimate(last - first, float("nan"), "s")
         elif first > 0:

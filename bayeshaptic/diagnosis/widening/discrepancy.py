@@ -44,19 +44,50 @@ def with_discrepancy(
     `base` is the fit of the model as declared, `fit` that with the accepted effects.
     """
     rng = np.random.default_rng(seed)
-    spread = np.sqrt(sum(effect.limit_log_sd**2 for effect in traced.state.accepted))
+    limit = _with_effects(limit, traced, rng)
+    limit = _with_rest(limit, posterior, base, fit, traced, rng)
+    count = len(limit.samples)
+    if (changing := changing_at_limit(limit, fit, traced)) > 0:
+        limit = _times(limit, -_blurred(changing) * rng.random(count))
+    if (noise := noise_besides(fit, traced.state.etfe)) is not None:
+        # In the record of the command, and not at the motor, it makes the response smaller by its
+        # share: nobody knows which.
+        limit = _times(limit, -np.log1p(noise.share) * rng.integers(2, size=count))
+    return limit
+
+
+def _times(limit: CriticalStiffness, log_factor: Floats) -> CriticalStiffness:
+    """The limit of each draw times exp(`log_factor`)."""
+    return replace(limit, samples=limit.samples * np.exp(log_factor))
+
+
+def _with_effects(
+    limit: CriticalStiffness, traced: Traced, rng: np.random.Generator
+) -> CriticalStiffness:
+    """The limit with what the accepted effects leave open of it, and how they go on."""
+    accepted, count = traced.state.accepted, len(limit.samples)
+    spread = np.sqrt(sum(effect.limit_log_sd**2 for effect in accepted))
     if spread > 0:
-        factor = np.exp(spread * rng.standard_normal(len(limit.samples)))
-        limit = replace(limit, samples=limit.samples * factor)
-    fall = sum(effect.limit_log_fall for effect in traced.state.accepted)
+        limit = _times(limit, spread * rng.standard_normal(count))
+    fall = sum(effect.limit_log_fall for effect in accepted)
     if fall > 0:  # a step stays where it is, a ramp goes on; neither goes much further
         beyond = 1.25  # times a steady ramp
-        factor = np.exp(-fall * rng.uniform(0.0, beyond, size=len(limit.samples)))
-        limit = replace(limit, samples=limit.samples * factor)
-    further = sum(effect.limit_log_further for effect in traced.state.accepted)
+        limit = _times(limit, -fall * rng.uniform(0.0, beyond, size=count))
+    further = sum(effect.limit_log_further for effect in accepted)
     if further > 0:  # it has settled, or goes on: nobody knows
-        share = rng.integers(2, size=len(limit.samples)) * rng.random(len(limit.samples))
-        limit = replace(limit, samples=limit.samples * np.exp(-further * share))
+        limit = _times(limit, -further * (rng.integers(2, size=count) * rng.random(count)))
+    return limit
+
+
+def _with_rest(
+    limit: CriticalStiffness,
+    posterior: Posterior,
+    base: Fit,
+    fit: Fit,
+    traced: Traced,
+    rng: np.random.Generator,
+) -> CriticalStiffness:
+    """The limit with what remains of the residual, one class after the other."""
     found = {effect.family for effect in traced.state.accepted}
     flagged = {test.family for test in traced.after if test.flagged}
     left = flagged if traced.verdict == UNEXPLAINED else set()
@@ -65,8 +96,7 @@ def with_discrepancy(
     elif traced.state.etfe.direct and _is_noticed(traced, "linear"):
         # Windows that feedback biases do not show how the response deviates.
         rest = _rest(base, fit, traced, "linear")
-        factor = np.exp(rest * rng.uniform(-1.0, 1.0, size=len(limit.samples)))
-        limit = replace(limit, samples=limit.samples * factor)
+        limit = _times(limit, rest * rng.uniform(-1.0, 1.0, size=len(limit.samples)))
     # A law of a force is never quite right, even where what it leaves would pass for noise.
     up = 0.25  # of the least way down, and up as well: a remainder biases either way
     for family in sorted((found & {"nonlinear"}) | (left - {"linear"})):
@@ -76,16 +106,7 @@ def with_discrepancy(
         else:
             width = _downwards(fit, traced, family)
             low, high = -1.0, _upwards(limit, width) + up * _LEAST[family] / width
-        factor = np.exp(width * rng.uniform(low, high, size=len(limit.samples)))
-        limit = replace(limit, samples=limit.samples * factor)
-    if (changing := changing_at_limit(limit, fit, traced)) > 0:
-        factor = np.exp(-_blurred(changing) * rng.random(len(limit.samples)))
-        limit = replace(limit, samples=limit.samples * factor)
-    if (noise := noise_besides(fit, traced.state.etfe)) is not None:
-        # In the record of the command, and not at the motor, it makes the response smaller by its
-        # share: nobody knows which.
-        recorded = rng.integers(2, size=len(limit.samples))
-        limit = replace(limit, samples=limit.samples * np.exp(-np.log1p(noise.share) * recorded))
+        limit = _times(limit, width * rng.uniform(low, high, size=len(limit.samples)))
     return limit
 
 
