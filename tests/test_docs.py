@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -100,6 +101,25 @@ def test_the_readme_has_two_commands_of_one_line() -> None:
     arguments = report.split("bayeshaptic report ")[1].split()
     understood = build_parser().parse_args(["report", *arguments])
     assert (ROOT / understood.source).is_file()
+
+
+def commands(page: Path) -> list[list[str]]:
+    """The arguments of every `bayeshaptic` in the fenced blocks of a page."""
+    inside, found = False, []
+    for line in page.read_text(encoding="utf-8").splitlines():
+        inside ^= line.startswith("```")
+        if inside and line.startswith("bayeshaptic "):
+            found.append(shlex.split(line.removeprefix("bayeshaptic ")))
+    return found
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if commands(page)], ids=lambda page: str(page.relative_to(ROOT))
+)
+def test_commands_are_understood(page: Path) -> None:
+    for arguments in commands(page):
+        understood = build_parser().parse_args(arguments)
+        assert callable(understood.run), arguments
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
