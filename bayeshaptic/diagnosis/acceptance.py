@@ -25,11 +25,11 @@ _OF_THE_DATA = {"nonlinear", "measurement", "time-varying"}  # families that cha
 def choose(
     trials: Sequence[Trial], left: Callable[[Trial], float], worth: Callable[[Trial], float]
 ) -> Trial | None:
-    """The convincing trial that leaves least; of those that leave nothing, the best.
+    """The convincing trial that leaves least; of those that leave nothing, the best one.
 
-    A wrong effect can gain nearly as much as the right one and then need another to mend it: an
-    alternative is better than an addition.  Of linear effects that do as well on windows that they
-    were not fitted to, that which is worth most on all windows.
+    A wrong effect can gain nearly as much as the right one and then need another to mend it, so an
+    alternative is tried before an addition.  Of linear effects that do as well on windows that they
+    were not fitted to, the one is taken that is worth most on all windows.
 
     Parameters
     ----------
@@ -59,15 +59,15 @@ def choose(
 
 
 def simplicity(trial: Trial) -> tuple[int, float]:
-    """Which of two laws that do as well is taken: the least.
+    """A key by which the simplest of several laws that do as well comes first.
 
-    Of as many numbers the one that is likelier on all windows, fitted to them or not.
+    Of laws with as many numbers the one that is likelier on all windows comes first.
     """
     return trial.size, -trial.gain_fit - trial.gain_choose
 
 
 def possible(trials: list[Trial]) -> list[Trial]:
-    """Those in whose fit no mass has run away; all where it has in each: see `Fit.run_away`."""
+    """The trials in whose fit no mass has run away (`Fit.run_away`); all, where one has in each."""
     return [trial for trial in trials if not trial.state.fit.run_away] or trials
 
 
@@ -86,7 +86,7 @@ def ties(best: Trial, other: Trial) -> bool:
 
 
 def with_ties(chosen: Trial, trials: Sequence[Trial]) -> State:
-    """The chosen trial's state, its effect naming those that do as well, and their spread."""
+    """The chosen trial's state; its effect names those that do as well, and has their spread."""
     others = [t for t in trials if t is not chosen and t.convincing and ties(chosen, t)]
     *earlier, own = chosen.state.accepted
     spread = own.limit_log_sd
@@ -103,13 +103,13 @@ def with_ties(chosen: Trial, trials: Sequence[Trial]) -> State:
 
 
 def remaining(tests: Iterable[Test], accepted: Sequence[Accepted]) -> tuple[Test, ...]:
-    """The tests of what is left, and how much of it counts.
+    """The tests that still count of what is left, with the thresholds that it may be held to.
 
-    Where the response drifts the limit is that of the worst part; that the part drifts a little
-    too is no news.  A recording that was mended, that a force was taken off, or that goes on in
-    part, is not as good as a sound one.  What was wrong with the measurement is where an excess of
-    noise comes from.  That positions are rounded takes nothing off: of 19 such recordings in which
-    no force acts none is flagged.
+    Where drift was accepted, the limit is that of the worst part, and that this part drifts a
+    little as well is no news; nor is what else a faulty measurement shows.  After samples were
+    mended, a force was taken off, or a part was chosen, the recording is not as good as a sound
+    one, and thresholds are higher.  Rounded positions excuse nothing: of 19 such recordings in
+    which no force acts none is flagged.
     """
     no_news = {effect.family for effect in accepted} & {"measurement", "time-varying"}
     tests = tuple(test for test in tests if test.family not in no_news)
@@ -130,7 +130,7 @@ def force_acts(accepted: Sequence[Accepted]) -> bool:
 def wanted(tests: Sequence[Test], accepted: Sequence[Accepted]) -> tuple[Test, ...]:
     """The tests that call for one more effect.
 
-    That thresholds are higher after a force was taken off is for the verdict: what is left may be
+    Higher thresholds after a force was taken off are for the verdict only: what is left may be
     another force beside it, which is tried.
     """
     if any(test.flagged for test in tests):
@@ -159,17 +159,18 @@ def needless(loss: float, size: int) -> bool:
 
 
 def raises_error(before: float, after: float) -> bool:
-    """Whether an explanation raises the held-out weighted rms: then it is none.
+    """Whether an explanation raises the held-out weighted rms, so that it explains nothing.
 
-    What is next to the noise may move within it.
+    An error that is next to the noise may move within the noise.
     """
     return after > thresholds.WORSE * max(before, 1.0)
 
 
 def with_misfit(tests: tuple[Test, ...], state: State) -> tuple[Test, ...]:
-    """The tests of what is left in the end, and one that no allowance excuses: of the whole misfit.
+    """The tests of what is left in the end, and one of the whole misfit that nothing excuses.
 
-    Allowances are for finding out whether to go on. What is explained leaves noise.
+    Allowances help to decide whether to go on; a recording that is called explained must leave
+    noise.
     """
     found = state.fit.reduced_chi_square
     if not state.fit.misfits or any(test.flagged for test in tests):

@@ -142,7 +142,7 @@ def finish(
 
 
 def without_sampling(begun: Begun, options: Options) -> Analysis:
-    """What is told of a response that feedback biases: a fit to look at, and no limit.
+    """The analysis of a response that feedback biases: a fit to look at, and no limit.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _with_noise(fit: Fit, scale: float) -> Fit:
 
 
 def _residual_notice(begun: Begun) -> tuple[Notice, ...]:
-    """What the tests of the residual find where nobody traces it."""
+    """A warning of what the tests of the residual find, where nobody traces it."""
     found = [test for test in residual_tests(begun.fit, begun.etfe) if test.flagged]
     if not found:
         return ()

@@ -30,10 +30,10 @@ def is_periodic(etfe: Etfe) -> bool:
 def residual_tests(
     fit: Fit, etfe: Etfe, look: SampleLook | None = None, acted: Floats | float = 0.0
 ) -> tuple[Test, ...]:
-    """The tests that a measurement of its kind gets.
+    """All tests that a measurement of this kind gets.
 
-    In closed loop a command that answers to the noise makes anything look like drift, and a device
-    that rests at its target like a sensor that hangs: neither is looked for there.
+    In closed loop the command answers to the noise, so that anything looks like drift, and a device
+    that rests at its target looks like a sensor that hangs: neither is tested for there.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ def close_loop(
 
 
 def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: Options) -> Closed:
-    """The base model analysed, and with what was found, widened by what that leaves open."""
+    """The base model analysed, and that with what was found, widened by what it leaves open."""
     state, seed = traced.state, options.seed
     # Of coarser counts than were said the fit knows nothing: what was sampled once holds for both.
     alike = not state.accepted or state.fit is begun.fit
@@ -134,7 +134,7 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
 
 
 def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:
-    """By the motion in its loop; None where it cannot be followed."""
+    """The closed loop by following the motion of one mass; None where it cannot be followed."""
     analysis = analyse_in_loop(found, options.within(0.3, 0.95))
     if analysis is None:
         return None
@@ -146,10 +146,11 @@ def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed |
 def _one_mass_instead(
     measurement: Recording | Etfe | str | Path, begun: Begun, model: str | Model, options: Options
 ) -> Closed | None:
-    """By the motion in its loop, where one mass and no linear effect is what a reference shows.
+    """The closed loop by following one mass, where the reference shows no more than one mass.
 
-    Through a reference the response is linear, and dry friction comes out as damping.  A mass that
-    is followed in time rubs; the result stands only where nothing speaks against it.
+    A response that is read through a reference is linear, so that dry friction comes out as
+    damping.  A mass that is followed in time has friction of its own.  The result is used only
+    where nothing speaks against it.
     """
     if begun.fit.model.name != "rigid":
         return None
@@ -160,9 +161,10 @@ def _one_mass_instead(
 
 
 def _refused(begun: Begun, force: ForceExplained | None, options: Options) -> Closed:
-    """Where feedback biases the response, and no motion can be followed: nothing is sampled.
+    """The result where feedback biases the response and no motion can be followed.
 
-    Nothing is traced in the response either: whatever is found may be the controller.
+    Nothing is sampled, and no effect is looked for in the response: whatever is found there may be
+    the controller.
     """
     analysis = without_sampling(begun, options)
     traced = left_alone(begun.etfe, begun.fit, force)
@@ -171,7 +173,7 @@ def _refused(begun: Begun, force: ForceExplained | None, options: Options) -> Cl
 
 
 def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed:
-    """With a limit that allows for what tests cannot see; as it is where nothing can be said.
+    """The result with a limit that allows for what tests cannot see, where that can be computed.
 
     Parameters
     ----------
@@ -223,7 +225,7 @@ def _stages(
     base: Mapping[str, float],
     after: Mapping[str, float],
 ) -> dict[str, float]:
-    """Every stage in its order with its time; of two samplings the declared model's comes first."""
+    """The time of every stage, in order; of two samplings the declared model's comes first."""
     stages = {**begun, "closing the loop": tracing}
     if after is not base:
         stages["the model as declared"] = sum(base.values()) - sum(begun.values())

@@ -140,9 +140,10 @@ def model_error(analysis: Analysis) -> dict[str, Any]:
 def error_beside(declared: Analysis, other: Analysis) -> dict[str, Any]:
     """How far the model of one analysis is from the measurement of another.
 
-    What was taken off a response was part of it, and of its noise, for the model as declared: its
-    error beside that is no measure of what was gained.  It is compared as it is, not fitted again,
-    so that all of the other measurement is held out.
+    What was taken off a response was, for the model as declared, part of the response and of its
+    noise; its error beside the response as measured is therefore no measure of what was gained.
+    Here the declared model is compared with the other measurement as it is and not fitted again, so
+    that all of that measurement is held out.
 
     Parameters
     ----------
@@ -172,7 +173,7 @@ def _of_response(fit: Fit, etfe: Etfe) -> dict[str, float]:
 
 
 def _of_limit(analysis: Analysis, own: EtfeCriticalStiffness) -> dict[str, float | None]:
-    """The model's median limit over that of a measured response, dB."""
+    """The model's median limit over that of a measured response, in dB."""
     with np.errstate(divide="ignore", invalid="ignore"):
         db = 20 * np.log10(analysis.limit.quantile(0.5) / own.q50) if own.q50 else np.nan
     return {"critical_stiffness_db": float(db) if np.isfinite(db) else None}

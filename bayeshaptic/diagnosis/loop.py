@@ -113,7 +113,7 @@ class Loop:
     def glance(self) -> bool | None:
         """Whether the next round will explain everything; None where first sight does not tell.
 
-        What it finds is not looked for again.
+        What is found is kept for that round.
         """
         with counting(self.meter):
             if not self._path:
@@ -122,7 +122,7 @@ class Loop:
             return self._kind.explains(self.state, wanted, self.meter, self._tick)
 
     def go_on(self, patient: bool = True) -> None:
-        """One more round; of what is seen at first sight where there is no patience."""
+        """One more round; without patience only of what is seen at first sight."""
         with counting(self.meter):
             if not self._path:
                 self._begin()
@@ -175,9 +175,10 @@ class Loop:
         self._mend()
 
     def _mend(self) -> None:
-        """With the samples mended, where that does not raise the held-out error.
+        """Go on with the samples mended, where that does not raise the held-out error.
 
-        Tried again after every round: what the model lacked may have looked like a fault.
+        It is tried again after every round: what the model lacked may have looked like a fault of
+        the samples.
         """
         mended = self._kind.mended(self.state)
         if mended is self.state or _raises(self.state, mended):
@@ -236,8 +237,8 @@ class Loop:
     def _look_beside(self) -> tuple[Test, ...]:
         """Look for a force in what tests of the residual take for linear; what is seen is left.
 
-        Under a sweep each frequency comes at one speed, and drag looks like another response.
-        Where no law convinces either, that is what nothing explains.
+        Under a sweep each frequency comes at one speed, so that drag looks like another linear
+        response.  Where no law explains it either, it stays unexplained.
         """
         if acceptance.force_acts(self.state.accepted):
             return ()
@@ -266,12 +267,12 @@ class Loop:
 
 
 def _may_be(trial: Trial) -> bool:
-    """Whether it may be what is left: a force that gains a little is, under another law."""
+    """Whether a candidate may be what is left: it convinces, or is a force under another law."""
     return trial.convincing or trial.accepted.family == "nonlinear"
 
 
 def _came_with(chosen: Trial, before: State) -> set[str]:
-    """Titles of what is accepted besides a trial's own: two forces come in the place of one."""
+    """Titles of what is accepted besides a trial's own effect: two forces may replace one."""
     known = {effect.title for effect in before.accepted}
     return {effect.title for effect in chosen.state.accepted[:-1]} - known
 

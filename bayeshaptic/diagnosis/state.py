@@ -180,7 +180,7 @@ class Trial:
 
 
 def worth(fit: Fit) -> float:
-    """Log likelihood on all windows, less half the log of their number a parameter of an effect.
+    """Log likelihood on all windows, less half the log of their number for each effect parameter.
 
     G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
     """
@@ -195,14 +195,14 @@ def cost(fit: Fit) -> float:
 
 
 def share(windows: Windows, parts: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Which windows belong to the given parts of every four; all where feedback hides the noise."""
+    """A mask of the windows in the given parts of every four; all by the direct method."""
     if windows.noise is not None:
         return np.ones(len(windows.scatter), bool)
     return np.isin(np.arange(len(windows.scatter)) % 4, parts)
 
 
 def fit_part(model: Model, windows: Windows, theta: Floats) -> Floats:
-    """The optimum on the windows to fit, nearest to one vector."""
+    """The vector that fits the windows to fit best, near a given one."""
     return polish(model, windows.part(share(windows, FIT)), theta)
 
 

@@ -1,4 +1,4 @@
-"""The analysis by the motion, followed in time: posterior, and in closed loop the limit."""
+"""The analysis by the motion of one mass that is followed in time, with or without feedback."""
 
 from __future__ import annotations
 
@@ -55,10 +55,11 @@ _TONES = (
 
 
 def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
-    """The analysis by the motion in the loop, or in open loop where that says too little.
+    """The analysis by the motion of one mass, which feedback does not bias.
 
-    None where no such motion can be found; and in open loop, which is refused then, where anything
-    speaks against it.
+    It is for recordings in closed loop, and for those in open loop that say too little for a
+    response.  None where no motion can be followed; in open loop, also where anything speaks
+    against the motion.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
 
 
 def _set_aside(begun: Opened, options: Options) -> tuple[Notice, ...]:
-    """What was said of the device and has no effect on one mass that nobody holds."""
+    """A warning of what was said of the device and cannot hold of one mass that nobody holds."""
     if begun.asked not in ("auto", "rigid"):
         what = f"the base model {begun.asked} that was asked for"
     elif options.held:
@@ -131,16 +132,16 @@ def _set_aside(begun: Opened, options: Options) -> tuple[Notice, ...]:
 
 
 def _open_loop(recording: Recording) -> tuple[Notice, ...]:
-    """What the parameters of a motion in open loop are worth."""
+    """A note of what the parameters of a motion in open loop are worth."""
     text = _OPEN if few_tones(recording) is None else f"{_OPEN} {_TONES}"
     return (Notice("note", TOO_LITTLE, text),)
 
 
 def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:
-    """What was found in the force, with its numbers and the verdict of the motion.
+    """The record of the loop: what was found in the force, with numbers, and a verdict.
 
-    "explained" and "consistent" say here that each half of the recording predicts the other; that
-    a force is left which is not noise is in the widths.
+    "explained" and "consistent" mean here that each half of the recording predicts the other; a
+    remaining force that is not noise is in the widths.
     """
     assert analysis.in_loop is not None
     names = ("coulomb", "offset")
@@ -160,7 +161,7 @@ def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:
 
 
 def _humming(analysis: Analysis) -> tuple[Accepted, ...]:
-    """The tones that were fitted with the motion, as one effect."""
+    """The tones that were fitted with the motion, as one accepted effect."""
     assert analysis.in_loop is not None
     tones = tones_of(analysis.in_loop.motion)
     if not tones:
@@ -180,7 +181,7 @@ def _humming(analysis: Analysis) -> tuple[Accepted, ...]:
 
 
 def _accepted(law: Lacking, analysis: Analysis) -> Accepted:
-    """A law that joined the mass."""
+    """A law that joined the mass, as an accepted effect."""
     evidence = (
         f"takes away {percent(1 - law.score.left)} of the error's power "
         f"(t = {law.score.t:.3g}, everything else fitted with it)"

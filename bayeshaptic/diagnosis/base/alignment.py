@@ -1,4 +1,4 @@
-"""Whether force and position of a row are of one sample, as far as the best fit tells."""
+"""Whether force and position in a row of the recording belong to the same instant."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _WAYS, _OWN = 4, 16
 def realigned(
     found: Opened, fit: Fit, model: str | Model, options: Options, simpler: Iterable[Fit] = ()
 ) -> Opened | None:
-    """What was opened, with rows of one sample; None where they are, or nothing tells.
+    """`found` with its rows put right; None where they are right already, or nothing shows it.
 
     Parameters
     ----------
@@ -67,9 +67,10 @@ def rows_of_one_sample(
 ) -> tuple[Recording, Notice] | None:
     """The recording with every force beside the position that was read when it was commanded.
 
-    No device answers before it is told to.  Whatever a model lacks, it fits rows that are moved
-    by a sample as well, with a period more of delay.  Rows whose position was written down early
-    it fits far better so, since no delay is less than none.
+    A device cannot answer before it is told to, so that no delay is below zero.  Rows that are
+    moved by a sample are fitted as well with one period more of delay, whatever else a model lacks.
+    Where positions were written down early, the moved rows are fitted far better, because the rows
+    as they are would need a delay below zero.
 
     Parameters
     ----------
@@ -128,7 +129,9 @@ def with_rows_moved(recording: Recording, early: int) -> Recording:
 
 
 def perhaps_late(fit: Fit) -> tuple[Notice, ...]:
-    """That a delay beyond the told one is whole periods, as of a position written down late.
+    """A note where the delay beyond the one that was told is a whole number of periods.
+
+    A position that was written down late looks like that.
 
     Parameters
     ----------
@@ -153,7 +156,7 @@ def perhaps_late(fit: Fit) -> tuple[Notice, ...]:
 
 
 def _tells(found: Opened, recording: Recording) -> bool:
-    """Whether the delay of the fit is that of an open loop, from a command to a position."""
+    """Whether the fitted delay is one of an open loop, from a command to a position."""
     closed = found.etfe.direct or found.etfe.through_reference or has_feedback(found.notices)
     return not closed and recording.sensed is None
 
@@ -167,10 +170,11 @@ def _with_any_delay(model: Model) -> Model:
 
 
 def _below(known: Fit, model: Model, recording: Recording, found: Opened) -> Fit | None:
-    """The best fit to rows that are moved a sample on, where a way from the known one leads down.
+    """The fit to rows moved by one sample, where it is better than that to the rows as they are.
 
-    With a period more of delay that leaves the same there, and only what wants less delay than none
-    has anything to gain.  A full search costs ten times that, and follows only then.
+    The search begins at the known fit with one period more of delay, which fits as well; only rows
+    that would need a delay below zero gain from there.  A full search costs ten times as much, and
+    follows only where this one gains.
     """
     etfe = _response(recording, found)
     if etfe is None or not _falls(_from(known, model, etfe, later_s=etfe.period_s), known):

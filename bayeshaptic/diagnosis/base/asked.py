@@ -1,4 +1,4 @@
-"""What was asked for: device, base model and measurement, by name or as they are."""
+"""What a caller asked for (device, base model, measurement), by name, by path or as an object."""
 
 from __future__ import annotations
 

@@ -26,9 +26,9 @@ from bayeshaptic.types import Floats
 
 @dataclass(frozen=True)
 class Begun(Opened):
-    """With a base model fitted to it: what an analysis, or the loop, begins with.
+    """An `Opened` with a base model fitted to it: what an analysis, or the loop, begins with.
 
-    `measured` is the response as it was measured, `etfe` what the fit makes of that.
+    `measured` is the response as it was measured, `etfe` what the fitted model makes of it.
     """
 
     measured: Etfe
@@ -57,7 +57,7 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
 
 
 def base_of(begun: Begun, name: str) -> tuple[Etfe, Fit]:
-    """The fit of a base model that was tried, and the response that it makes of the measurement."""
+    """The fit of a base model that was tried, and the response that it was fitted to."""
     if begun.choice is None or name == begun.fit.model.name:
         return begun.etfe, begun.fit
     tried = begun.choice.candidates[name]
@@ -65,7 +65,7 @@ def base_of(begun: Begun, name: str) -> tuple[Etfe, Fit]:
 
 
 def refitted(begun: Begun, etfe: Etfe, model: str | Model, options: Options) -> Begun:
-    """With the base model fitted to another estimate of the response."""
+    """`begun` with its base model fitted again, to another estimate of the response."""
     etfe, fit, choice = _fit(etfe, base_model(model, options), begun.device, options, False)
     return replace(begun, etfe=etfe, fit=fit, choice=choice)
 
@@ -111,7 +111,7 @@ def _simpler(choice: Choice | None) -> tuple[Fit, ...]:
 
 
 def _lower_where_undecided(choice: Choice) -> Choice:
-    """The choice; where it is open whether somebody holds the device, that with the lower limit."""
+    """The choice; where it is open whether somebody holds the device, the lower limit decides."""
     if not choice.undecided:
         return choice
     names = (choice.fit.model.name, *choice.undecided)

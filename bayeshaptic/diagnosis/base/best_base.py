@@ -36,10 +36,11 @@ _OWN = 0.6  # of the budget for the base model that was chosen, where others are
 def traced_as_of_the_loop(
     begun: Begun, model: str | Model, options: Options
 ) -> tuple[Begun, Traced]:
-    """The loop closed; again where what was found changes what is between the samples.
+    """Close the loop, and close it again where what was found changes the measurement itself.
 
-    And where an effect that was found shows that force and position are not of one sample, which
-    others were added for then: what it does had hidden that.
+    That is so where the found effects change what moves between the samples (of a velocity or a
+    measured force), and where they show that force and position do not belong to the same instant;
+    other effects may have been added only to make up for that.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def traced_as_of_the_loop(
 
 
 def _on_the_way(traced: Traced) -> Iterator[Fit]:
-    """The fits with some of the linear effects, where one was not enough."""
+    """The fits with some of the linear effects, where more than one was found."""
     if len(traced.state.model.effects) < _SEVERAL:
         return
     for state in traced.path[1:]:
@@ -115,11 +116,11 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
 
 
 def _rivals(begun: Begun) -> tuple[str, ...]:
-    """The base models that could be instead: none where the chosen one was asked for, or fits.
+    """The base models that could be right instead; none where the chosen one was asked for or fits.
 
-    A hand that is like none is no better than a misfit.  A rigid device with a mode is a free one,
-    and a free one with a mode on its body a chain; one with a mode on its motor is none, so that
-    beside a chain that misfits the free device is tried, too.
+    A hand that is like no hand counts as a misfit.  A rigid device with a mode is a free one, and a
+    free one with a mode on its body is a chain.  One with a mode on its motor is no chain: so
+    beside a chain that misfits, the free device is tried, too.
     """
     choice = begun.choice
     if choice is None:
@@ -147,11 +148,11 @@ def _best_other(choice: Choice, chosen: ScoredFit) -> tuple[str, ...]:
 
 
 def _beside_a_force(begun: Begun, own: Traced) -> tuple[str, ...]:
-    """The best other base model where a force was found that the choice did not know of.
+    """The best other base model, where a force was found that was not known when one was chosen.
 
     Strong friction makes a free device look held: the choice was made on a motion that is not
-    linear.  The other way round there is nothing to make good: no force hides a hand, and one that
-    the response does not show would take what the force leaves for its own motion.
+    linear.  The other way round nothing has to be tried: no force hides a hand, and a hand that the
+    response does not show would explain what the force leaves as its own motion.
     """
     choice = begun.choice
     if choice is None or not any(one.family == "nonlinear" for one in own.state.accepted):
@@ -161,9 +162,9 @@ def _beside_a_force(begun: Begun, own: Traced) -> tuple[str, ...]:
 
 
 def _hardly_worse(begun: Begun) -> tuple[str, ...]:
-    """The base models with or without a hand, as the chosen one is not, that fit all but as well.
+    """The best base models of the other kind (held or not held) that fit nearly as well.
 
-    A hand that hardly holds looks like a third mass, and its own motion like noise of a device.
+    A hand that hardly holds looks like a third mass, and its own motion like noise of the device.
     """
     choice = begun.choice
     if choice is None:
@@ -186,10 +187,10 @@ def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
 def _comparable(
     found: Mapping[str, Traced], noise: float, given_up: Collection[str]
 ) -> Mapping[str, Traced]:
-    """What explains; where nothing does, all.
+    """Of the loops those that explain the recording; where none does, all of them.
 
-    A hand can take up what a force does to a device that nobody holds: it explains nothing where
-    two masses or one, with what they lack, predict the response better without it.
+    A loop with a hand does not count as explaining where models without one, with what they lack,
+    predict the response better: a hand can take up what a force does to a device that nobody holds.
     """
     simple = {"rigid", "free"} - set(given_up)
     unheld = [criterion(one, noise) for name, one in found.items() if name in simple]
@@ -204,7 +205,7 @@ def _comparable(
 
 
 def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] = ()) -> str:
-    """What explains comes first, then the information criterion; of equals the fewest effects."""
+    """The best loop: one that explains, then by BIC; of equals that with the fewest effects."""
     among = _comparable(found, noise, given_up)
     behind = {name: criterion(traced, noise) for name, traced in among.items()}
     equals = [name for name in behind if behind[name] <= min(behind.values()) + _BARE_MENTION]
@@ -212,7 +213,7 @@ def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] =
 
 
 def criterion(traced: Traced, noise: float) -> float:
-    """BIC of the model with its effects; those beside the model count by their estimates."""
+    """BIC of the model with all effects; those that are not part of the model count as well."""
     beside = sum(len(effect.estimates) for effect in traced.state.accepted)
     return information_criterion(traced.state.fit, noise, beside)
 

@@ -1,4 +1,4 @@
-"""Loops on several base models, a round of each at a time."""
+"""Closing the loop on several base models, one round of each at a time."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from bayeshaptic.numerics.spending import RATE
 
 
 class LoopsInTurn:
-    """The loops on all base models in question, a round of each at a time.
+    """The loops on all base models in question, which go on one round at a time.
 
-    What explains with few parameters ends the search on what would need more.
+    Once a model with few parameters explains everything, those that would need more are given up.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class LoopsInTurn:
         self.given_up: set[str] = set()
 
     def begin(self, name: str, budget_s: float) -> Loop:
-        """The loop on a base model, which has not gone anywhere yet."""
+        """The loop on a base model, before its first round."""
         etfe, fit = base_of(self._begun, name)
         own = next(iter(self.running.values()), None)
         self.running[name] = Loop(etfe, fit, budget_s, self._options.report, like=own)
@@ -44,13 +44,13 @@ class LoopsInTurn:
 
     @property
     def patient(self) -> bool:
-        """Whether none explains everything yet: then no way is too long."""
+        """Whether no loop explains everything yet, so that a long search is worth it."""
         return not self._explained
 
     def glance(self, rivals: Sequence[str]) -> None:
-        """A round of the first rival that explains at first sight, where the chosen one does not.
+        """One round of the first rival that explains at first sight, if the chosen model does not.
 
-        Before the long ways on a base model that is the wrong one.
+        It comes before the long search on a base model that is the wrong one.
         """
         (own,) = self.running.values()
         if not rivals or own.glance() is not False:
@@ -63,9 +63,9 @@ class LoopsInTurn:
                 break
 
     def take_turns(self, rivals: Sequence[str]) -> None:
-        """Go on with all of them, until each is done or given up.
+        """Go on with all loops until each is done or given up.
 
-        The chosen one is a round ahead: the others come first.
+        The chosen base model has had one round already: the others come first.
         """
         chosen, own = next(iter(self.running.items()))
         others = [self.running.get(name) or self.begin(name, 0.0) for name in rivals]
@@ -86,9 +86,10 @@ class LoopsInTurn:
         return self.running[name].done or name in self.given_up
 
     def _needs_no_less(self, name: str) -> bool:
-        """Whether it would need as many parameters as what explains everything already has.
+        """Whether a loop would need at least as many parameters as one that explains everything.
 
-        An effect counts as one parameter more: which one it is was chosen, too.
+        An effect counts as one parameter more than it has, because which effect it is was chosen,
+        too.
         """
         loop = self.running[name]
         if not loop.misfits:
@@ -99,12 +100,12 @@ class LoopsInTurn:
 
     @property
     def _explained(self) -> list[Loop]:
-        """Those in which nothing is left."""
+        """The loops in which nothing is left to explain."""
         done = [loop for loop in self.running.values() if loop.done]
         return [loop for loop in done if loop.traced.verdict != UNEXPLAINED]
 
 
 def parameters_of(state: State) -> int:
-    """Of the model, of the forces beside it, and one for the choice of each effect."""
+    """Number of parameters: of the model, of its forces, and one for the choice of each effect."""
     beside = sum(len(effect.estimates) + 1 for effect in state.accepted)
     return int(state.fit.model.size) + beside

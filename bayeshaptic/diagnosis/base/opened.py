@@ -112,7 +112,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
 
 
 def _first_of_the_period(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
-    """Notices that a recording says too little, unless its period is what cannot be."""
+    """`notices` that a recording says too little; an impossible period is refused before them."""
     unusual = unusual_period(recording.period_s)
     if notices and unusual is not None:
         raise InputError(f"{recording.name}: {unusual}", topic="units")
@@ -122,7 +122,7 @@ def _first_of_the_period(recording: Recording, notices: tuple[Notice, ...]) -> t
 def _refuse_delay(
     period_s: float, device: Device | None, model: str | Model, options: Options
 ) -> None:
-    """Refuse a delay of the loop that none has: every period of it costs states and time."""
+    """Refuse a delay that no loop has: every period of it costs states and time."""
     delay_s, sd_s = options.delay_s, options.delay_sd_s
     if delay_s is None and isinstance(model, Model):
         delay_s = model.fixed.get("delay_s")
@@ -142,9 +142,10 @@ def _refuse_delay(
 def with_delay_of_the_loop(
     measurement: Recording | Etfe, device: Device | None, options: Options
 ) -> tuple[Recording | Etfe, tuple[Notice, ...]]:
-    """The measurement as of the loop: what a sensor of the force, or a hammer, saw has no delay.
+    """The measurement with the loop's delay put in, where the sensors' signals have none.
 
-    Where the delay is known it is put in; otherwise whoever reads the limit is warned.
+    A measured force, or a hammer's, knows nothing of the delay between command and force.  A known
+    delay is put in; where it is not known, whoever reads the limit is warned.
 
     Raises
     ------
@@ -173,7 +174,7 @@ def with_delay_of_the_loop(
 
 
 def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
-    """What no test looks for in pieces: the motion of one says nothing of how the next began."""
+    """A note of what no test looks for in pieces: one piece says nothing of how the next began."""
     if not recording.joints or has_feedback(notices) or told_too_little(notices):
         return ()
     text = (
@@ -190,9 +191,11 @@ def _response(
     notices: tuple[Notice, ...],
     unread: tuple[Notice, ...],
 ) -> tuple[Etfe, tuple[Notice, ...]]:
-    """The response; one that nothing is read from is for comparison only, in any band.
+    """The estimated response, and the notices that hold with it.
 
-    `unread` are the notices before a reference was looked for.
+    Where no band can be found, but nothing is to be read from the response either (feedback, too
+    little excitation), it is estimated in the widest band, for comparison only. `unread` are the
+    notices from before a reference was looked for.
     """
     try:
         return estimate_etfe(recording, band_hz), notices

@@ -1,15 +1,17 @@
-"""Trying effects where feedback hides the noise: on all windows at once.
+"""Trying effects by the direct method: on all windows at once, because feedback hides the noise.
 
-In closed loop a window by itself is biased, and the sum over all of them is not
-(`recordings/response/estimators/direct.py`): nothing can be held out (`diagnosis/state.py`).  The
-command that was recorded is what drove the device, whatever made it, so that a force inside it is
-simulated as in open loop.  Tests of forces see friction faintly there, because the controller makes
-up for it, or not at all: it is tried beside what is linear, which would else stand in for it, and
-where nothing is left, too.  Of a held device it was worth 176 in log likelihood, no test saw it,
-and 1.23 times the limit was recommended; in 17 loops without any its gain was 7 at most, where 32
-are asked for.  In simulated loops the right linear effect gained 55 to 1100 in log likelihood, the
-best of those that lacked none at most 13.  Of 100 clean loops one has an effect named, by 39: its
-fit had ended in another valley.
+In closed loop a single window is biased, and only the sum over all windows is not
+(`recordings/response/estimators/direct.py`), so that no windows can be held out
+(`diagnosis/state.py`).  The recorded command is what drove the device, whatever made it, and a
+force inside the device is simulated under it as in open loop.
+
+Tests see friction faintly there, or not at all, because the controller makes up for it.  So dry
+friction is always tried, beside linear effects, which would otherwise stand in for it, and also
+where nothing seems to be left.  On one held device it was worth 176 in log likelihood while no test
+saw it, and 1.23 times the limit was recommended without it; in 17 loops without friction it gained
+7 at most, and 32 are asked for.  In simulated loops the right linear effect gained 55 to 1100 in
+log likelihood, and the best effect gained at most 13 where none was lacking.  Of 100 clean loops
+one has an effect named, with a gain of 39: its fit had ended in another valley.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ def untraced(state: State) -> Traced:
 
 
 def trace_directly(traced: Traced, meter: Meter, tick: Tick | None = None) -> Traced:
-    """What is left explained by effects, as far as they convince; whether it `stands` comes next.
+    """Explain what is left by effects, as far as they convince; `stands` judges the result.
 
     Parameters
     ----------
@@ -89,9 +91,9 @@ def rubs(found: Traced) -> bool:
 def _leaves_little(found: Traced) -> bool:
     """Whether dry friction takes away most of what was seen, and no other force is left.
 
-    Where a mass turns or rests its encoder's counts say little of when the force changes its sign:
-    a few thousandths of the time at the wrong one are a tenth of what friction does.  Not of a held
-    device, whose hand makes up for friction that is a little too small.
+    Where a mass turns or rests, the encoder's counts hardly tell when friction changes its sign:
+    the wrong sign for a few thousandths of the time is a tenth of what friction does.  A held
+    device is not excused so, because its hand makes up for friction that is a little too small.
     """
     left = [test for test in found.after if test.flagged]
     accepted = found.state.accepted
@@ -105,7 +107,7 @@ def _leaves_little(found: Traced) -> bool:
 
 
 def _round(before: Traced, meter: Meter, tick: Tick | None) -> Traced | None:
-    """With one more effect; None where none convinces."""
+    """The record with one more effect; None where none convinces."""
     trials = _trials(before.state, before.after, meter, tick)
     open_ = [t for t in trials if t.convincing and not t.state.fit.impossible]
     left = {id(trial): _left(trial.state) for trial in open_}
@@ -120,7 +122,7 @@ def _round(before: Traced, meter: Meter, tick: Tick | None) -> Traced | None:
 
 
 def with_trial(before: Traced, trial: Trial) -> Traced:
-    """With an effect that was tried elsewhere, and convinced.
+    """The record with an effect that was tried elsewhere and convinced.
 
     Parameters
     ----------
@@ -138,7 +140,7 @@ def _accepting(
     open_: list[Trial],
     tests: tuple[Test, ...],
 ) -> Traced:
-    """With the chosen one of what was tried, which leaves `tests`; others are `open_`, too."""
+    """The record with the chosen trial, which leaves `tests`; others that are open are `open_`."""
     state = acceptance.with_ties(chosen, open_)
     *earlier, own = state.accepted
     evidence = f"raises the log likelihood of all windows by {chosen.gain_fit:.0f}"
@@ -164,8 +166,8 @@ def _accepting(
 def _is_known_to_hold(trial: Trial) -> bool:
     """Whether limits with such an effect were right in simulated loops.
 
-    With linear ones and dry friction they were.  The one loop with a spring that hardens, which was
-    named as such, had 1.6 times its limit: other forces are told, and not taken off.
+    With linear effects and dry friction they were.  In the one loop with a hardening spring, which
+    was named as such, the limit was 1.6 times too high: other forces are named, and not taken off.
     """
     return trial.accepted.family == "linear" or _FRICTION in trial.accepted.estimates
 
@@ -178,9 +180,10 @@ def _left(state: State) -> tuple[Test, ...]:
 
 
 def _trials(state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick | None) -> list[Trial]:
-    """Of the classes that tests raise; drift is none of them, which no test tells from the loop.
+    """Trials of the classes that tests raise, and of dry friction always.
 
-    Dry friction is always among them: what a force does all lines may see as linear alone, or not.
+    Drift is not tried: no test tells it from what the loop does.  A force may look linear to all
+    lines together, or not be seen at all.
     """
     raised = {test.name for test in tests if test.flagged}
     families = {test.family for test in tests if test.flagged}
@@ -191,7 +194,7 @@ def _trials(state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick | No
 
 
 def _linear_trials(state: State, meter: Meter, tick: Tick | None) -> list[Trial]:
-    """One trial an effect, of its variants the best: of those that a sieve leaves."""
+    """One trial for each linear effect that a sieve leaves, of its variants the best."""
     fit, best = state.fit, dict[str, Trial]()
     bases = starting_bases(fit.model, fit.theta, fit.elsewhere)
     sieved = sieve(fit.model, state.etfe, fit.windows, bases)

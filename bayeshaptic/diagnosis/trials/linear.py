@@ -102,7 +102,7 @@ class Sight:
 
 
 def first_sight(state: State, meter: Meter, tick: Tick | None = None) -> Sight | None:
-    """All candidates sieved, the near ones fitted in full; None where not even that is affordable.
+    """All candidates sieved, and the promising ones fitted; None where not even that is affordable.
 
     Parameters
     ----------
@@ -199,11 +199,11 @@ def sieve(model: Model, etfe: Etfe, windows: Windows, bases: Floats) -> list[Sie
 
 
 def _looked_further(sight: Sight, meter: Meter) -> Mapping[int, Optimum]:
-    """The optima, also from points that no fit has bent where nothing explains it, until one does.
+    """The optima; where nothing explains the recording, also from points that no fit has bent.
 
-    Whatever explains it was reached from the present fit, and then no way is barred.  From a fit
-    in which a mass has run away to be the ground, hardly any leads on: there those that were left
-    aside at first sight are followed as well.
+    Where something explains it already, it was reached from the present fit, and no way is barred.
+    Few ways lead on from a fit in which a mass has run away to become the ground: there the
+    candidates that first sight left aside are followed as well.
     """
     state, part = sight.state, sight.windows.part(share(sight.windows, FIT))
     found, bent = sight, state.fit.run_away
@@ -256,6 +256,6 @@ def _try(state: State, windows: Windows, one: Sieved, base: Floats, first: Optim
 
 
 def _around(model: Model, etfe: Etfe, first: Optimum) -> tuple[Floats, Windows]:
-    """The fit to the windows to fit by once more, compressed around the first one."""
+    """The fit to the windows to fit by, made once more with windows compressed around it."""
     windows = compress(etfe, partial(model.response, first.theta, measured=True))
     return fit_part(model, windows, first.theta), windows

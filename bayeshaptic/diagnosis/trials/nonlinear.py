@@ -57,7 +57,7 @@ def nonlinear_trials(
     def looked_for(
         laws: Iterable[Variants], known: dict[str, Point], before: Sequence[Point] = ()
     ) -> list[Point]:
-        """By a scan, or where forces are there by what a little of each law would do."""
+        """The best points of the laws: by a scan, or beside forces there are to first order."""
         points, inner = [], []
         for law in laws:
             point = known.get(law[0].strength[0])
@@ -90,7 +90,7 @@ def trial_of(
     meter: Meter,
     tick: Callable[[str], None] | None = None,
 ) -> Trial | None:
-    """One law of a force beside a state; None where it does not convince, in a scan or fitted.
+    """The trial of one law of a force; None where it convinces neither in a scan nor fitted.
 
     Parameters
     ----------
@@ -113,5 +113,5 @@ def trial_of(
 
 
 def _beside(variants: Variants, known: Point | None) -> Variants:
-    """Where a force is known by another law, the variants at its place."""
+    """Variants of the same kind of force at its own place, where it is known by another law."""
     return [e for e in variants if known is None or e.place == known.effect.place]

@@ -31,7 +31,7 @@ _AS_FAR = 0.7
 def in_the_place_of_one(
     trials: Sequence[Trial], meter: Meter, tick: Callable[[str], None] | None
 ) -> list[Trial]:
-    """Two forces in the place of one whose law contains a simpler one: that, and another.
+    """Two forces in the place of one whose law contains a simpler one: the simpler, and another.
 
     Friction that falls with the velocity bends like dry friction with a drag, and a damper makes up
     for the rest: it explained a held device that had both, with 1.8 times its limit.
@@ -64,11 +64,11 @@ def in_the_place_of_one(
 
 
 def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
-    """With another law in the place of an earlier force, where that predicts more.
+    """The state with another law in the place of an earlier force, where that predicts more.
 
-    What an earlier force was found to be was found without the last one: cubic damping for a drag,
-    where friction was not known of.  Where others do as well the limit spreads over them.  The very
-    same state where none comes near.
+    An earlier force was named before the last one was known: a drag may have been taken for cubic
+    damping where friction was not known of.  Where several laws do as well, the limit spreads over
+    them.  The very same state is returned where none comes near.
     """
     forces = [one for one in state.accepted if one.change and one.change.acting]
     for one in forces[:-1] if state.etfe.unbroken else ():
@@ -78,10 +78,10 @@ def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None 
 
 
 def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
-    """The state with its last force searched for and fitted once more; as it is without one.
+    """The state with its last force searched for and fitted again; unchanged where there is none.
 
-    Where it was found beside a linear effect that the state does not have any more it may be at
-    another place, and larger, or have another law.
+    A force that was found beside a linear effect which has since been taken out may be larger, act
+    at another place, or have another law.
     """
     *rest, last = state.accepted
     if last.change is None or last.change.acting is None:

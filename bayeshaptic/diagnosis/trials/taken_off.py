@@ -14,9 +14,9 @@ from bayeshaptic.types import Floats
 def with_forces(
     etfe: Etfe, changes: Sequence[Change], sign: float = 1.0, louder: Floats | None = None
 ) -> Etfe:
-    """The measurement with what forces took off put back; with a sign of -1 once more without.
+    """The measurement with what forces took off put back; with a sign of -1, taken off again.
 
-    `louder`, (W,), is how many times as far a hand moves it without those that are off.
+    `louder`, (W,), is how many times as far a hand moves the device without those forces.
     """
     own, spectra = etfe.recording, etfe.spectra
     assert own is not None and isinstance(spectra, RandomSpectra)
@@ -35,7 +35,7 @@ def with_forces(
 
 
 def put_back(etfe: Etfe, change: Change, rest: Sequence[Accepted]) -> Etfe:
-    """The measurement with what an effect took off put back, `rest` what has not been."""
+    """The measurement with what one effect took off put back; `rest` is what stays off."""
     spectra = etfe.spectra
     assert isinstance(spectra, RandomSpectra)
     louder = spectra.louder if any(one.acts for one in rest) else None

@@ -168,7 +168,7 @@ def _is_mended(state: State) -> bool:
 
 
 def _on_other_samples(trial: Trial) -> Trial:
-    """The trial's state, where what was taken off before can no longer be put back."""
+    """The trial's state; what was taken off before can no longer be put back into other samples."""
     linear = tuple(
         effect if effect.change and effect.change.effect else replace(effect, change=None)
         for effect in trial.state.accepted

@@ -130,7 +130,7 @@ def changing_at_limit(limit: CriticalStiffness, fit: Fit, traced: Traced) -> flo
 
 
 def _is_noticed(traced: Traced, family: str) -> bool:
-    """Whether a test of the class would be flagged but for the allowance for a force taken off.
+    """Whether a test of the class would be flagged without the allowance for a force taken off.
 
     It decides whether to widen, not by how much.
     """
@@ -138,7 +138,7 @@ def _is_noticed(traced: Traced, family: str) -> bool:
 
 
 def _upwards(limit: CriticalStiffness, width: float) -> float:
-    """How far up a uniform factor must reach, over its reach down, to leave the 95 % point there.
+    """How far up a uniform factor must reach, relative to its reach down, to keep the 95 % point.
 
     Of a uniform variable from -1 to a, 5 % lie above a - 0.05 (1 + a).
     """
@@ -150,9 +150,10 @@ def _upwards(limit: CriticalStiffness, width: float) -> float:
 def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
     """How far, in log stiffness, the rest of an effect may take the limit either way.
 
-    What tests still see of it, as a share of what they saw, times how far it moved the limit.  In a
-    loop they see a force faintly, or in the linear residual alone: of what they saw noise is a half
-    then, and what moved the limit far would leave it open.  There each says what it still sees.
+    It is what tests still see of the effect, as a share of what they saw before, times how far the
+    effect moved the limit.  In closed loop tests see a force faintly, or in the linear residual
+    alone, so that half of what they saw is noise and the share says little: there each test says
+    how strong a force it still sees.
     """
     if family == "nonlinear" and traced.state.etfe.direct:
         return min(forces_left(fit, traced.after).limit_log, _FARTHEST)
@@ -184,17 +185,18 @@ def _downwards(fit: Fit, traced: Traced, family: str) -> float:
 def _blurred(share: float) -> float:
     """How far down, in log stiffness, the limit may be where this share of the response changes.
 
-    Of a mode that wanders a recording has the mean, which is flatter and wider than the mode ever
-    is.  Over a mode 1 / (1 + j d) at its top, d its distance from there, the means of its real part
-    and of its power are one number; so the limit of the mean is too high by the factor by which the
-    mean power is above the power of the mean: by one and the share that changes.
+    Of a mode that wanders a recording shows the mean, which is flatter and wider than the mode ever
+    is.  Over a mode 1 / (1 + j d) at its top, d being the distance from there, the mean of the real
+    part equals the mean of the power.  The limit of the mean response is therefore too high by the
+    ratio of the mean power to the power of the mean, which is one plus the share that changes.
 
-    Friction in it, a cable that slips, damps it and ends in small motions.  Of the power of a sign
-    of normal numbers 2 / pi are linear and the rest is noise, half of which stays about a mode: the
-    share that changes is 0.28 times the square of friction's share of the damping.
+    Friction in the mode (a cable that slips) damps it, and stops damping in small motions.  Of the
+    power of the sign of a normal variable 2 / pi is linear and the rest is noise, half of which
+    stays around a mode: the share that changes is 0.28 times the square of friction's share of the
+    damping.
 
-    Both are derived, not measured: a quarter is added for what a mode is not (alone, and all of the
-    response), and a twentieth of the damping is taken to be viscous.
+    Both are derived, not measured.  A quarter is added because a mode is never alone and never all
+    of the response, and a twentieth of the damping is taken to be viscous.
     """
     beyond, of_friction, least = 1.25, 0.28, 0.05
     rubs = float(np.sqrt(share / of_friction))

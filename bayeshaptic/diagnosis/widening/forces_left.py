@@ -37,9 +37,9 @@ class ForcesLeft:
 
 
 def forces_left(fit: Fit, tests: Iterable[Test]) -> ForcesLeft:
-    """The worst of the forces that tests see around a fit, each as strong as it is seen.
+    """The worst of the forces that tests still see around a fit, each as strong as it is seen.
 
-    To first order: what is known badly would go beyond any device.
+    To first order only, and no further than any device could go.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
-"""What of a model's damping may be friction, by the noise that friction makes.
+"""How much of a model's damping may be friction, judged by the noise that friction makes.
 
-The sign of a velocity of normal numbers goes with it as sqrt(2 / pi) over its rms, which looks like
-a damper; the rest of it is noise.  So a device whose noise is small has little friction, and one in
-which no law of a force was found, but noise is left, may owe that much of its damping to one.
+The sign of a normally distributed velocity has a part that is proportional to the velocity, sqrt(2
+/ pi) over its rms, which looks like a damper; the rest is noise.  So a device with little noise has
+little friction.  Where noise is left and no law of a force was found, as much of the damping as
+would make this noise may be friction.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _VISCOUS = 0.2  # of the damping, if most of it is friction that was fitted as d
 
 
 def may_be_held_by_friction(fit: Fit, traced: Traced) -> bool:
-    """Whether nothing but noise is left of a force, as of friction that holds a mass mostly.
+    """Whether noise alone is left of a force, as friction leaves it that mostly holds a mass.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def may_be_held_by_friction(fit: Fit, traced: Traced) -> bool:
 
 
 def with_friction_for_damping(fit: Fit, etfe: Etfe | None = None) -> Floats:
-    """The fitted parameters, shape (P,), with that part of the damping that is viscous at least.
+    """The fitted parameters, shape (P,), with only that part of the damping that must be viscous.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def with_friction_for_damping(fit: Fit, etfe: Etfe | None = None) -> Floats:
 
 
 def _as_damper(fit: Fit, etfe: Etfe) -> float:
-    """The damper that the friction looks like which would make all noise of the device."""
+    """The damper that friction looks like which would make all of the device's noise."""
     recording = etfe.unbroken
     if recording is None:
         return np.inf

@@ -59,7 +59,7 @@ def with_law_error(
 
 
 def _by(chains: Floats, far: Floats, lowest: Floats) -> Floats:
-    """Moved that far, and down to a bound by ever less: a device has no mass that is zero."""
+    """The draws moved so far, ever less towards a bound: no device has a mass of zero."""
     above = chains - lowest
     with np.errstate(divide="ignore", invalid="ignore"):
         down = lowest + above * np.exp(np.minimum(far, 0.0) / above)
@@ -68,6 +68,6 @@ def _by(chains: Floats, far: Floats, lowest: Floats) -> Floats:
 
 
 def _relative_sd(law: Accepted) -> float:
-    """Of the strength of a force, which is the first of its numbers."""
+    """The relative standard deviation of a force's strength, the first of its numbers."""
     strength = next(iter(law.estimates.values()))
     return strength.sd / abs(strength.mean) if strength.mean else 0.0

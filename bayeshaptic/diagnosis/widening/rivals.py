@@ -56,10 +56,11 @@ class Rival:
 def with_rivals(
     limit: CriticalStiffness, traced: Traced, seed: int = 0
 ) -> tuple[CriticalStiffness, Traced]:
-    """The limit over the linear effect accepted last and its rivals, and these probabilities.
+    """The limit averaged over the last linear effect and its rivals, and their probabilities.
 
-    In the place of what ties add to the limit's spread.  As they are where another kind of effect
-    was accepted last: what a law takes off the recording leaves each rival other data.
+    The average takes the place of what ties add to the spread of the limit.  Where another kind of
+    effect was accepted last, limit and record stay as they are: each rival would be fitted to other
+    data after a law was taken off.
 
     Parameters
     ----------
@@ -137,12 +138,12 @@ def _rival(name: str, fit: Fit, windows: Windows, rng: np.random.Generator) -> R
 
 
 def _constant(here: Coordinates) -> float:
-    """What `Coordinates.log_jacobian` leaves out: not all models go in the same coordinates."""
+    """What `Coordinates.log_jacobian` leaves out, which differs between models."""
     return float(np.log(here.scale[~here.log]).sum() + np.log(here.floor).sum())
 
 
 def _taken(model: Model, here: Coordinates, phi: Floats) -> float:
-    """Log of the share of the prior of effects' parameters that their posterior takes up."""
+    """Log of the share of the effect parameters' prior that their posterior takes up."""
     own = _own(model)
     places = [model.names.index(name) for name in own]
     coordinate = here.own(phi)[:, places]

@@ -1,8 +1,9 @@
-"""How forces answer to the motion that a hand makes, and how much further it would go alone.
+"""How forces answer to a hand's motion, and how much further a hand alone would move the device.
 
-On the average over a motion y a force on the motor is a damper and a spring, N = k_1 s + k_2 with
+Averaged over a motion y, a force on the motor acts as a damper and a spring, N = k_1 s + k_2 with
 the numbers that come closest (R. C. Booton, IRE Trans. Circuit Theory 1, 1954), and adds -G N y to
-it.  What a hand does to the linear mechanism alone is then 1 + G N times what it was seen to do.
+the motion.  Without forces the hand would therefore move the linear mechanism 1 + G N times as far
+as it was seen to.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ _FAR, _MOST = 2.0, 1000
 
 @dataclass(frozen=True)
 class Answer:
-    """Reads what forces add to the motion.
+    """Reads off what forces add to the motion how they answer to it.
 
     Attributes
     ----------

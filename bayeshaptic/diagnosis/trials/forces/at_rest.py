@@ -1,9 +1,9 @@
 """What dry friction does while it holds a mass in a hand.
 
-It is whatever the other forces leave then, a hand's among them, and the position does not move: how
-much of that is the hand's nothing says, but that hands move smoothly.  Simulated forces agree with
-any motion of the hand there, and one that was not its own had a friction fit best that was 13 % too
-small, with a limit that came out 0.5 dB too high (docs/closed-loop.md).
+While the mass rests, friction equals all other forces, a hand's among them.  How much of them is
+the hand's can only be told by the fact that hands move smoothly.  Simulated forces agree with any
+motion of the hand at rest: with a wrong one, friction that was 13 % too small fitted best, and the
+limit came out 0.5 dB too high (docs/closed-loop.md).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class AtRest:
 def at_rest(recording: Recording, system: LinearSystem, edge_hz: float) -> AtRest | None:
     """Where a recording rests, and what forces at the motor do then.
 
-    None where it does not, where it is too long for that, or sampled too slowly to see a hand.
+    None where it does not rest, or is too long or sampled too slowly to see a hand.
 
     Parameters
     ----------

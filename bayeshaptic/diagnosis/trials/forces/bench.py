@@ -1,8 +1,8 @@
 """One recording and one linear model, on which internal forces are tried.
 
-What forces add to the motion is simulated and taken off the recording; the linear parameters are
-fitted to what is left.  Forces that were found before are put back and simulated with the one that
-is tried: each acts in the motion that all of them make, and what one was taken for may be
+What forces add to the motion is simulated and taken off the recording, and the linear parameters
+are fitted to the rest.  Forces that were found before are put back and simulated together with the
+one that is tried: each acts in the motion that all of them make, and what was taken for one may be
 another's.
 """
 
@@ -159,7 +159,7 @@ class ForceBench:
         return other
 
     def stays(self, point: Point) -> bool:
-        """Whether the mass does not run away with the forces, after the last fit."""
+        """Whether the mass does not run away with these forces, after the last fit."""
         if point.motion is None:
             return False
         return bool(
@@ -198,10 +198,10 @@ class ForceBench:
     def _simulated(
         self, forces: tuple[Acting, ...], theta: Floats, expected: Floats | None
     ) -> _Simulated | None:
-        """What forces do, the measurement without it and its windows.
+        """What forces do, and the measurement without it, with its windows.
 
-        None where it runs away, or where the linear parameters are such that no response is a
-        number (a damper at zero behind a spring a thousand times too stiff).
+        None where the mass runs away, or where no response is a number (a damper at zero behind a
+        spring a thousand times too stiff).
         """
         if not np.all(np.isfinite(self.model.response(theta, self._somewhere, measured=True))):
             return None
@@ -227,7 +227,7 @@ class ForceBench:
 
 
 def answered(changes: Sequence[Change]) -> Complexes | None:
-    """What those that answer to a hand add to the position at the lines, (L,); None: none does."""
+    """What the forces that answer to a hand add to the position at the lines, (L,), or None."""
     own = [c.position for c in changes if c.acting and c.acting.effect.grounded]
     return np.asarray(sum(own)) if own else None
 

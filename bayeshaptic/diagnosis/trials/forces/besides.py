@@ -1,12 +1,12 @@
 """The motion that neither the command nor forces make: a hand's, or a free device's coasting.
 
-It is read off the encoder: what is measured, less what command and forces do.  Forces act in it,
-so that what they do and it must be found together.  One read off beside what forces did in the
-last motion, over and over, comes to that by as little a step as friction is more of the damping
-than the damper: friction that was nearly all of it lay 12 mm apart from a motion of 0.5 mm, and a
-tenth less of it seemed to fit better.  How forces answer is told by the linear parameters that fit
-where no force is taken off, since these are the mechanism's with what forces do on the average
-(R. C. Booton, IRE Trans. Circuit Theory 1, 1954): Newton's steps are then as large as is needed.
+It is read off the encoder as what is measured, less what command and forces do.  Forces act in this
+motion as well, so that both must be found together.  Reading one off beside the other in turn
+converges slowly where friction is most of the damping: friction that was nearly all of it ended 12
+mm away from a motion of 0.5 mm, and a tenth less of it seemed to fit better.  How forces answer to
+a change of the motion is told by the linear parameters that fit where no force is taken off,
+because these contain what forces do on average (R. C. Booton, IRE Trans. Circuit Theory 1, 1954).
+With them Newton's steps have the right length.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _WORSE = 3  # in turn, after which none is better any more
 
 
 class Besides(Protocol):
-    """What the encoder tells of a motion that nothing known makes."""
+    """What the encoder tells of the motion that neither command nor forces make."""
 
     def begin(self, left: Floats) -> Floats:
         """Where to begin, before anything is known of forces; shapes (N,)."""
@@ -57,7 +57,7 @@ class Besides(Protocol):
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand's: what is slow, because there the encoder sees it well.
+    """The motion that a hand makes: what is slow, because there the encoder sees it well.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class HandAfar(Hand):
-    """A hand's, to a force between the masses, which hardly answers to it."""
+    """A hand's motion beside a force between the masses, which hardly answers to it."""
 
     def answered(self, motion: Floats) -> Floats:
         return motion
@@ -112,7 +112,7 @@ class HandAfar(Hand):
 
 @dataclass(frozen=True)
 class Coasting:
-    """A free device's: how it began to move, and a constant force.
+    """A free device's coasting: how it began to move, and the motion under a constant force.
 
     Attributes
     ----------
@@ -180,10 +180,11 @@ def remembered(columns: Floats) -> Floats:
 def settled(
     besides: Besides, left: Floats, forced: Callable[[Floats], Floats], first: Floats
 ) -> Floats:
-    """What forces add to the motion, in one that agrees with the measured one.
+    """What forces add to the motion, found together with a motion that agrees with the measurement.
 
-    From the best mixture of the motions tried so far (D. G. Anderson, Journal of the ACM 12, 1965):
-    forces that are not the true ones answer unlike those that were there.
+    Each step begins at the best mixture of the motions tried so far (D. G. Anderson, Journal of the
+    ACM 12, 1965), because forces that are not the true ones answer differently from those that
+    acted.
 
     Parameters
     ----------

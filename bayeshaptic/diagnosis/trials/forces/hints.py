@@ -1,4 +1,4 @@
-"""What a further force, or a larger law of a known one, would be: to first order, by its score."""
+"""What a further force, or a larger law of a known one, would gain, to first order: its score."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Hint:
 
 
 def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
-    """What each further force would be beside those that the bench's state has.
+    """What each further force would be worth beside those of the bench's state.
 
-    Everything that is fitted moves along: a score is standard normal where there is no such force
-    (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).  Those that run away are left out.
+    Everything that is fitted moves along, so that a score is standard normal where there is no such
+    force (C. R. Rao, Proc. Camb.  Phil. Soc. 44, 1948).  Forces that run away are left out.
 
     Parameters
     ----------

@@ -44,11 +44,11 @@ def in_doubt(bench: ForceBench, point: Point) -> tuple[list[float], float]:
 def _by_law(bench: ForceBench, point: Point, by_slopes: float) -> float:
     """How far log K_CR goes with the error of a law.
 
-    Not less than by the way that the linear parameters went when the forces were taken off, in
-    proportion, nor more than twice that.  Between them slopes at the fit are believed, which hold
-    no further than the force is known, perhaps a thousandth of the law's error: of nine forces they
-    said 0.04, 0.05 and 0.61 where fits with that much more and less of it moved the limit by 0.23,
-    0.93 and 0.02; that way says 0.21, 1.9 and 0.02.
+    The slope of the limit at the fit is used, within bounds: at least, in proportion, the way that
+    the linear parameters went when the forces were taken off, and at most twice that.  The slope
+    alone holds no further than the force is known, perhaps a thousandth of the law's error.  For
+    three of nine forces it said 0.04, 0.05 and 0.61, where fits with that much more and less of the
+    force moved the limit by 0.23, 0.93 and 0.02; the bounded value is 0.21, 1.9 and 0.02.
     """
     here, *ends = search_box(bench.model)
     low, high = (here.natural(end[None])[0] for end in ends)
