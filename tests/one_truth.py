@@ -16,7 +16,8 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.jobs.index import row_of
 from bayeshaptic.quantities import estimate, rounded_down
 from bayeshaptic.report import write
-from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, style
+from bayeshaptic.report.figures import style
+from bayeshaptic.report.figures.pictures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.tables import outcomes
 from bayeshaptic.report.numbers.misfit import misfit_is_clear, residual_is_noticed

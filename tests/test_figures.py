@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from fake_analysis import CASES, fake_analysis
 
-from bayeshaptic.report.figures import PICTURES, marginals, stiffness
+from bayeshaptic.report.figures import marginals, stiffness
 from bayeshaptic.report.figures.pairs import correlation, strongest
+from bayeshaptic.report.figures.pictures import PICTURES
 from bayeshaptic.report.figures.sampler import rank_histogram
 from bayeshaptic.report.figures.style import drawn
 from bayeshaptic.report.numbers.octaves import third_octaves

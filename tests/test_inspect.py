@@ -14,7 +14,7 @@ from bayeshaptic import cli
 from bayeshaptic.commands.inspect import lines
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import read_recording, read_study
-from bayeshaptic.recordings.overview import doubts, overview
+from bayeshaptic.recordings.overview.overview import doubts, overview
 
 N = 2000
 RNG = np.random.default_rng(0)

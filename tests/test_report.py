@@ -20,7 +20,7 @@ import bayeshaptic
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.report import write, write_report
-from bayeshaptic.report.figures import PICTURES, draw_pictures
+from bayeshaptic.report.figures.pictures import PICTURES, draw_pictures
 from bayeshaptic.report.figures.style import Drawn
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import least_squares_limit, witnesses

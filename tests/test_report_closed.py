@@ -26,8 +26,8 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.report import summary
 from bayeshaptic.report.assumptions import assumptions
-from bayeshaptic.report.figures import LOOP_PICTURES
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
+from bayeshaptic.report.figures.pictures import LOOP_PICTURES
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.loop.tables import (

@@ -14,7 +14,8 @@ from bayeshaptic.errors import InputError, printable
 from bayeshaptic.files import whole_file, write_whole
 
 if TYPE_CHECKING:
-    from bayeshaptic.recordings.overview import ColumnFacts, Overview
+    from bayeshaptic.recordings.overview.overview import Overview
+    from bayeshaptic.recordings.overview.roles import ColumnFacts
 
 NAME = "inspect"
 SUMMARY = "what is in a file, and a --columns line to read it with"
@@ -41,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the columns; 0."""
-    from bayeshaptic.recordings.overview import overview
+    from bayeshaptic.recordings.overview.overview import overview
 
     for path in (arguments.png, arguments.write):
         if path is not None and path.exists() and not arguments.force:
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 def lines(found: Overview) -> list[str]:
     """The table, the doubts, and the suggested line."""
     from bayeshaptic.recordings.columns import POSITIONS
-    from bayeshaptic.recordings.overview import doubts, is_guess
+    from bayeshaptic.recordings.overview.overview import doubts, is_guess
     from bayeshaptic.recordings.overview.roles import is_measured
 
     roles = {name: role for role, name in found.roles.items()}
@@ -128,7 +129,7 @@ def _quoted(text: str) -> str:
 def asked(found: Overview) -> str:
     """The mapping as somebody at the terminal wants it: a line each, empty for the guess."""
     from bayeshaptic.recordings.columns import POSITIONS, parse_columns
-    from bayeshaptic.recordings.overview import unit_of
+    from bayeshaptic.recordings.overview.overview import unit_of
 
     guesses = dict(part.split("=", 1) for part in (found.mapping or "").split(",") if part)
     chosen: dict[str, str] = {}
@@ -164,7 +165,7 @@ def _answer(question: str) -> str:
 
 def study_text(found: Overview, path: Path, mapping: str | None) -> str:
     """A study with this one recording, its columns as in `mapping`."""
-    from bayeshaptic.recordings.overview import UNIT_TO_SAY, unit_of
+    from bayeshaptic.recordings.overview.overview import UNIT_TO_SAY, unit_of
 
     terms = dict(part.split("=", 1) for part in (mapping or "").split(",") if part)
     said = {role: term for role, term in terms.items() if not term.endswith(UNIT_TO_SAY)}

@@ -11,7 +11,7 @@ from bayeshaptic.errors import unique
 from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.report import tables, words
 from bayeshaptic.report.assumptions import assumptions, priors
-from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
+from bayeshaptic.report.figures.pictures import FORCE_PICTURES, LOOP_PICTURES, PICTURES
 from bayeshaptic.report.figures.style import Drawn
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import (

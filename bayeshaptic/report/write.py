@@ -10,7 +10,12 @@ from typing import Any
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.draft import report_in
-from bayeshaptic.report.figures import FORCE_PICTURES, LOOP_PICTURES, PICTURES, draw_pictures
+from bayeshaptic.report.figures.pictures import (
+    FORCE_PICTURES,
+    LOOP_PICTURES,
+    PICTURES,
+    draw_pictures,
+)
 from bayeshaptic.report.guidance.section import FIGURES as ADVICE, guidance_section
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.hidden.section import hidden_section

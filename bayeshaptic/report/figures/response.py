@@ -12,7 +12,7 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import pretty_unit
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.band import ResponseBand, response_band
-from bayeshaptic.report.figures.hover import Reading, note
+from bayeshaptic.report.figures.drawing.hover import Reading, note
 from bayeshaptic.report.numbers.estimates import correction
 
 if TYPE_CHECKING:

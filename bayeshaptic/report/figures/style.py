@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.quantities import minus
+from bayeshaptic.report.figures.drawing.hover import panels
 from bayeshaptic.report.figures.drawing.png import png
-from bayeshaptic.report.figures.hover import panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -197,7 +197,7 @@ class Drawn:
     svg : str or None
         For the page itself; None where it is too large for one.
     readings : list
-        Values under the pointer; see `bayeshaptic.report.figures.hover`.
+        Values under the pointer; see `bayeshaptic.report.figures.drawing.hover`.
     """
 
     png: bytes = field(repr=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.quantities import Scale, scale
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.figures.hover import Reading, note
+from bayeshaptic.report.figures.drawing.hover import Reading, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.quantities import percent, rounded_down, scale
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.figures.hover import Reading, note
+from bayeshaptic.report.figures.drawing.hover import Reading, note
 from bayeshaptic.stability.tail import quantiles
 
 if TYPE_CHECKING:

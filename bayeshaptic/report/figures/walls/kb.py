@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.quantities import Scale, percent, scale
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.figures.hover import Reading, note
+from bayeshaptic.report.figures.drawing.hover import Reading, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
