@@ -38,6 +38,10 @@ def told(progress: Callable[[float, str], None] | bool | None) -> Progress | Non
     )
 
 
+def silent(share: float, word: str) -> None:
+    """Tell nobody that a `share` of the work is done, and the `word`."""
+
+
 class Bar:
     """A bar on stderr, which ends with the work."""
 

@@ -24,6 +24,8 @@ from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.effects.measurement import MainsTone
 from bayeshaptic.errors import Notice
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample_around
 from bayeshaptic.inference.stopping import EveryParameter
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
@@ -33,6 +35,8 @@ from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.checks.sufficiency import TOO_LITTLE, few_tones, told_too_little
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 _SEEN = 2.9  # Student's t of eight degrees of freedom: 1 in 100
@@ -78,18 +82,7 @@ def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
     delay = options.delay_s, options.delay_sd_s
     model = rigid_with_friction(recording, found.motion, begun.device, *delay, options.prior)
     fit = in_loop_fit(model, begun.etfe, found.motion, found.misfit)
-    watch = LimitKnown(model)
-    posterior = sample_around(
-        fit,
-        begun.etfe,
-        watch if options.ess is None else EveryParameter(model, options.ess),
-        options.seed,
-        options.report,
-        options.checkpoints,
-    )
-    # What the response says is no part of this likelihood.
-    posterior = replace(posterior, windows=None, etfe=None)
-    limit = watch.limit_of(posterior)
+    posterior, limit = _sampled(fit, begun.etfe, options)
     doubts = found.doubts + contradictions(found.motion, posterior)
     if open_loop and doubts:
         return None
@@ -114,6 +107,22 @@ def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
         lever_m=begun.lever_m,
         in_loop=replace(found, doubts=doubts, questions=questions),
     )
+
+
+def _sampled(fit: Fit, etfe: Etfe, options: Options) -> tuple[Posterior, CriticalStiffness]:
+    """The posterior of a motion that was fitted, and its limit."""
+    watch = LimitKnown(fit.model)
+    posterior = sample_around(
+        fit,
+        etfe,
+        watch if options.ess is None else EveryParameter(fit.model, options.ess),
+        options.seed,
+        options.report,
+        options.checkpoints,
+    )
+    # What the response says is no part of this likelihood.
+    posterior = replace(posterior, windows=None, etfe=None)
+    return posterior, watch.limit_of(posterior)
 
 
 def _set_aside(begun: Opened, options: Options) -> tuple[Notice, ...]:

@@ -31,7 +31,7 @@ from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.models.start import informed
 from bayeshaptic.numerics.gauss_newton import minimise
-from bayeshaptic.progress import told
+from bayeshaptic.progress import silent, told
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, LogDensity, Progress
@@ -155,7 +155,7 @@ def sample_around(
         As of `sample`.
     """
     began = time.perf_counter()
-    report = told(progress) or (lambda share, word: None)
+    report = told(progress) or silent
     report(0.02, "finding the peak")
     fit = resolved(_converged(fit))
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)

@@ -14,6 +14,7 @@ from bayeshaptic.report.listed import listed
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.recordings.response.etfe import Etfe
 
 
 def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, ...]:
@@ -62,46 +63,50 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
             "motion counts more. It has the same mean however the mass moves.",
         )
     etfe = analysis.etfe
-    noise = (
-        f" Because the model misfits, the posterior takes {pure(analysis.noise_scale)} times that "
-        "variance."
-        if analysis.noise_scale != 1.0
-        else ""
+    said = []
+    if etfe.direct:
+        said.append(
+            "The command depends on the motion before it alone, not on what is to come; by which "
+            "controller is no matter."
+        )
+    if etfe.through_reference:
+        said.append(
+            "What the response is read through (what the controller followed, or what of the "
+            "command neither its past nor the motion up to then foretells) owes nothing to the "
+            "noise."
+        )
+    said.append(_scatter(etfe))
+    if analysis.noise_scale != 1.0:
+        said.append(
+            f"Because the model misfits, the posterior takes {pure(analysis.noise_scale)} times "
+            "that variance."
+        )
+    return (
+        f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
+        "extrapolates.",
+        " ".join(said),
     )
+
+
+def _scatter(etfe: Etfe) -> str:
+    """What the noise is, by how the response was measured."""
     if etfe.recording is None:
-        scatter = (
+        return (
             "The noise is Gaussian, independent from row to row of the table, and as large as the "
             "table says."
         )
-    elif etfe.period_lines is not None:
-        scatter = (
+    if etfe.period_lines is not None:
+        return (
             "The noise is Gaussian: at each excited line it is what does not repeat from period to "
             "period, and its variance is integrated out. The device has settled in the periods "
             "that were kept; whether it changes from one to the next is tested where there are "
             "four or more."
         )
-    else:
-        scatter = (
-            "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is "
-            "estimated in each window of lines and integrated out. The leakage of a random "
-            "excitation is removed in each window; what is left over is independent from window to "
-            "window."
-        )
-    if etfe.through_reference:
-        scatter = (
-            "What the response is read through (what the controller followed, or what of the "
-            "command neither its past nor the motion up to then foretells) owes nothing to the "
-            f"noise. {scatter}"
-        )
-    if etfe.direct:
-        scatter = (
-            "The command depends on the motion before it alone, not on what is to come; by which "
-            f"controller is no matter. {scatter}"
-        )
     return (
-        f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
-        "extrapolates.",
-        scatter + noise,
+        "The noise is Gaussian, with a spectrum that is unknown and smooth: its variance is "
+        "estimated in each window of lines and integrated out. The leakage of a random "
+        "excitation is removed in each window; what is left over is independent from window to "
+        "window."
     )
 
 

@@ -18,6 +18,7 @@ from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
+from bayeshaptic.progress import silent
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
@@ -102,7 +103,7 @@ def infer_configurations(
     InputError
         With fewer than three different configurations, or different models.
     """
-    report = progress or (lambda share, word: None)
+    report = progress or silent
     measured = np.unique(np.asarray(coordinate, float))
     if len(coordinate) != len(posteriors):
         raise InputError(

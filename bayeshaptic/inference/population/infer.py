@@ -23,7 +23,7 @@ from bayeshaptic.models import HalfNormal, MaybeZero, Model
 from bayeshaptic.models.build import DAMPER_SCALE
 from bayeshaptic.models.prior_of_zero import weight_of_zero
 from bayeshaptic.models.structures import HAND
-from bayeshaptic.progress import told
+from bayeshaptic.progress import silent, told
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
@@ -75,7 +75,7 @@ def infer_population(
     likelihood (`reweight`).
     """
     began = time.perf_counter()
-    report = told(progress) or (lambda share, word: None)
+    report = told(progress) or silent
     model = common_model(posteriors)
     if not any(name in HAND for name in model.names):
         raise InputError(f"the {model.name} model has no hand: give posteriors of held devices.")
