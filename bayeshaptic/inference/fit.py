@@ -93,12 +93,12 @@ class Fit(Shown):
 
     @property
     def impossible(self) -> tuple[str, ...]:
-        """Masses, and the loop's delay, that end at a bound: no device is like that.
+        """Masses, and the loop's delay, that end at a bound, where no device is.
 
-        A delay of zero is that of a position which was written down before its command acted (a
-        loop that has none is told so, and then it is no parameter); a damper may well be zero.
-        Of 194 fits to open loops 12 end so, all of a position a sample early, with limits 1.7 to
-        179 times the truth (docs/door.md).
+        A delay of zero means that the position was written down before its command acted (a loop
+        that has no delay is told so, and then the delay is no parameter); a damper may well be
+        zero.  Of 194 fits to open loops 12 end so, all of a position a sample early, with limits
+        1.7 to 179 times the truth (docs/door.md).
         """
         ends = [name for name, how in self.outcome.items() if how == AT_BOUND]
         return impossible_at_bounds(self.model, ends)

@@ -139,12 +139,13 @@ def _fit(model: Model, etfe: Etfe, start: Floats) -> Fit:
 def _sharpened(
     model: Model, etfe: Etfe, theta: Floats, rewindowings: int
 ) -> tuple[Floats, Windows]:
-    """A fit goes on, and the windows around it: where modes ring on, or feedback hides the noise.
+    """The fit continued together with the windows around it, where that is needed.
 
-    The valleys of such modes are narrower than starting points are dense, so that a fit begins
-    without them.  Then the windows themselves tell a pole better than it does; around a fit that is
-    off by a hundredth of a line they are many times louder, so that not every step is one to a
-    better fit.  In closed loop the noise is what the last fit left.
+    It is needed beside sharp modes, and where feedback hides the noise.  Valleys of sharp modes are
+    narrower than starting points are dense, so that a fit begins without them; then the windows
+    themselves tell a pole better than the fit does.  Around a fit that is off by a hundredth of a
+    line the windows are many times louder, so that not every step leads to a better fit.  In closed
+    loop the noise is what the last fit left.
     """
     tried: list[tuple[float, Floats, Windows]] = []
     for step in range(rewindowings + 1):
@@ -240,12 +241,13 @@ def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Op
 def anew(model: Model, etfe: Etfe, windows: Windows, found: Optimum | None) -> Optimum | None:
     """What starting points of the model's own lead to, or `found` where that is as good.
 
-    A fit without an effect may be bent so far that no value of the effect beside it leads on.  Of a
-    second mode on the motor of a held LHIfAM without a device file none of ten fits did; starting
-    points that no fit has bent led there in nine of ten.  Both in one set crowd each other out.
-    Not with dynamic links, of which so many responses would be dear (not measured).  Where more
-    than this effect is lacking a valley that is a little deeper is but bent in another way: the far
-    one must halve what is left, or have masses where those of `found` ran away.
+    A fit without an effect may be bent so far that no value of the effect beside it leads on.  For
+    a second mode on the motor of a held LHIfAM without a device file none of ten fits led on, while
+    starting points that no fit has bent led there in nine of ten.  Both kinds in one set would
+    crowd each other out.  Models with dynamic links are left out, because so many responses would
+    be dear (not measured).  Where more than this effect is lacking, a valley that is a little
+    deeper may only be bent in another way: the other one must halve what is left, or keep its
+    masses where those of `found` ran away.
     """
     if found is not None and found.explains:
         return found

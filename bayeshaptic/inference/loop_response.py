@@ -1,8 +1,8 @@
-"""The response of the loop, where something else than a command and a position was sensed.
+"""The response of the loop, where something other than a command and a position was sensed.
 
-What lies between the samples depends on the model, and so each model is fitted to what it makes of
-the measurement itself: until then the right one misfits, and a richer one stands in for what is
-missing.
+What happens between the samples depends on the model.  So each model is fitted to the response that
+it makes of the measurement itself.  Without that the right model misfits, and a richer one stands
+in for what is missing.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def depends_on_fit(etfe: Etfe) -> bool:
 
 
 def as_of_the_loop(etfe: Etfe, fit: Fit) -> Etfe:
-    """The response as of a position sampled in the loop, whatever was sensed in its place.
+    """The response that a position sampled in the loop would have, whatever was sensed instead.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def _beside(etfe: Etfe, system: LinearSystem) -> Etfe:
 
 
 def hardly_differ(etfe: Etfe, other: Etfe) -> bool:
-    """Whether two estimates from one measurement are the same, beside their errors."""
+    """Whether two estimates from one measurement differ by less than their errors."""
     apart = np.abs(etfe.value - other.value) ** 2 / etfe.variance
     return bool(np.sum(apart) < _SAME)
 
@@ -113,10 +113,10 @@ def _motor_alone(etfe: Etfe, fit: Fit) -> LinearSystem:
 
 
 def _settled(fitting: Fitting, measured: Etfe, fit: Fit, etfe: Etfe) -> tuple[Fit, Etfe]:
-    """Fits from where the last one ended, until what they make of the measurement stays.
+    """The fit repeated from where the last one ended, until the response that it makes stays.
 
-    One that does not settle is fitted to what it makes of the measurement once more when the loop
-    is closed, and shows there as a misfit: it has no stiffness.
+    A fit that does not settle is fitted once more when the loop is closed, and shows there as a
+    misfit, so that no stiffness is recommended.
     """
     for _ in range(_MOST_ROUNDS):
         again = as_of_the_loop(measured, fit)

@@ -206,9 +206,9 @@ def sample_around(
 
 
 def _converged(fit: Fit) -> Fit:
-    """The fit, followed to its optimum along ridges that are straight in sampling coordinates.
+    """The fit, followed to its optimum in sampling coordinates, in which its ridges are straight.
 
-    In the logarithms of a fit they are bent, and it may have stopped halfway.
+    In the logarithms of a fit ridges are bent, and it may have stopped halfway.
     """
     here = sampling_coordinates(fit.model, fit.theta, fit.sd)
     low, high = (here.coordinate(end) for end in reach(fit.model, REACH_SDS))

@@ -1,4 +1,4 @@
-"""Where feedback biases the response: the loop closed on the force instead."""
+"""Closing the loop on the force instead of the response, where feedback biases the response."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def trace_force(etfe: Etfe, fit: Fit, force: ForceExplained) -> Traced:
 
 
 def left_alone(etfe: Etfe, fit: Fit, force: ForceExplained | None) -> Traced:
-    """The biased response of a device whose motion cannot be followed: nothing is traced in it."""
+    """The record of a biased response whose motion cannot be followed: nothing is traced in it."""
     state = State(etfe, fit, () if force is None else _friction(force))
     return Traced(UNEXPLAINED, None, state, (), ())
 

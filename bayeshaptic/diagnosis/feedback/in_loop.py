@@ -1,4 +1,4 @@
-"""The motion of a recording with feedback, fitted; and what speaks against a limit from it."""
+"""The motion of one mass fitted to a recording with feedback, and what speaks against its limit."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def follow_in_loop(recording: Recording) -> InLoop | None:
 
 
 def _like_one_mass(motion: MotionFit, recording: Recording) -> MotionFit:
-    """With what a tone cannot tell from mass and damping in the widths of these."""
+    """The fit with wider mass and damping, by what a single tone cannot tell from them."""
     velocity = np.gradient(motion.simulated, recording.period_s)
     spread, size = motion.covariance.copy(), UNSEEN * float(np.std(recording.force))
     for name, moves in (("m", np.gradient(velocity, recording.period_s)), ("b", velocity)):
@@ -180,18 +180,18 @@ def is_wide(limit: CriticalStiffness) -> bool:
 
 
 def _unsure_of_the_delay(motion: MotionFit) -> bool:
-    """Whether it comes out below zero, as one does by chance that is known to a period or two."""
+    """Whether the delay is below zero by chance, as one may be that is known to a period or two."""
     delay = NAMES.index("delay_s")
     value, sd = motion.values[delay], motion.sd[delay]
     return bool(value < 0 <= value + SURELY * sd)
 
 
 def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
-    """What was given, as known or by a prior, that the motion contradicts.
+    """What was given, as known or by a prior, and is contradicted by the motion.
 
-    A delay of the device file that is not the recording's moves the damping, and with it the limit.
-    What was given may be right as well, and the motion be of more than one mass: that is certain
-    where one mass would need what no device has, such as a delay below zero.
+    A device file's delay that is not the recording's moves the damping, and with it the limit.
+    What was given may be right as well, and the motion be that of more than one mass; that is
+    certain where one mass would need what no device has, such as a delay below zero.
     """
     model, drawn = posterior.model, posterior.summary()
     known: list[str] = []
@@ -241,7 +241,7 @@ def _power(errors: list[Floats]) -> float:
 
 
 def _differences(first: MotionFit, second: MotionFit) -> tuple[str, ...]:
-    """Of mass, damping and delay, what the halves disagree about."""
+    """What the halves disagree about, of mass, damping and delay."""
     apart = np.abs(first.values - second.values)
     sd = np.sqrt(np.diag(first.covariance) + np.diag(second.covariance))
     return tuple(

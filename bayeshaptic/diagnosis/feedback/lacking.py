@@ -1,10 +1,10 @@
 """What the motion of one mass in its loop lacks: laws that join it, and what speaks against it.
 
-Tones that stand out of what the fit leaves are fitted with it: they hide, and feign, the rest.
-Then every force of a table is asked for by the score of its strength in what is left.
-Forces over the velocity are laws of one mass, and join it.  Damping that fades with the frequency
-(a base that gives, a connection that relaxes, eddy currents) and whatever changes with time are
-not: they say that a limit from one mass is another device's.
+Tones that stand out of what the fit leaves are fitted with it first, because they hide other things
+and look like them.  Then every force of a table is tested by its score in what is left.  Forces
+over the velocity are laws of one mass, and join it.  Damping that fades with the frequency (a base
+that gives, a connection that relaxes, eddy currents) and whatever changes with time are not: they
+say that a limit from one mass would be another device's.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Lacking:
 def with_laws(
     recording: Recording, follower: Follower | None
 ) -> tuple[MotionFit, tuple[Lacking, ...], tuple[str, ...]]:
-    """The motion, fitted with the laws that it lacks; these; and why none of it is to be relied on.
+    """The motion fitted with the laws that it lacks; these laws; and what speaks against all of it.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _best_of_each(
 
 
 def _speaks_against(motion: MotionFit, recording: Recording, path: SmoothMotion) -> tuple[str, ...]:
-    """What no limit of one mass goes with, where it is seen."""
+    """Forces that are seen and that no limit of one mass goes with."""
     asked = list(unlike_one_mass(recording, path))
     scored = scores(motion, recording, [force for _, force in asked])
     seen = [

@@ -1,10 +1,11 @@
-"""Whether a vibration mode in a band of few windows may as well lie above it.
+"""Whether a vibration mode in a band of few windows may as well lie above the band.
 
 What a reference moves may be a few windows of slow motion.  A mode among them can follow their
 noise better than the device does, whose own mode lies above the band; draws around the one never
-see the other.  It is not asked where nearly all frequencies are moved, as in open loop.  Of 96 free
-devices in closed loop 57 were read through the reference; three were doubted for it, whose
-intervals all lay wholly above the truth.  Of 66 that are now, seven, whose intervals all hold.
+see the other.  This is not asked where nearly all frequencies are moved, as in open loop.  Of 96
+free devices in closed loop 57 were read through the reference; three were doubted for it, and their
+intervals all lay wholly above the truth.  Of 66 that are read now, seven are doubted, and their
+intervals all hold.
 """
 
 from __future__ import annotations

@@ -36,11 +36,12 @@ def count_of(recording: Recording) -> float:
 
 
 def below_the_counts(recording: Recording) -> float:
-    """A twentieth of the sampling rate, Hz, halved while counts are much of the acceleration.
+    """The cut-off of the smoothing, Hz, below which counts are little of the acceleration.
 
-    By their share of its power the mass comes out too small, and what it lacks looks like another
-    mass, or like damping that changes with the frequency.  The share falls with the fifth power of
-    the cut-off: of slow motions and coarse counts one octave is enough.
+    It is a twentieth of the sampling rate, halved while counts are more than that.  By the counts'
+    share of its power the mass comes out too small, and what is missing looks like another mass, or
+    like damping that changes with the frequency.  The share falls with the fifth power of the
+    cut-off, so that one octave is enough for slow motions and coarse counts.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Whether units are in doubt in closed loop: by a fit that holds there.
+"""Whether units are in doubt, asked in closed loop of a fit that feedback does not bias.
 
-The measured response of a loop is biased towards what its controller does, so that it says nothing
-of units.  Of a response that is estimated in spite of feedback, or of a motion that was followed,
-the same is asked as of a measured one at the door.
+The measured response of a loop is biased towards what its controller does, and says nothing of
+units.  The same questions that are asked of a measured response at the door are asked here of the
+fitted one, or of the motion that was followed.
 """
 
 from __future__ import annotations

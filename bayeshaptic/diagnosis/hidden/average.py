@@ -40,9 +40,10 @@ class Looked:
     gain: Floats = field(repr=False)
 
     def with_more(self, told: Mapping[int, Sequence[Evidence]], rng: np.random.Generator) -> Looked:
-        """With what other recordings say of the sizes of some effects: by their number here.
+        """The same with what other recordings say of the sizes of some effects, by their number.
 
-        Draws are drawn again by it; those of which two effects share something stay among these.
+        Draws are drawn again by that evidence; those for which two effects share something stay
+        among the old ones.
         """
         weighed, meeting = list(self.weighed), self.meeting.copy()
         for number, others in told.items():
@@ -58,7 +59,7 @@ class Looked:
 
 
 def _drawn_again(log_weight: Floats, rng: np.random.Generator) -> Ints:
-    """As many, by their weight, in any order."""
+    """Indices of as many draws, drawn anew by their weight, in random order."""
     weight = np.exp(log_weight - log_weight.max())
     return rng.permutation(systematic(weight, len(weight), rng))
 
@@ -69,7 +70,7 @@ def _gain(meeting: Floats) -> Floats:
 
 
 def looked_at(weighed: Sequence[Weighed], known: Around) -> Looked:
-    """What each two effects share, to first order in both."""
+    """The effects with what each two of them share, to first order in both."""
     every = np.concatenate([one.changes for one in weighed])
     count, draws = len(weighed), len(weighed[0].changes)
     shared = known.overlap(every, every).reshape(count, draws, count, draws)

@@ -44,7 +44,7 @@ def drifts(model: Model) -> tuple[Drift, ...]:
 
 
 def weigh_drift(drift: Drift, known: Around, rng: np.random.Generator) -> Weighed:
-    """The posterior of the size of a ramp, a logarithm, where the tests see none.
+    """The posterior of the size of a ramp, as a logarithm, where tests see none.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Nonlinear forces that could hide: the spring, damper or gain as which they stand in a fit.
+"""Nonlinear forces that could hide, each by the spring, damper or gain that a fit takes it for.
 
 A small force f(m) of a motion m, normal with standard deviation sigma, changes the response as the
 linear force k m does that is closest to it, k = E[f m] / sigma^2 (R. C. Booton, "Nonlinear control
-systems with random inputs", IRE Transactions on Circuit Theory 1, 1954).  The parameters take k for
-their own; the limit is that of the loop without it.  What is left of f, which no linear response
-explains, is what the tests of the residual look for: they say how strong it may be.
+systems with random inputs", IRE Transactions on Circuit Theory 1, 1954).  The fitted parameters
+contain k; the limit is that of the loop without it.  What is left of f, which no linear response
+explains, is what the tests of the residual look for: they say how strong the force may be.
 """
 
 from __future__ import annotations
@@ -140,10 +140,11 @@ def force_suspects(
 
 
 def _said(test: Test) -> ForceSeen:
-    """What a test says of its force; where a law was taken off, no better than that law is.
+    """What a test says of the strength of its force.
 
-    A law is an approximation, and what it leaves raises the tests of other forces: their thresholds
-    are higher then, and what is below these tells of no second force.
+    Where a law was taken off it can say no better than that law is known.  A law is an
+    approximation, and what it leaves raises the tests of other forces.  Their thresholds are higher
+    then, and what is below them is no evidence of a second force.
     """
     assert test.force is not None
     doubt = max(1.0, test.threshold / thresholds.two_sided())

@@ -160,9 +160,9 @@ def averaged(
 def _parts(
     limit: CriticalStiffness, looked: Looked, prior: HiddenPrior
 ) -> list[tuple[Bools, Average]]:
-    """What hides beside each explanation, and the draws of the limit that are of it.
+    """What hides beside each explanation, and which draws of the limit belong to it.
 
-    A rival of the accepted effect does not hide beside itself: without this it counts twice.
+    A rival of the accepted effect does not hide beside itself, where it would count twice.
     """
     which = limit.explained_by
     if which is None:
@@ -201,7 +201,7 @@ def _weighed(
 
 
 def _effects(looked: Looked, present: Floats, prior: HiddenPrior) -> tuple[HiddenEffect, ...]:
-    """One row an effect, its places together."""
+    """One row for each effect, all its places together."""
     rows, weighed = [], looked.weighed
     for name in dict.fromkeys(one.name for one in weighed):
         places = [i for i, one in enumerate(weighed) if one.name == name]
@@ -242,6 +242,6 @@ def _quantile(values: Floats, levels: float | list[float]) -> Floats:
 
 
 def _widening(effect: HiddenEffect) -> float:
-    """How much it asks for: what lowers the limit first."""
+    """A key by which the effect comes first that lowers the limit most."""
     low, _, high = effect.shift_db
     return effect.probability * (max(-low, 0.0) + 0.1 * max(high, 0.0))

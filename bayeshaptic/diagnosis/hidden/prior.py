@@ -42,7 +42,7 @@ class HiddenPrior:
 
     @classmethod
     def from_table(cls, table: Mapping[str, float]) -> HiddenPrior:
-        """From the probabilities by name that a caller gave, that of the others as "each"."""
+        """The prior from probabilities by name, as callers give them; "each" is for the others."""
         named = {name: float(value) for name, value in table.items() if name != "each"}
         return cls(float(table.get("each", PROBABILITY)), named)
 
@@ -51,10 +51,10 @@ class HiddenPrior:
         return float(self.named.get(name, self.each))
 
     def without(self, name: str) -> HiddenPrior:
-        """With none for the effect called `name`."""
+        """The same with a probability of zero for the effect called `name`."""
         return HiddenPrior(self.each, {**self.named, name: 0.0})
 
     def times(self, factor: float) -> HiddenPrior:
-        """With every probability multiplied, at most a half."""
+        """The same with every probability multiplied by a factor, at most a half."""
         named = {name: min(factor * p, 0.5) for name, p in self.named.items()}
         return HiddenPrior(min(factor * self.each, 0.5), named)

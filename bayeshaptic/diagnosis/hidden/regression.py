@@ -173,10 +173,11 @@ def _near_an_end(model: Model, here: Coordinates, phi: Floats) -> NDArray[np.boo
 
 
 def _root(slope: Floats, curvature: Floats, free: NDArray[np.bool_]) -> Floats:
-    """Of the covariance of the free coordinates, the others known, shape (F, P).
+    """A root of the covariance of the free coordinates, the others taken as known, shape (F, P).
 
-    From slope and prior, not from the draws: what an effect and the parameters share may be a
-    hundred standard deviations, and the covariance of some hundred draws is right to some per cent.
+    It is made from slope and prior and not from the draws: what an effect and the parameters share
+    may be a hundred standard deviations, and the covariance of some hundred draws is right to some
+    per cent only.
     """
     normal = slope[:, free].T @ slope[:, free] + np.diag(curvature[free])
     scale = 1 / np.sqrt(np.diag(normal))
@@ -188,7 +189,7 @@ def _root(slope: Floats, curvature: Floats, free: NDArray[np.bool_]) -> Floats:
 
 
 def _curvature(model: Model, here: Coordinates, centre: Floats, spread: Floats) -> Floats:
-    """Of the log prior at the centre, downwards, shape (P,); none where it bends upwards."""
+    """Downward curvature of the log prior at the centre, shape (P,); zero where it bends up."""
     steps = np.concatenate([np.zeros((1, len(centre))), np.diag(spread), -np.diag(spread)])
     points = centre + 0.5 * steps
     with np.errstate(all="ignore"):

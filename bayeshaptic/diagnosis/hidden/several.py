@@ -82,7 +82,7 @@ def all_together(
 def _others(
     own: Weighed, number: int, every: Sequence[Hidden], configurations: Sequence[Hashable]
 ) -> list[Evidence]:
-    """What the recordings but one say of the same effect at the same place."""
+    """What all other recordings say of the same effect at the same place."""
     if own.evidence is None:
         return []
     alike = [

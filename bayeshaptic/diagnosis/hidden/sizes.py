@@ -39,9 +39,10 @@ class Sizes:
 
 
 def sizes_of(suspect: Suspect, known: Around) -> Sizes:
-    """From a thirtieth of what is seen to three times that, for every shape; at most the largest.
+    """Sizes for every shape: from a thirtieth of what is seen to three times that.
 
-    What is larger would have been seen, and then it is in the model.
+    No size is beyond the effect's largest, because what is larger would have been seen and be in
+    the model.
     """
     unseen = suspect.unseen
     seen = seen_of(suspect, known)

@@ -80,7 +80,7 @@ class Weighed:
     evidence: Evidence | None = field(default=None, repr=False)
 
     def with_more(self, others: Sequence[Evidence], kept: Ints) -> Weighed:
-        """With what other recordings say of its sizes; `kept` are the draws that this leaves."""
+        """The same with what other recordings say of its sizes; `kept` are the draws left."""
         assert self.evidence is not None
         return replace(
             self,
@@ -145,7 +145,7 @@ def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
 def _of_every_size(
     sizes: Sizes, size: Floats, log: Floats, known: Around, there: Floats
 ) -> Evidence:
-    """The evidence of every size, for other recordings of the device.
+    """The evidence of every size, to be used by other recordings of the device.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def _followed(suspect: Suspect, known: Around, own: Floats) -> tuple[Floats, Flo
 
 
 def _drawn(log_weight: Floats, count: int, rng: np.random.Generator) -> tuple[Ints, Floats]:
-    """Cells by their weight, some by a flatter one; and the log probability of each drawn."""
+    """Indices of cells drawn by weight, some by a flatter one, and the log probability of each."""
     bold = 0.25  # share of the sizes that are drawn from the flatter distribution
     share = (1 - bold) * normalised(log_weight) + bold * normalised(0.5 * log_weight)
     cells = rng.permutation(systematic(share, count, rng))

@@ -101,7 +101,7 @@ class Chain:
         )
 
     def answer(self, change: Floats) -> Complexes:
-        """Of the normalised residual to a change of the motion with the forces held, (L,)."""
+        """The residual's change with a change of the motion, the forces held; normalised, (L,)."""
         shape = change.shape[0], change.shape[2]
 
         def forces(motion: Floats) -> Floats:

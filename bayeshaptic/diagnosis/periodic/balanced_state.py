@@ -47,7 +47,7 @@ def as_linear(effect: LinearEffect) -> tuple[int, Accepted]:
 def sized(accepted: tuple[Accepted, ...], whole: Balanced) -> tuple[Accepted, ...]:
     """Forces with the strengths that all lines give them, and what these leave open of the limit.
 
-    The last force has that of all together.
+    The last force has what all of them together leave open.
     """
     spread = _limit_log_sd(whole)
     titles = [basis.title for basis in whole.forces]

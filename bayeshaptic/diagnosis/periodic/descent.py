@@ -1,10 +1,10 @@
-"""From where forces and motion agree to where the lines are explained best.
+"""From a place where forces and motion agree to the place where the lines are explained best.
 
 In `bayeshaptic.diagnosis.periodic.harmonic_balance` motion, forces and fit follow one another, so
-that each fit takes the forces as given.  They are not: other parameters make another motion, and
-that other forces.  Where a force is strong that way may lead off from the truth, and where it ends
-is not the likeliest place.  Here slopes are those of the balance itself, the change of the motion
-solved for to first order.
+that each fit takes the forces as given.  But other parameters make another motion, and another
+motion other forces.  Where a force is strong, fits that ignore this may lead away from the truth,
+and end where the lines are not likeliest.  Here the slopes are those of the balance itself, with
+the change of the motion solved for to first order.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _FAR = 3.0  # coordinates that a step goes at most: parameters that run to a bou
 def settled(
     joint: Joint, applied: Applied, theta: Floats, strength: Floats, exact: float = _SETTLED
 ) -> Settled | None:
-    """Forces and motion in turn until they agree; None where they do not.
+    """Let forces and motion follow each other until they agree; None where they do not.
 
     Parameters
     ----------
@@ -84,10 +84,11 @@ def likeliest(
     strength: Floats,
     fitted: NDArray[np.bool_] | None = None,
 ) -> Balanced:
-    """A model and internal forces where the lines are likeliest: see `balance`.
+    """The model and internal forces for which the lines are likeliest; see `balance`.
 
-    From strengths that are known on at once; of a force that is new, or where motion and forces do
-    not settle, from where a balance ends.  As that is where they do not settle there, either.
+    The search begins at the given strengths where all are known.  Where a force is new, or motion
+    and forces do not settle there, it begins where a balance ends; where they do not settle there
+    either, that end is the result.
 
     Parameters
     ----------
@@ -143,7 +144,7 @@ def _strengths(slope: Floats, unit: Floats, count: int) -> tuple[Floats, Floats]
 
 
 def _descended(start: Settled) -> tuple[Settled, Floats, Floats]:
-    """Levenberg's steps to the best place, the last slope (2 F, P + J) and units of strengths."""
+    """The best place by Levenberg's steps, the last slope (2 F, P + J), and strengths' units."""
     best, damping = start, 1e-3
     here = best.joint.here
     low, high = (here.coordinate(bound) for bound in reach(best.joint.model, 6.0))

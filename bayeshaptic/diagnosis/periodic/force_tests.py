@@ -76,9 +76,10 @@ def force_tests(fit: Fit, etfe: Etfe, period: Period) -> tuple[Test, ...]:
 
 @dataclass(frozen=True)
 class _Beside:
-    """What is explained already, the residual, and its size: 1 is noise.
+    """What is explained already, the residual, and its size, of which 1 is noise.
 
-    `own` are orthonormal columns of what the parameters can do, `smooth` of what else is smooth.
+    `own` are orthonormal columns of what the parameters can do, `smooth` of anything else that is
+    smooth over the frequency.
     """
 
     own: Floats = field(repr=False)

@@ -146,10 +146,10 @@ def balance(
 def promise(
     part: Balanced, windows: Windows, period: Period, basis: Basis, fitted: NDArray[np.bool_]
 ) -> float:
-    """Gain in log likelihood that one more force promises, to first order, the motion as it is.
+    """Gain in log likelihood that one more force promises, to first order, at the present motion.
 
-    Beyond what parameters and forces that are there would gain without it; the noise is as large as
-    what is left.  Cheap: it tells which forces are worth a balance.
+    It is the gain beyond what the parameters and the forces that are there would gain without it,
+    with noise as large as what is left.  It is cheap, and tells which forces are worth a balance.
     """
     forces = (*part.forces, basis)
     unit = [period.transform(b.mean(part.motions[b.place], period)) for b in forces]

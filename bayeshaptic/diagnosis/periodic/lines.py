@@ -81,11 +81,11 @@ class LineTrials:
         return (*residual_tests(state.fit, state.etfe), *forces)
 
     def mended(self, state: State) -> State:
-        """As it is: samples are averaged over the periods."""
+        """The state as it is: samples are averaged over the periods."""
         return state
 
     def explains(self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick) -> None:
-        """Unasked: a test does not tell the classes of candidates apart."""
+        """None: tests of lines do not tell classes of candidates apart, so this is not asked."""
 
     def trials(
         self,
@@ -121,15 +121,15 @@ class LineTrials:
         return list(found.values())
 
     def beside(self, state: State) -> tuple[Test, ...]:
-        """None: the tests of lines are of forces fitted together."""
+        """No tests: those of lines are already tests of forces fitted together."""
         return ()
 
     def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
-        """As it is."""
+        """The state as it is."""
         return state
 
     def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
-        """Without the earlier effect that is worth least, if that is next to nothing."""
+        """The state without the earlier effect that is worth least, if that is next to nothing."""
         assert isinstance(state, BalancedState)
         full = self._log_likelihoods(state.part)[1]
         worst: State = state

@@ -105,10 +105,10 @@ def apply(
 
 @dataclass
 class Following:
-    """Forces in time on the way to those that their motion asks for.
+    """Forces in time on their way to those that their own motion asks for.
 
-    Strong friction slows the motion, which then asks for less: steps that turn back get shorter, so
-    that the way ends and does not go round.
+    Strong friction slows the motion, which then asks for less friction.  Steps that turn back get
+    shorter, so that the way ends instead of going round.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class Following:
         return self.is_within(0.05)
 
     def is_within(self, to_go: float) -> bool:
-        """Whether the motion asks for no more than that share of the forces beyond them, rms."""
+        """Whether the motion asks for a further force of at most that share of the forces, rms."""
         if self.force is None or self.step is None:
             return False
         missing, there = (sum(f @ f for f in each.values()) for each in (self.step, self.force))

@@ -1,8 +1,9 @@
-"""What a device does beside the motion that repeats: a hand moves it, a floor does.
+"""How a device moves beside the motion that repeats: a hand moves it, or a floor does.
 
-A force that is not linear in the motion has another mean under it.  Of drag at a velocity v beside
-a normal one of rms s, |v| v becomes v (|v| + s^2 / |v|) and more where v is small; of friction the
-corner is rounded.  It is measured, and only where the sensor sees more than its own noise.
+A force that is not linear in the motion has another mean under such a motion.  Beside a normal
+velocity of rms s, a drag |v| v becomes v (|v| + s^2 / |v|), and more where v is small; the corner
+of dry friction is rounded.  The motion is measured, and used only where the sensor sees more of it
+than its own noise.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class Scores:
     size: Floats
 
     def beside(self, count: int) -> Scores:
-        """Of all but the first `count` changes, with what those can do taken off."""
+        """The scores of all but the first `count` changes, with what those can do taken off."""
         known, new = slice(0, count), slice(count, None)
         inverse = np.linalg.pinv(self.covariance[known, known], rcond=1e-12, hermitian=True)
         share = self.covariance[new, known] @ inverse
@@ -99,7 +99,7 @@ def _tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
 
 
 def _closer(fit: Fit, etfe: Etfe, acted: Floats | float) -> tuple[Fit, Etfe]:
-    """The same less the rounding of the fitted motion, with the noise that the fit leaves."""
+    """The measurement less the fitted motion's rounding, with the noise that the fit leaves."""
     recording, spectra = etfe.unbroken, etfe.spectra
     assert recording is not None and isinstance(spectra, DirectSpectra)
     measured, position = recording.position + acted, spectra.position
@@ -160,7 +160,7 @@ def _filtered(fit: Fit) -> Complexes:
 
 
 def _together(found: Scores) -> float:
-    """All scores as one, standard normal where the model is right."""
+    """All scores as one number, standard normal where the model is right."""
     sizes, directions = np.linalg.eigh(found.covariance)
     kept = sizes > _LEAST * max(float(sizes.max()), _LEAST)
     along = directions[:, kept].T @ found.score

@@ -1,4 +1,4 @@
-"""Noise in the driven band beside noise where the force moves nothing: above it, or at its end."""
+"""Noise in the driven band, compared with noise where the force moves nothing."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Noise of the force itself: a coarse or late converter, an amplifier that hisses.
-
-What pushes the motor besides the command moves it as the command does, so that its noise is that of
-the position over the power of the response: white, or falling with the frequency as the noise of an
-amplifier does, whatever the device.  A device that changes makes most of its noise where it
-changes: of a mode that wanders, or of a cable that slips, the same ratio has the mode's peak, of 10
-to 30 dB.
-"""
+"""Noise of the force itself: of a coarse or late converter, or of an amplifier that hisses."""
 
 from __future__ import annotations
 

@@ -37,12 +37,12 @@ class Density:
         return out
 
     def beyond_walls(self, phi: Floats) -> Floats:
-        """The density with the walls taken away: each prior there goes on as it begins.
+        """The density without its walls: each prior goes on beyond its wall as it begins there.
 
-        For Laplace's approximation, whose peak may lie behind a wall.  A half-normal goes on as
-        its mirror image, a cut-off normal as the normal, a uniform one as a constant; one that
-        rises ever more steeply towards its wall as its mirror image, too, or the peak of the
-        density would be wherever the climb ends.
+        It serves Laplace's approximation, whose peak may lie behind a wall.  A half-normal goes on
+        as its mirror image, a cut-off normal as the normal, and a uniform prior as a constant.  A
+        prior that rises ever more steeply towards its wall goes on as its mirror image, too;
+        otherwise the peak of the density would be wherever the climb ends.
         """
         phi = np.atleast_2d(phi)
         low = self.coordinates.low

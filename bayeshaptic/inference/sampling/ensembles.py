@@ -225,9 +225,9 @@ def _by_ensemble(chain: Floats) -> Floats:
 def _spread_start(
     density: LogDensity, first: StudentMixture, peak: Floats, rng: np.random.Generator
 ) -> Floats:
-    """Walkers where the density is positive: from the proposal, which is wider than the target.
+    """Walkers where the density is positive, drawn from the proposal, which is wider than it.
 
-    Where the proposal all but misses the support, nearer and nearer to the peak.
+    Where the proposal all but misses the support, draws come nearer and nearer to the peak.
     """
     start = np.empty((0, len(peak)))
     for attempt in range(200):
