@@ -63,7 +63,7 @@ def decided(job: Job) -> dict[str, Decided]:
     before = kind.tests(kind.first)
     raised = tuple(replace(test, threshold=-np.inf) for test in before)
     with metered(10 * BUDGET_S * RATE) as meter:
-        trials = kind.trials(kind.first, raised, meter, lambda _: None)
+        trials = kind.trials(kind.first, raised, meter)
 
     @cache
     def tests_of(number: int) -> tuple[Test, ...]:

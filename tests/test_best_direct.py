@@ -52,7 +52,7 @@ def outcome(
     by_name, tried = {loop.state.fit.model.name: loop for loop in loops}, []
     took: list[str] = [] if taken is None else taken
 
-    def traced(base: Any, meter: Any, tick: Any) -> Any:
+    def traced(base: Any, meter: Any) -> Any:
         tried.append(base)
         return by_name[base]
 
@@ -186,15 +186,15 @@ def test_of_two_that_stand_alike_the_lower_limit_is_taken(monkeypatch, behind, n
 
 def test_friction_is_tried_where_the_direct_method_sees_something_linear_alone(monkeypatch) -> None:
     asked = []
-    monkeypatch.setattr(direct, "_linear_trials", lambda state, meter, tick: [])
+    monkeypatch.setattr(direct, "_linear_trials", lambda state, meter: [])
     monkeypatch.setattr(
-        direct, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
+        direct, "nonlinear_trials", lambda state, raised, meter: asked.append(raised) or []
     )
     linear = residual.Test("causal change", "linear", 12.0, 5.0, None, "")
-    assert direct._trials(None, (linear,), Meter(), None) == []  # type: ignore[arg-type]
+    assert direct._trials(None, (linear,), Meter()) == []  # type: ignore[arg-type]
     assert "sign(v)" in asked[0]
     direct._trials(
-        None, (residual.Test("gain in time", "time-varying", 9.0, 4.4, None, ""),), Meter(), None
+        None, (residual.Test("gain in time", "time-varying", 9.0, 4.4, None, ""),), Meter()
     )  # type: ignore[arg-type]
     assert len(asked) == 1, "drift calls for no force"
 
@@ -204,7 +204,7 @@ def test_friction_is_tried_where_nothing_is_left_and_not_beside_what_leaves_noth
 ) -> None:
     asked = []
     monkeypatch.setattr(
-        direct, "nonlinear_trials", lambda state, raised, meter, tick: asked.append(raised) or []
+        direct, "nonlinear_trials", lambda state, raised, meter: asked.append(raised) or []
     )
     noise = residual.Test("causal change", "linear", 2.0, 5.0, None, "")
     for accepted in ((), (SimpleNamespace(family="linear"),)):

@@ -108,7 +108,7 @@ def test_at_first_sight_more_noise_is_no_sign_of_a_force(monkeypatch) -> None:
 
     def classes(tests: tuple[ResidualTest, ...], patient: bool) -> list[str]:
         tried.clear()
-        trials.trials(state, tests, Meter(), lambda _: None, patient)
+        trials.trials(state, tests, Meter(), patient)
         return list(tried)
 
     both = ["linear_trials", "nonlinear_trials"]
@@ -183,7 +183,7 @@ def test_forces_come_after_a_linear_effect_that_leaves_noise_at_first_sight(monk
     def forces(linear: float) -> int:
         looked.clear()
         tests = (ResidualTest("bands", "linear", linear, 5.0, None, ""), force)
-        found = windows.WindowTrials(state).trials(state, tests, Meter(), lambda _: None)
+        found = windows.WindowTrials(state).trials(state, tests, Meter())
         assert "second_mode" in {trial.name for trial in found}
         return len(looked)
 

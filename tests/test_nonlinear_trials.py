@@ -209,10 +209,10 @@ def test_an_effect_that_a_force_was_taken_for_goes_when_the_force_is_found(
     found = nonlinear_trials(taken_for.state, {"stretch^3"}, Meter())[0]
     assert [one.family for one in found.state.accepted] == ["linear", "nonlinear"]
     trials = WindowTrials(state)
-    lighter = trials.without_needless(found.state, Meter(), lambda _: None)
+    lighter = trials.without_needless(found.state, Meter())
     assert [one.name for one in lighter.accepted] == ["dahl_friction"]
     unspent = Meter(limit=0.0)  # nothing is searched for where nothing is left to spend
-    assert trials.without_needless(found.state, unspent, lambda _: None) is found.state
+    assert trials.without_needless(found.state, unspent) is found.state
     assert unspent.skipped == [found.accepted.title]
     wide = replace(found.accepted, limit_log_sd=9.0)  # beside a linear effect that is gone
     stale = replace(found.state, fit=state.fit, accepted=(wide,))
@@ -366,7 +366,7 @@ def test_what_hardly_stands_out_is_fitted_where_some_of_it_is_better_than_none(
     nothing: Any = SimpleNamespace(gain_fit=10.0)
     bench: Any = SimpleNamespace(stays=lambda point: True)
     ways = [hint], lambda hint, part: there, nothing, [[law]]
-    found = search._followed(bench, *ways, lambda _, point: point, Meter(), None)
+    found = search._followed(bench, *ways, lambda _, point: point, Meter())
     assert found == ([there] if fitted else [])
 
 
@@ -408,7 +408,7 @@ def test_candidates_are_announced_by_their_titles() -> None:
         raise Enough
 
     with pytest.raises(Enough):
-        nonlinear_trials(state, {"sign(v)"}, Meter(), tick)
+        nonlinear_trials(state, {"sign(v)"}, Meter(tick=tick))
     assert len(titles) == 1 and titles[0]
 
 

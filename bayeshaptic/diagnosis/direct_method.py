@@ -53,11 +53,10 @@ def by_direct_method(found: Opened, model: str | Model, options: Options) -> Clo
     except InputError:
         return found
     began = time.perf_counter()
-    trying, meter = options.within(0.3, 0.5), Meter(options.budget_s * RATE)
+    trying = options.within(0.3, 0.5)
+    meter = Meter(options.budget_s * RATE, tick=lambda title: trying.report(0.5, f"trying {title}"))
     with counting(meter):
-        begun, traced = traced_directly(
-            begun, meter, lambda title: trying.report(0.5, f"trying {title}")
-        )
+        begun, traced = traced_directly(begun, meter)
     tracing_s = time.perf_counter() - began
     fit = traced.state.fit
     if not stands(traced) or fit.impossible:

@@ -99,7 +99,7 @@ class Loop:
         trials: Trials | None = None,
         like: Loop | None = None,
     ) -> None:
-        self.meter = Meter(budget_s * RATE)
+        self.meter = Meter(budget_s * RATE, tick=self._tick)
         self.state, self.done = State(etfe, fit), False
         self._given, self._like, self._progress = trials, like, progress
         self._path: list[State] = []
@@ -119,7 +119,7 @@ class Loop:
             if not self._path:
                 self._begin()
             wanted = self._wanted
-            return self._kind.explains(self.state, wanted, self.meter, self._tick)
+            return self._kind.explains(self.state, wanted, self.meter)
 
     def go_on(self, patient: bool = True) -> None:
         """One more round; without patience only of what is seen at first sight."""
@@ -193,7 +193,7 @@ class Loop:
         """Go on to one more effect, and what is left; False where nothing convinces."""
         if not wanted:
             return False
-        trials = self._kind.trials(self.state, wanted, self.meter, self._tick, patient)
+        trials = self._kind.trials(self.state, wanted, self.meter, patient)
         left: dict[int, tuple[Test, ...]] = {}
 
         def remaining(trial: Trial) -> tuple[Test, ...]:
@@ -223,8 +223,8 @@ class Loop:
         if chosen is None:
             return False
         found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
-        better = self._kind.reconsidered(found, self.meter, self._tick)
-        lighter = self._kind.without_needless(better, self.meter, self._tick)
+        better = self._kind.reconsidered(found, self.meter)
+        lighter = self._kind.without_needless(better, self.meter)
         if lighter is not found:
             found, tests = lighter, self._remaining(lighter)
         there = {effect.name for effect in found.accepted}

@@ -11,6 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bayeshaptic.types import Tick
 
 RATE = 2.5e7
 """Evaluations that count as a second: what a busy core of 2020 does in searches, about."""
@@ -29,11 +33,14 @@ class Meter:
     spent : float
     skipped : list of str
         What was asked for when the limit was reached.
+    tick : callable, optional
+        Called with the title of whatever is tried next, for those who wait.
     """
 
     limit: float = float("inf")
     spent: float = 0.0
     skipped: list[str] = field(default_factory=list)
+    tick: Tick | None = field(default=None, repr=False, compare=False)
 
     def affords(self, what: str) -> bool:
         """Whether the limit is not reached yet; if it is, `what` is put down as skipped."""
@@ -42,6 +49,11 @@ class Meter:
         if what not in self.skipped:
             self.skipped.append(what)
         return False
+
+    def trying(self, what: str) -> None:
+        """Tell whoever waits that `what` is tried next."""
+        if self.tick:
+            self.tick(what)
 
 
 _meter: ContextVar[Meter | None] = ContextVar("meter", default=None)

@@ -26,12 +26,11 @@ from bayeshaptic.inference.choose import UNDECIDED, Choice
 from bayeshaptic.inference.criterion import information_criterion
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.stability.critical import critical_stiffness
-from bayeshaptic.types import Tick
 
 _ONE_MASS = "rigid"
 
 
-def traced_directly(begun: Begun, meter: Meter, tick: Tick | None = None) -> tuple[Begun, Traced]:
+def traced_directly(begun: Begun, meter: Meter) -> tuple[Begun, Traced]:
     """The loop closed on the chosen base model, and on others that may be likelier with friction.
 
     Parameters
@@ -40,8 +39,6 @@ def traced_directly(begun: Begun, meter: Meter, tick: Tick | None = None) -> tup
         Fitted to all lines.
     meter : Meter
         Says whether one more fit is affordable.
-    tick : callable, optional
-        Called with the title of each candidate that is fitted in full.
 
     Returns
     -------
@@ -55,8 +52,8 @@ def traced_directly(begun: Begun, meter: Meter, tick: Tick | None = None) -> tup
     if chosen == _ONE_MASS:  # is followed in time instead, with its friction
         return begun, own
     # Before the long ways on a base model that may be the wrong one.
-    rubbing = _rubbing(begun, meter, tick) if begun.choice is not None else {}
-    own = trace_directly(own, meter, tick)
+    rubbing = _rubbing(begun, meter) if begun.choice is not None else {}
+    own = trace_directly(own, meter)
     settled = own.verdict == CONSISTENT or (rubs(own) and own.verdict == EXPLAINED)
     if begun.choice is None or (settled and not _is_likelier(rubbing, own)):
         return begun, own
@@ -64,7 +61,7 @@ def traced_directly(begun: Begun, meter: Meter, tick: Tick | None = None) -> tup
     for name in _rivals(begun.choice):
         etfe, fit = base_of(begun, name)
         other = untraced(State(etfe, fit))
-        found[name] = trace_directly(other, meter, tick)
+        found[name] = trace_directly(other, meter)
         if name in rubbing and not found[name].state.accepted:  # there was nothing left for it
             found[name] = with_trial(other, rubbing[name])
     best = _likeliest(found)
@@ -84,12 +81,12 @@ def traced_directly(begun: Begun, meter: Meter, tick: Tick | None = None) -> tup
     return replace(begun, etfe=etfe, fit=fit, choice=choice), found[best]
 
 
-def _rubbing(begun: Begun, meter: Meter, tick: Tick | None) -> dict[str, Trial]:
+def _rubbing(begun: Begun, meter: Meter) -> dict[str, Trial]:
     """Dry friction on the other base models in question, where it convinces."""
     assert begun.choice is not None
     found = {}
     for name in _rivals(begun.choice):
-        trial = trial_of(CoulombFriction, State(*base_of(begun, name)), meter, tick)
+        trial = trial_of(CoulombFriction, State(*base_of(begun, name)), meter)
         if trial is not None:
             found[name] = trial
     return found

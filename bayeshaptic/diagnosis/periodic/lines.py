@@ -43,7 +43,7 @@ from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
 from bayeshaptic.recordings.response.windows import Windows
-from bayeshaptic.types import Floats, Tick
+from bayeshaptic.types import Floats
 
 FLOOR = 0.002
 """No line is trusted to better than this share of its response while candidates are weighed."""
@@ -84,7 +84,7 @@ class LineTrials:
         """The state as it is: samples are averaged over the periods."""
         return state
 
-    def explains(self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick) -> None:
+    def explains(self, state: State, tests: tuple[Test, ...], meter: Meter) -> None:
         """None: tests of lines do not tell classes of candidates apart, so this is not asked."""
 
     def trials(
@@ -92,7 +92,6 @@ class LineTrials:
         state: State,
         tests: tuple[Test, ...],
         meter: Meter,
-        tick: Tick,
         patient: bool = True,
     ) -> list[Trial]:
         """All candidates, the best variant of each: a test does not tell their classes apart."""
@@ -106,7 +105,7 @@ class LineTrials:
             near = one.gain >= thresholds.REACH * sieved[0].gain
             if not (near and meter.affords(one.effect.title)):
                 continue
-            tick(one.effect.title)
+            meter.trying(one.effect.title)
             with suppress(np.linalg.LinAlgError):  # a motion that runs away has no balance
                 tried = self._with_linear(state.part, one.effect, one.starts, rest)
                 best = max(best, self._gained(state.part, tried))
@@ -114,7 +113,7 @@ class LineTrials:
                 self._keep(found, (one.effect.name, None), trial)
         for basis in self._promising(state.part, best):
             if meter.affords(basis.title):
-                tick(basis.title)
+                meter.trying(basis.title)
                 with suppress(np.linalg.LinAlgError):
                     forced = self._with_force(state, basis)
                     self._keep(found, (basis.name, basis.place), forced)
@@ -124,11 +123,11 @@ class LineTrials:
         """No tests: those of lines are already tests of forces fitted together."""
         return ()
 
-    def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
+    def reconsidered(self, state: State, meter: Meter) -> State:
         """The state as it is."""
         return state
 
-    def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
+    def without_needless(self, state: State, meter: Meter) -> State:
         """The state without the earlier effect that is worth least, if that is next to nothing."""
         assert isinstance(state, BalancedState)
         full = self._log_likelihoods(state.part)[1]

@@ -29,7 +29,6 @@ from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.types import Tick
 
 _MOST = 2  # effects
 _FRICTION = "friction_force"  # the strength of every law of dry friction
@@ -52,7 +51,7 @@ def untraced(state: State) -> Traced:
     return Traced(*acceptance.verdict_of((), tests), state, tests, tests, path=(state,))
 
 
-def trace_directly(traced: Traced, meter: Meter, tick: Tick | None = None) -> Traced:
+def trace_directly(traced: Traced, meter: Meter) -> Traced:
     """Explain what is left by effects, as far as they convince; `stands` judges the result.
 
     Parameters
@@ -61,12 +60,10 @@ def trace_directly(traced: Traced, meter: Meter, tick: Tick | None = None) -> Tr
         Of the base model.
     meter : Meter
         Says whether one more fit is affordable.
-    tick : callable, optional
-        Called with the title of each candidate that is fitted in full.
     """
     found = traced
     while _wants_more(found):
-        further = _round(found, meter, tick)
+        further = _round(found, meter)
         if further is None:
             break
         found = further
@@ -106,9 +103,9 @@ def _leaves_little(found: Traced) -> bool:
     )
 
 
-def _round(before: Traced, meter: Meter, tick: Tick | None) -> Traced | None:
+def _round(before: Traced, meter: Meter) -> Traced | None:
     """The record with one more effect; None where none convinces."""
-    trials = _trials(before.state, before.after, meter, tick)
+    trials = _trials(before.state, before.after, meter)
     open_ = [t for t in trials if t.convincing and not t.state.fit.impossible]
     left = {id(trial): _left(trial.state) for trial in open_}
     chosen = acceptance.choose(
@@ -179,7 +176,7 @@ def _left(state: State) -> tuple[Test, ...]:
     return acceptance.remaining(tests, state.accepted)
 
 
-def _trials(state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick | None) -> list[Trial]:
+def _trials(state: State, tests: tuple[Test, ...], meter: Meter) -> list[Trial]:
     """Trials of the classes that tests raise, and of dry friction always.
 
     Drift is not tried: no test tells it from what the loop does.  A force may look linear to all
@@ -189,11 +186,11 @@ def _trials(state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick | No
     families = {test.family for test in tests if test.flagged}
     if families and not families & {"linear", "nonlinear"}:
         return []
-    found = _linear_trials(state, meter, tick) if "linear" in families else []
-    return found + nonlinear_trials(state, raised | _FRICTION_TESTS, meter, tick)
+    found = _linear_trials(state, meter) if "linear" in families else []
+    return found + nonlinear_trials(state, raised | _FRICTION_TESTS, meter)
 
 
-def _linear_trials(state: State, meter: Meter, tick: Tick | None) -> list[Trial]:
+def _linear_trials(state: State, meter: Meter) -> list[Trial]:
     """One trial for each linear effect that a sieve leaves, of its variants the best."""
     fit, best = state.fit, dict[str, Trial]()
     bases = starting_bases(fit.model, fit.theta, fit.elsewhere)
@@ -202,8 +199,7 @@ def _linear_trials(state: State, meter: Meter, tick: Tick | None) -> list[Trial]
         near = one.gain >= thresholds.REACH * sieved[0].gain
         if not near or not meter.affords(one.effect.title):
             continue
-        if tick:
-            tick(one.effect.title)
+        meter.trying(one.effect.title)
         trial = _try(state, one)
         if trial.name not in best or trial.score > best[trial.name].score:
             best[trial.name] = trial

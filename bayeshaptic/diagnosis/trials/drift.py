@@ -26,7 +26,7 @@ from bayeshaptic.recordings.checks.sufficiency import SHORTEST_S
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.stability.critical import critical_stiffness
-from bayeshaptic.types import Floats, Tick
+from bayeshaptic.types import Floats
 
 PARTS = 3
 # Of what parts were off by, in reduced chi-squares over one: in the 11 recordings that this was
@@ -60,10 +60,10 @@ _DELAY = _Kind(
 _JOINS: dict[_Kind, type[LinearEffect]] = {_GAIN: Gain, _DELAY: ExtraDelay}
 
 
-def drift_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[Trial]:
+def drift_trials(state: State, meter: Meter) -> list[Trial]:
     """One trial for each group of parameters that may drift; none for short recordings.
 
-    `meter` says whether one more is affordable, `tick` is called with the title of each.
+    `meter` says whether one more is affordable.
     """
     recording = state.etfe.recording
     if recording is None or recording.duration_s < PARTS * SHORTEST_S:
@@ -83,8 +83,7 @@ def drift_trials(state: State, meter: Meter, tick: Tick | None = None) -> list[T
             model = model.with_effect(joining)
         own = any(name in model.names for name in kind.parameters)
         if own and meter.affords(kind.title):
-            if tick:
-                tick(kind.title)
+            meter.trying(kind.title)
             trials.append(_try(state, kind, model, parts))
     return trials
 

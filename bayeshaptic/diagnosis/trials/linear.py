@@ -35,7 +35,7 @@ from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.windows import Windows
-from bayeshaptic.types import Floats, Tick
+from bayeshaptic.types import Floats
 
 _STARTS = 24  # kept by first order,
 _STEPS = 15  # and given at most so many steps of Gauss and Newton
@@ -101,7 +101,7 @@ class Sight:
         return any(one.explains for one in self.optima.values())
 
 
-def first_sight(state: State, meter: Meter, tick: Tick | None = None) -> Sight | None:
+def first_sight(state: State, meter: Meter) -> Sight | None:
     """All candidates sieved, and the promising ones fitted; None where not even that is affordable.
 
     Parameters
@@ -109,8 +109,6 @@ def first_sight(state: State, meter: Meter, tick: Tick | None = None) -> Sight |
     state : State
     meter : Meter
         Says whether one more fit is affordable.
-    tick : callable, optional
-        Called with the title of each candidate that is fitted in full.
     """
     affords = [meter.affords(one.title) for one in linear_candidates(state.model, state.etfe)]
     if not all(affords):
@@ -126,8 +124,7 @@ def first_sight(state: State, meter: Meter, tick: Tick | None = None) -> Sight |
     for number, one in enumerate(found):
         near = one.gain >= thresholds.REACH * found[0].gain
         if near and meter.affords(one.effect.title):
-            if tick:
-                tick(one.effect.title)
+            meter.trying(one.effect.title)
             optima[number] = refine(state.model.with_effect(one.effect), part, one.starts)
     return Sight(state, windows, base, found, optima)
 
@@ -135,7 +132,6 @@ def first_sight(state: State, meter: Meter, tick: Tick | None = None) -> Sight |
 def linear_trials(
     state: State,
     meter: Meter,
-    tick: Tick | None = None,
     sight: Sight | None = None,
     patient: bool = True,
 ) -> list[Trial]:
@@ -146,14 +142,12 @@ def linear_trials(
     state : State
     meter : Meter
         Says whether one more fit is affordable.
-    tick : callable, optional
-        Called with the title of each candidate that is fitted in full.
     sight : Sight, optional
         What was seen of this very state before.
     patient : bool
         Whether to look further than first sight.
     """
-    sight = sight or first_sight(state, meter, tick)
+    sight = sight or first_sight(state, meter)
     if sight is None:
         return []
     optima = _looked_further(sight, meter) if patient else sight.optima

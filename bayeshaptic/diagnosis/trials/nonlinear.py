@@ -6,7 +6,7 @@ parameters fitted anew: a profile.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import State, Trial
@@ -33,7 +33,6 @@ def nonlinear_trials(
     state: State,
     raised: set[str],
     meter: Meter,
-    tick: Callable[[str], None] | None = None,
 ) -> list[Trial]:
     """One trial for each nonlinear effect that the raised tests call for; the best of its variants.
 
@@ -44,8 +43,6 @@ def nonlinear_trials(
         Names of the nonlinear tests that are flagged.
     meter : Meter
         Says whether one more search for a force, or one more fit of one, is affordable.
-    tick : callable, optional
-        Called with the title of each candidate.
     """
     recording = state.etfe.unbroken
     if recording is None:
@@ -64,9 +61,9 @@ def nonlinear_trials(
             if bench.before and point is None and not isinstance(law[0], CommandEffect):
                 inner.append(law)
             elif (there := _beside(law, point)) and meter.affords(law[0].title):
-                points.append(search(bench, there, motion, tick, point))
+                points.append(search(bench, there, motion, meter, point))
         found = fitted(bench, points, meter, before)
-        return found + beside_others(bench, inner, meter, tick) if inner else found
+        return found + beside_others(bench, inner, meter) if inner else found
 
     # Of a mass that a controller holds against its friction first order says nothing: strengths
     # that gained 195 in log likelihood had a score of zero.
@@ -75,20 +72,19 @@ def nonlinear_trials(
     known = {point.effect.strength[0]: point for point in found}
     for point in [one for one in known.values() if worth_following(one, known.values())]:
         laws = [_beside(law, point) for law in others if law[0].contains(point.effect)]
-        found += containing(bench, point, laws, meter, tick)
+        found += containing(bench, point, laws, meter)
     rest = [law for law in others if not any(law[0].contains(p.effect) for p in known.values())]
     # Where a limit is gradual says nothing of where it would be hard.
     alike = {name: p for name, p in known.items() if not isinstance(p.effect, CommandEffect)}
     found = looked_for(to_scan(bench, rest, alike, meter), alike, found)
     trials = [force_trial(bench, point) for point in found]
-    return trials if in_loop else trials + in_the_place_of_one(trials, meter, tick)
+    return trials if in_loop else trials + in_the_place_of_one(trials, meter)
 
 
 def trial_of(
     kind: type[NonlinearEffect],
     state: State,
     meter: Meter,
-    tick: Callable[[str], None] | None = None,
 ) -> Trial | None:
     """The trial of one law of a force; None where it convinces neither in a scan nor fitted.
 
@@ -98,14 +94,12 @@ def trial_of(
     state : State
     meter : Meter
         Says whether that is affordable.
-    tick : callable, optional
-        Called with its title.
     """
     if state.etfe.unbroken is None or not meter.affords(kind.title):
         return None
     bench = ForceBench(state, state.etfe.unbroken)
     motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
-    best = search(bench, list(kind.candidates(state.model, motion)), motion, tick)
+    best = search(bench, list(kind.candidates(state.model, motion)), motion, meter)
     if not thresholds.convincing(best.gain_fit, best.gain_choose, 1):
         return None
     trials = [force_trial(bench, point) for point in fitted(bench, [best], meter)]

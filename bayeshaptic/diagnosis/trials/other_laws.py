@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,9 +28,7 @@ from bayeshaptic.recordings.response.etfe import compress
 _AS_FAR = 0.7
 
 
-def in_the_place_of_one(
-    trials: Sequence[Trial], meter: Meter, tick: Callable[[str], None] | None
-) -> list[Trial]:
+def in_the_place_of_one(trials: Sequence[Trial], meter: Meter) -> list[Trial]:
     """Two forces in the place of one whose law contains a simpler one: the simpler, and another.
 
     Friction that falls with the velocity bends like dry friction with a drag, and a damper makes up
@@ -50,7 +48,7 @@ def in_the_place_of_one(
         least = _AS_FAR * max((h.score for h in departures(bench, here, larger)), default=np.inf)
         others, _ = called_for(simple.state, {v for law in larger for v in law.over}, motion)
         inner = [law for law in others if not isinstance(law[0], CommandEffect)]
-        for point in beside_others(bench, inner, meter, tick, least):
+        for point in beside_others(bench, inner, meter, least):
             trial = force_trial(bench, point)
             found.append(
                 replace(
@@ -63,7 +61,7 @@ def in_the_place_of_one(
     return found
 
 
-def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
+def reconsidered(state: State, meter: Meter) -> State:
     """The state with another law in the place of an earlier force, where that predicts more.
 
     An earlier force was named before the last one was known: a drag may have been taken for cubic
@@ -73,11 +71,11 @@ def reconsidered(state: State, meter: Meter, tick: Callable[[str], None] | None 
     forces = [one for one in state.accepted if one.change and one.change.acting]
     for one in forces[:-1] if state.etfe.unbroken else ():
         if one in state.accepted:
-            state = _likeliest(state, _instead_of(one, state, meter, tick))
+            state = _likeliest(state, _instead_of(one, state, meter))
     return state
 
 
-def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = None) -> State:
+def found_anew(state: State, meter: Meter) -> State:
     """The state with its last force searched for and fitted again; unchanged where there is none.
 
     A force that was found beside a linear effect which has since been taken out may be larger, act
@@ -96,17 +94,15 @@ def found_anew(state: State, meter: Meter, tick: Callable[[str], None] | None = 
         return force_trial(bench, here).state if bench.stays(here) else state
     motion = bench.simulation.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
     present = last.change.acting.effect
-    own = search(bench, list(present.candidates(bare.model, motion)), motion, tick)
+    own = search(bench, list(present.candidates(bare.model, motion)), motion, meter)
     laws, _ = called_for(bare, set(present.over), motion)
     others = [law for law in laws if law[0].name != present.name]
-    found = [*fitted(bench, [own], meter), *beside_others(bench, others, meter, tick)]
+    found = [*fitted(bench, [own], meter), *beside_others(bench, others, meter)]
     trials = [force_trial(bench, point) for point in found]
     return max(trials, key=lambda trial: trial.score).state if trials else state
 
 
-def _instead_of(
-    one: Accepted, state: State, meter: Meter, tick: Callable[[str], None] | None
-) -> list[Trial]:
+def _instead_of(one: Accepted, state: State, meter: Meter) -> list[Trial]:
     """A force that a state has as a trial, and then others that could be in its place."""
     assert one.change and one.change.acting
     present = one.change.acting.effect
@@ -125,7 +121,7 @@ def _instead_of(
     here = bench.point((*bench.before, one.change.acting), state.fit.theta)
     if not bench.stays(here):
         return []
-    others = beside_others(bench, [law for law in laws if law], meter, tick)
+    others = beside_others(bench, [law for law in laws if law], meter)
     return [force_trial(bench, point) for point in (here, *others)]
 
 

@@ -7,7 +7,6 @@ from typing import Protocol
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.types import Tick
 
 
 class Trials(Protocol):
@@ -23,21 +22,19 @@ class Trials(Protocol):
     def mended(self, state: State) -> State:
         """With what is wrong with the samples mended; the very same where nothing is."""
 
-    def explains(
-        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
-    ) -> bool | None:
+    def explains(self, state: State, tests: tuple[Test, ...], meter: Meter) -> bool | None:
         """Whether an effect explains everything at first sight; None where that is no question."""
 
     def trials(
-        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick, patient: bool = True
+        self, state: State, tests: tuple[Test, ...], meter: Meter, patient: bool = True
     ) -> list[Trial]:
         """Trials of every class that a test raises; at first sight where there is no patience."""
 
     def beside(self, state: State) -> tuple[Test, ...]:
         """Tests for another force beside those that a state has."""
 
-    def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
+    def reconsidered(self, state: State, meter: Meter) -> State:
         """With another law in the place of an earlier force, or the very same."""
 
-    def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
+    def without_needless(self, state: State, meter: Meter) -> State:
         """Without the earlier effect that a later one made needless, or the very same."""

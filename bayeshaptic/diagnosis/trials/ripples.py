@@ -28,7 +28,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.stability.critical import critical_stiffness
-from bayeshaptic.types import Floats, Tick
+from bayeshaptic.types import Floats
 
 _SIZE = 3  # parameters: the period, and both parts of the ripple
 _MOST = 0.9  # of the mean gain that a ripple may be
@@ -36,9 +36,7 @@ _FARTHEST = 2.3  # log stiffness: a factor of ten
 _LAW_SD = 0.03  # relative, of a ripple's size: no motor's is one sine
 
 
-def ripple_trials(
-    state: State, raised: set[str], meter: Meter, tick: Tick | None = None
-) -> list[Trial]:
+def ripple_trials(state: State, raised: set[str], meter: Meter) -> list[Trial]:
     """One trial for each ripple that a test has raised.
 
     Parameters
@@ -47,16 +45,13 @@ def ripple_trials(
     raised : set of str
         Names of tests.
     meter : Meter
-    tick : callable, optional
-        Called with the title of each.
     """
     recording = state.etfe.recording
     trials = []
     for wave in WAVES:
         if recording is None or wave.test not in raised or not meter.affords(wave.title):
             continue
-        if tick:
-            tick(wave.title)
+        meter.trying(wave.title)
         ripple = find_ripple(wave, state.fit, state.etfe)
         if ripple is not None and (trial := _try(state, recording, wave, ripple)) is not None:
             trials.append(trial)

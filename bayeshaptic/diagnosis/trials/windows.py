@@ -22,7 +22,6 @@ from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import compress
-from bayeshaptic.types import Tick
 
 # Of how far the tests of a force stand out, those of the response: 0.04 and 0.26 in recordings in
 # which a force alone was left, 0.98 to 120 in nine in which a linear effect acted as well; but 5.7
@@ -66,16 +65,14 @@ class WindowTrials:
             return state
         return state if _is_mended(state) else repair_measurement(state, self._look)
 
-    def explains(
-        self, state: State, tests: tuple[Test, ...], meter: Meter, tick: Tick
-    ) -> bool | None:
+    def explains(self, state: State, tests: tuple[Test, ...], meter: Meter) -> bool | None:
         """Whether a linear effect explains everything at first sight; None where that is unasked.
 
         It is where a test looks for a force, or nothing linear is left.
         """
         if not _raised(tests, "linear") or _looks_like_a_force(tests):
             return None
-        self._sight = first_sight(state, meter, tick)
+        self._sight = first_sight(state, meter)
         return None if self._sight is None else self._sight.explains
 
     def trials(
@@ -83,7 +80,6 @@ class WindowTrials:
         state: State,
         tests: tuple[Test, ...],
         meter: Meter,
-        tick: Tick,
         patient: bool = True,
     ) -> list[Trial]:
         """Trials of every class that a test raises.
@@ -101,27 +97,27 @@ class WindowTrials:
         explained = False
         if "linear" in families:
             if self._sight is None or self._sight.state is not state:
-                self._sight = first_sight(state, meter, tick)
-            found += linear_trials(state, meter, tick, self._sight, patient)
+                self._sight = first_sight(state, meter)
+            found += linear_trials(state, meter, self._sight, patient)
             seen = self._sight is not None and self._sight.explains
             explained = seen and any(trial.convincing for trial in found) and _bends(tests)
         if "time-varying" in families:
-            found += [_on_other_samples(trial) for trial in drift_trials(state, meter, tick)]
-        found += map(_on_other_samples, ripple_trials(state, raised, meter, tick))
+            found += [_on_other_samples(trial) for trial in drift_trials(state, meter)]
+        found += map(_on_other_samples, ripple_trials(state, raised, meter))
         now = patient or _looks_like_a_force(tests) or "linear" not in families
         if "nonlinear" in families and now and not explained:
-            found += nonlinear_trials(state, raised, meter, tick)
+            found += nonlinear_trials(state, raised, meter)
         return found
 
     def beside(self, state: State) -> tuple[Test, ...]:
         """Tests for another force beside those that a state has."""
         return beside_tests(state)
 
-    def reconsidered(self, state: State, meter: Meter, tick: Tick) -> State:
+    def reconsidered(self, state: State, meter: Meter) -> State:
         """With another law in the place of an earlier force, or the very same."""
-        return reconsidered(state, meter, tick)
+        return reconsidered(state, meter)
 
-    def without_needless(self, state: State, meter: Meter, tick: Tick) -> State:
+    def without_needless(self, state: State, meter: Meter) -> State:
         """The state without the earlier effect that is worth least, if that is next to nothing.
 
         A force that was found beside a linear effect is found anew without it: what the force
@@ -139,7 +135,7 @@ class WindowTrials:
             if worth < spare:
                 spare, without = worth, other
         if state.accepted[-1].family == "nonlinear" and without.model is not state.model:
-            anew = found_anew(without, meter, tick)
+            anew = found_anew(without, meter)
             if _held_out(anew) > max(full - thresholds.ENOUGH, _held_out(without)):
                 return anew
         return without if spare < 0 else state

@@ -73,12 +73,11 @@ def search(
     bench: ForceBench,
     variants: Variants,
     motion: dict[Place, Motion],
-    tick: Callable[[str], None] | None = None,
+    meter: Meter,
     known: Point | None = None,
 ) -> Point:
     """The best variant on a coarse scan of strengths, or beside that of a known force."""
-    if tick:
-        tick(variants[0].title)
+    meter.trying(variants[0].title)
     theta = bench.state.fit.theta
     points: list[Point] = []
     for effect in variants:
@@ -100,7 +99,6 @@ def beside_others(
     bench: ForceBench,
     laws: Sequence[Variants],
     meter: Meter,
-    tick: Callable[[str], None] | None = None,
     least: float = 0.0,
 ) -> list[Point]:
     """The best variant of each law beside the forces that the state has, where it stands out.
@@ -120,7 +118,7 @@ def beside_others(
         h for h in hints(bench, [effect for law in laws for effect in law]) if h.score >= least
     ]
     nothing = bench.point(bench.before, theta, expected=bench.known_motion) if every else None
-    return _followed(bench, every, start, nothing, laws, fit_nested, meter, tick)
+    return _followed(bench, every, start, nothing, laws, fit_nested, meter)
 
 
 def containing(
@@ -128,7 +126,6 @@ def containing(
     known: Point,
     laws: Sequence[Variants],
     meter: Meter,
-    tick: Callable[[str], None] | None = None,
 ) -> list[Point]:
     """The best variant of each law that contains that of a known force, where it stands out.
 
@@ -145,7 +142,7 @@ def containing(
         return bench.point((*before, Acting(law, own.strength)), known.theta, expected=known.motion)
 
     every = departures(bench, known, [effect for law in laws for effect in law])
-    return _followed(bench, every, start, known, laws, fit_force, meter, tick)
+    return _followed(bench, every, start, known, laws, fit_force, meter)
 
 
 def _followed(
@@ -156,7 +153,6 @@ def _followed(
     laws: Sequence[Variants],
     fit: Callable[[ForceBench, Point], Point],
     meter: Meter,
-    tick: Callable[[str], None] | None,
 ) -> list[Point]:
     """The best hint of each law fitted, where it stands out, from the best part of what it says.
 
@@ -170,8 +166,7 @@ def _followed(
         best = max(own, key=lambda hint: hint.score, default=None)
         if best is None or best.score < max(STANDS_OUT, _IN_REACH * most):
             continue
-        if tick:
-            tick(best.effect.title)
+        meter.trying(best.effect.title)
         point = max((start(best, part) for part in PARTS), key=lambda point: point.gain_fit)
         least = -np.inf if nothing is None or best.score > _CLEARLY else nothing.gain_fit
         if point.gain_fit > least and meter.affords(best.effect.title):
