@@ -6,7 +6,7 @@ To add one, write the module and add a line to PICTURES; to LOOP_PICTURES, with
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of the report: the name of its file, how to draw it, and what it shows in words."""
+    """A figure of a report: its file's name, how to draw it, what it shows in words, and when."""
 
     name: str
     draw: Callable[[Any], Figure]
@@ -152,4 +152,9 @@ def draw_pictures(result: Result) -> dict[str, Drawn]:
         chosen += FORCE_PICTURES
     elif closed is not None and result.analysis.sampled:
         chosen += LOOP_PICTURES
-    return {p.name: drawn(p.draw(result), p.name) for p in chosen if p.shown(result)}
+    return all_drawn(chosen, result)
+
+
+def all_drawn(pictures: Iterable[Picture], result: Any) -> dict[str, Drawn]:
+    """Those of the `pictures` that the result has, by name."""
+    return {p.name: drawn(p.draw(result), p.name) for p in pictures if p.shown(result)}

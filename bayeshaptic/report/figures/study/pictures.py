@@ -2,47 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bayeshaptic.report.figures.pictures import Picture, all_drawn
 from bayeshaptic.report.figures.study import (
     configurations as study_configurations,
     limit as study_limit,
     people as study_people,
 )
-from bayeshaptic.report.figures.style import Drawn, drawn
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from bayeshaptic.report.figures.style import Drawn
     from bayeshaptic.study.analysis import StudyAnalysis
 
-
-@dataclass(frozen=True)
-class StudyPicture:
-    """A figure of a study: the name of its file, how to draw it, what it shows, and when."""
-
-    name: str
-    draw: Callable[[StudyAnalysis], Figure]
-    alternative: str
-    shown: Callable[[StudyAnalysis], bool]
-
-
 STUDY_PICTURES = (
-    StudyPicture(
+    Picture(
         "study_limit",
         study_limit.draw,
         "Critical stiffness of every case, and the lowest of all",
         lambda study: study.limit is not None,
     ),
-    StudyPicture(
+    Picture(
         "study_people",
         study_people.draw,
         "Critical stiffness of a person not yet seen and of every person recorded",
         lambda study: bool(study.users),
     ),
-    StudyPicture(
+    Picture(
         "study_configurations",
         study_configurations.draw,
         "Critical stiffness over the configuration",
@@ -53,4 +39,4 @@ STUDY_PICTURES = (
 
 def draw_study_pictures(study: StudyAnalysis) -> dict[str, Drawn]:
     """Every figure of a study, by name."""
-    return {p.name: drawn(p.draw(study), p.name) for p in STUDY_PICTURES if p.shown(study)}
+    return all_drawn(STUDY_PICTURES, study)
