@@ -31,7 +31,7 @@ from bayeshaptic.stability.critical import critical_stiffness
 def log_ratios(closed: Closed, traced: Traced, base: Fit | None = None) -> np.ndarray:
     """How the limit's draws are changed, in log stiffness."""
     one = closed.analysis
-    wide = with_discrepancy(one.limit, one.posterior, base or one.fit, one.fit, traced)
+    wide = with_discrepancy(one.limit, one.posterior, base or one.fit, traced)
     return np.log(wide.samples / one.limit.samples)
 
 
@@ -223,7 +223,7 @@ def test_in_a_hand_no_rest_of_friction_stays() -> None:
 def test_where_nothing_was_found_the_limit_falls_and_its_upper_end_stays() -> None:
     closed = fake_closed("unexplained", "nonlinear")
     one = closed.analysis
-    wide = with_discrepancy(one.limit, one.posterior, one.fit, one.fit, closed.traced)
+    wide = with_discrepancy(one.limit, one.posterior, one.fit, closed.traced)
     before, after = (limit.quantile(np.array([0.05, 0.95])) for limit in (one.limit, wide))
     assert np.log(after[0] / before[0]) < -0.1
     # A little above, by a quarter of the least way down (0.12) at most and some sampling noise.
@@ -244,7 +244,7 @@ def test_a_force_that_gained_a_little_may_be_what_is_left() -> None:
     low, there = (
         np.quantile(np.log(wide.samples / one.limit.samples), 0.05)
         for wide in (
-            with_discrepancy(one.limit, one.posterior, fit, fit, traced)
+            with_discrepancy(one.limit, one.posterior, fit, traced)
             for traced in (closed.traced, farther)
         )
     )
@@ -275,7 +275,7 @@ def test_a_crossing_is_named_where_it_binds() -> None:
     assert group.tolist() == [0, 1, 1, 2]
     closed = fake_closed("unexplained", "linear")
     one = closed.analysis
-    wide = with_discrepancy(one.limit, one.posterior, one.fit, one.fit, closed.traced)
+    wide = with_discrepancy(one.limit, one.posterior, one.fit, closed.traced)
     for number, found in enumerate(wide.crossings):
         bound = wide.frequency_hz[wide.group == number]
         assert len(bound) > 0
@@ -293,7 +293,7 @@ def test_crossings_of_a_bent_response_are_told_apart_by_their_frequency(monkeypa
         return np.where(low, 15e3, 22e3), np.where(low, 8.0, 103.0) * rng.uniform(0.99, 1.01)
 
     monkeypatch.setattr("bayeshaptic.diagnosis.widening.discrepancy._lowest_crossing", bent)
-    wide = with_discrepancy(one.limit, one.posterior, one.fit, one.fit, closed.traced)
+    wide = with_discrepancy(one.limit, one.posterior, one.fit, closed.traced)
     first, second = wide.crossings
     assert first == replace(one.limit.crossings[0], probability=first.probability)
     assert second.label.startswith("rigid body at") and second.frequency_hz < 9

@@ -125,12 +125,12 @@ def test_a_force_seen_faintly_in_a_loop_widens_by_what_it_does(monkeypatch) -> N
         after=(seen(0.1, along(fit, m2=0.2)),),
     )
     monkeypatch.setattr(Etfe, "direct", True)
-    wide = with_discrepancy(one.limit, one.posterior, base, fit, traced)
+    wide = with_discrepancy(one.limit, one.posterior, base, traced)
     ratio = np.log(wide.samples / one.limit.samples)
     width = forces_left(fit, traced.after).limit_log
     assert width > 1e-4
     assert np.quantile(ratio, [0.05, 0.95]) == pytest.approx([-0.9 * width, 0.9 * width], rel=0.05)
-    posterior = with_law_error(one.posterior, fit, fit, traced)
+    posterior = with_law_error(one.posterior, fit, traced)
     assert posterior is not None
     place = one.posterior.names.index("m2")
     moved = posterior.chains[..., place] / one.posterior.chains[..., place] - 1

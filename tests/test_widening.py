@@ -59,7 +59,7 @@ def test_a_law_that_is_not_quite_right_leaves_every_mass_one() -> None:
     found = fake_closed("explained")
     posterior, fit = found.analysis.posterior, found.analysis.fit
     heavier = fit.theta * np.where(np.array(fit.model.names) == "m2", 50.0, 1.0)
-    wide = with_law_error(posterior, replace(fit, theta=heavier), fit, found.traced)
+    wide = with_law_error(posterior, replace(fit, theta=heavier), found.traced)
     assert wide is not None
     chains, before = (p.chains[..., posterior.names.index("m2")] for p in (wide, posterior))
     assert chains.min() > 0

@@ -111,14 +111,14 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
             witness=base.etfe_limit if state.etfe is begun.etfe else None,
         )
     limit, traced = with_rivals(analysis.limit, traced, seed)
-    limit = with_discrepancy(limit, analysis.posterior, begun.fit, state.fit, traced, seed)
+    limit = with_discrepancy(limit, analysis.posterior, begun.fit, traced, seed)
     notices = analysis.notices + traced.notices + perhaps_late(state.fit)
     if state.etfe.through_reference and not state.etfe.moved_throughout:
         notices += mode_above_band(state.fit, state.etfe, analysis.limit)
     if (noise := noise_besides(state.fit, state.etfe)) is not None:
         notices += (noise.notice(state.etfe),)
     seconds = _stages(begun.seconds, tracing_s, base.seconds, analysis.seconds)
-    wide = with_law_error(analysis.posterior, begun.fit, state.fit, traced, seed)
+    wide = with_law_error(analysis.posterior, begun.fit, traced, seed)
     stated, louder = wide or analysis.posterior, analysis.noise_scale
     wide = with_rest(stated, state.fit, traced, louder, seed) or wide
     analysis = replace(analysis, limit=limit, notices=notices, seconds=seconds, widened=wide)

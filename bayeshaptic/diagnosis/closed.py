@@ -69,7 +69,7 @@ class Closed(Shown):
     @cached_property
     def changing_at_limit(self) -> float:
         """See `bayeshaptic.diagnosis.widening`; kept: every headline of a page asks."""
-        return changing_at_limit(self.analysis.limit, self.traced.state.fit, self.traced)
+        return changing_at_limit(self.analysis.limit, self.traced)
 
     @cached_property
     def may_be_held_by_friction(self) -> bool:

@@ -71,11 +71,11 @@ def by_direct_method(found: Opened, model: str | Model, options: Options) -> Clo
         etfe, seed = traced.state.etfe, options.seed
         analysis = finish(begun, etfe, fit, options.within(0.7, 0.95), witness=nothing)
         limit, traced = with_rivals(analysis.limit, traced, seed)
-        limit = with_discrepancy(limit, analysis.posterior, begun.fit, fit, traced, seed)
+        limit = with_discrepancy(limit, analysis.posterior, begun.fit, traced, seed)
         analysis = replace(
             analysis,
             limit=limit,
-            widened=with_law_error(analysis.posterior, begun.fit, fit, traced, seed),
+            widened=with_law_error(analysis.posterior, begun.fit, traced, seed),
             recording=found.etfe.recording,
             seconds={**analysis.seconds, "closing the loop": tracing_s},
         )

@@ -35,21 +35,20 @@ def with_discrepancy(
     limit: CriticalStiffness,
     posterior: Posterior,
     base: Fit,
-    fit: Fit,
     traced: Traced,
     seed: int = 0,
 ) -> CriticalStiffness:
     """The limit with the spread of accepted effects and of what is unexplained.
 
-    `base` is the fit of the model as declared, `fit` that with the accepted effects.
+    `base` is the fit of the model as declared; that with the accepted effects is in `traced`.
     """
     rng = np.random.default_rng(seed)
     limit = _with_effects(limit, traced, rng)
-    limit = _with_rest(limit, posterior, base, fit, traced, rng)
+    limit = _with_rest(limit, posterior, base, traced, rng)
     count = len(limit.samples)
-    if (changing := changing_at_limit(limit, fit, traced)) > 0:
+    if (changing := changing_at_limit(limit, traced)) > 0:
         limit = _times(limit, -_blurred(changing) * rng.random(count))
-    if (noise := noise_besides(fit, traced.state.etfe)) is not None:
+    if (noise := noise_besides(traced.state.fit, traced.state.etfe)) is not None:
         # In the record of the command, and not at the motor, it makes the response smaller by its
         # share: nobody knows which.
         limit = _times(limit, -np.log1p(noise.share) * rng.integers(2, size=count))
@@ -83,7 +82,6 @@ def _with_rest(
     limit: CriticalStiffness,
     posterior: Posterior,
     base: Fit,
-    fit: Fit,
     traced: Traced,
     rng: np.random.Generator,
 ) -> CriticalStiffness:
@@ -92,25 +90,25 @@ def _with_rest(
     flagged = {test.family for test in traced.after if test.flagged}
     left = flagged if traced.verdict == UNEXPLAINED else set()
     if "linear" in left and not traced.state.etfe.direct:
-        limit = _with_linear(limit, posterior, fit, rng)
+        limit = _with_linear(limit, posterior, traced.state.fit, rng)
     elif traced.state.etfe.direct and _is_noticed(traced, "linear"):
         # Windows that feedback biases do not show how the response deviates.
-        rest = _rest(base, fit, traced, "linear")
+        rest = _rest(base, traced, "linear")
         limit = _times(limit, rest * rng.uniform(-1.0, 1.0, size=len(limit.samples)))
     # A law of a force is never quite right, even where what it leaves would pass for noise.
     up = 0.25  # of the least way down, and up as well: a remainder biases either way
     for family in sorted((found & {"nonlinear"}) | (left - {"linear"})):
         if family in found:
             low, high = -1.0, 1.0
-            width = max(_rest(base, fit, traced, family), _LEAST[family] * (family in left))
+            width = max(_rest(base, traced, family), _LEAST[family] * (family in left))
         else:
-            width = _downwards(fit, traced, family)
+            width = _downwards(traced, family)
             low, high = -1.0, _upwards(limit, width) + up * _LEAST[family] / width
         limit = _times(limit, width * rng.uniform(low, high, size=len(limit.samples)))
     return limit
 
 
-def changing_at_limit(limit: CriticalStiffness, fit: Fit, traced: Traced) -> float:
+def changing_at_limit(limit: CriticalStiffness, traced: Traced) -> float:
     """Share of the response's power that changes from moment to moment where the limit is.
 
     Zero where no noise of the device is left.
@@ -118,7 +116,6 @@ def changing_at_limit(limit: CriticalStiffness, fit: Fit, traced: Traced) -> flo
     Parameters
     ----------
     limit : CriticalStiffness
-    fit : Fit
     traced : Traced
     """
     if traced.verdict != UNEXPLAINED:
@@ -126,7 +123,8 @@ def changing_at_limit(limit: CriticalStiffness, fit: Fit, traced: Traced) -> flo
     if not any(test.flagged and test.name == EXCESS_NOISE for test in traced.after):
         return 0.0
     at = [c.frequency_hz for c in limit.crossings if c.frequency_hz]
-    return max((changing_share(fit, traced.state.etfe, frequency) for frequency in at), default=0.0)
+    state = traced.state
+    return max((changing_share(state.fit, state.etfe, frequency) for frequency in at), default=0.0)
 
 
 def _is_noticed(traced: Traced, family: str) -> bool:
@@ -147,7 +145,7 @@ def _upwards(limit: CriticalStiffness, width: float) -> float:
     return (min(reach, 1.0) + 0.05) / 0.95
 
 
-def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
+def _rest(base: Fit, traced: Traced, family: str) -> float:
     """How far, in log stiffness, the rest of an effect may take the limit either way.
 
     It is what tests still see of the effect, as a share of what they saw before, times how far the
@@ -155,6 +153,7 @@ def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
     alone, so that half of what they saw is noise and the share says little: there each test says
     how strong a force it still sees.
     """
+    fit = traced.state.fit
     if family == "nonlinear" and traced.state.etfe.direct:
         return min(forces_left(fit, traced.after).limit_log, _FARTHEST)
     limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
@@ -162,8 +161,9 @@ def _rest(base: Fit, fit: Fit, traced: Traced, family: str) -> float:
     return share_left(traced, family) * min(moved, _FARTHEST)
 
 
-def _downwards(fit: Fit, traced: Traced, family: str) -> float:
+def _downwards(traced: Traced, family: str) -> float:
     """How far down, in log stiffness, a remainder of another class may take the limit."""
+    fit = traced.state.fit
     here = critical_stiffness(fit.model, fit.theta).value
     others = [
         critical_stiffness(trial.state.model, trial.state.fit.theta).value

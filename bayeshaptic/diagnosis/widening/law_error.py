@@ -20,7 +20,7 @@ from bayeshaptic.types import Floats
 
 
 def with_law_error(
-    posterior: Posterior, base: Fit, fit: Fit, traced: Traced, seed: int = 0
+    posterior: Posterior, base: Fit, traced: Traced, seed: int = 0
 ) -> Posterior | None:
     """The posterior with the errors of the accepted laws; None where no force was taken off.
 
@@ -28,15 +28,16 @@ def with_law_error(
     ----------
     posterior : Posterior
         Given the fitted forces.
-    base, fit : Fit
-        Of the model as declared, and with what was found.
+    base : Fit
+        Of the model as declared.
     traced : Traced
+        With the fit of the model with what was found.
     seed : int
     """
     laws = [effect for effect in traced.state.accepted if effect.family == "nonlinear"]
     if not laws:
         return None
-    rng = np.random.default_rng([seed, 13])
+    fit, rng = traced.state.fit, np.random.default_rng([seed, 13])
     shape = posterior.chains.shape[:-1]
     sd = np.sqrt(sum(_relative_sd(law) ** 2 for law in laws))
     strength, rest = sd * rng.standard_normal(shape), rng.uniform(-1.0, 1.0, shape)
