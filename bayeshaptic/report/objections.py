@@ -59,44 +59,49 @@ def why_none(result: Result) -> tuple[str, ...]:
     if told_too_little(analysis.notices) and (reason := unstated(analysis)) is not None:
         return (reason,)
     found = _of_the_analysis(analysis, closed.diagnosis if closed else None)
-    if closed and _rubs_otherwise(closed):
-        through = analysis.etfe.through_reference  # where no law is asked
+    return tuple(found + (_of_the_loop(closed) if closed else []))
+
+
+def _of_the_loop(closed: Closed) -> list[str]:
+    """What closing the loop found that a limit cannot be read beside."""
+    found = []
+    if _rubs_otherwise(closed):
+        through = closed.analysis.etfe.through_reference  # where no law is asked
         why = "is not fitted through a reference" if through else "no law of friction explains"
         found.append(
             f"a force that goes with the velocity is left, which {why}, and what the model takes "
             "for damping may be its part"
         )
-    if closed and is_the_rest(closed):
+    if is_the_rest(closed):
         found.append(
             "a force was taken off that made the limit look more than "
             f"{_MOSTLY:.0f} times as high, so that what is left of the damping is less than an "
             "error of a tenth in that force"
         )
-    if closed:
-        found += [why for why in (held_still(closed), stand_ins(closed)) if why]
-    if closed and GAIN.test in _left(closed):
+    found += [why for why in (held_still(closed), stand_ins(closed)) if why]
+    if GAIN.test in _left(closed):
         found.append(
             "the gain of the actuator ripples along the way, which was not taken off, and where it "
             "is largest the limit is lower by that"
         )
-    if closed and closed.may_be_held_by_friction:
+    if closed.may_be_held_by_friction:
         found.append(
             "beside the force that was found the device makes noise of its own, as one does that "
             "friction holds for most of the time, and what the model takes for damping may be that "
             "friction"
         )
-    if closed and closed.changing_at_limit > _CHANGES:
+    if closed.changing_at_limit > _CHANGES:
         found.append(
             "what the device does at the frequency of the limit is not the same from moment to "
             "moment, by as much as it answers there (a mode that wanders, a cable that slips, "
             "friction): the limit of the mean is not that of the device"
         )
-    if closed and changes(closed):
+    if changes(closed):
         found.append(
             "the device is not the same at the end of the recording as at its beginning, and what "
             "changes was not found"
         )
-    return tuple(found)
+    return found
 
 
 def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
@@ -140,6 +145,26 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             "everything here is read from"
         )
     found += in_closed_loop(analysis, verdict)
+    found += _of_the_alignment(analysis)
+    recording = analysis.recording
+    if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
+        found.append(
+            "what was sensed lags beyond the delay that is known, and whether that is in the loop "
+            "or in the sensor of force or motion, which the loop does without, nobody can tell"
+        )
+    if _is_moved(analysis):
+        hand = "a hand (--held yes) or " if may_be_held(analysis) else ""
+        found.append(
+            "the device moves beside what its command does, at more than "
+            f"{percent(_BESIDES)} of that speed: something else moves it, {hand}the floor, or a "
+            "force that was not found, and dry friction beside such a motion looks like damping"
+        )
+    return found
+
+
+def _of_the_alignment(analysis: Analysis) -> list[str]:
+    """Where force and position may not be of the same sample."""
+    found = []
     sensed = any(notice.topic == NO_LOOP for notice in analysis.notices)
     if analysis.sampled and analysis.fit.impossible and not sensed:
         found.append(
@@ -159,19 +184,6 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             f"the recording shows {quantity(less_s, 's')} less delay than was told, as where a "
             "position is written down before its command acts, and with the delay that was told "
             "the limit is lower: correct the columns, or --delay-s"
-        )
-    recording = analysis.recording
-    if recording is not None and recording.sensed is not None and _LAGS & set(_added(diagnosis)):
-        found.append(
-            "what was sensed lags beyond the delay that is known, and whether that is in the loop "
-            "or in the sensor of force or motion, which the loop does without, nobody can tell"
-        )
-    if _is_moved(analysis):
-        hand = "a hand (--held yes) or " if may_be_held(analysis) else ""
-        found.append(
-            "the device moves beside what its command does, at more than "
-            f"{percent(_BESIDES)} of that speed: something else moves it, {hand}the floor, or a "
-            "force that was not found, and dry friction beside such a motion looks like damping"
         )
     return found
 
