@@ -14,6 +14,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped
 from bayeshaptic.recordings.units import choose_units
+from bayeshaptic.types import Floats
 
 
 @at_the_door
@@ -67,14 +68,7 @@ def recording_from_arrays(
     position = _signal(position, "position", where)
     stamps = None if time is None else _signal(time, "time", where)
     followed = None if reference is None else _signal(reference, "reference", where)
-    lengths = {"force": len(force), "position": len(position)}
-    if followed is not None:
-        lengths["reference"] = len(followed)
-    if stamps is not None:
-        lengths["time"] = len(stamps)
-    if len(set(lengths.values())) > 1:
-        counts = ", ".join(f"{role} has {length}" for role, length in lengths.items())
-        raise InputError(f"{where}: the arrays differ in length: {counts} samples")
+    _refuse_lengths(where, force=force, position=position, reference=followed, time=stamps)
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
     timing = sampling_period(stamps, period_s, where)
@@ -105,6 +99,14 @@ def recording_from_arrays(
         notices=notices,
         reference=followed,
     )
+
+
+def _refuse_lengths(where: str, **signals: Floats | None) -> None:
+    """Refuse signals of different lengths, by the names that they have here."""
+    lengths = {role: len(signal) for role, signal in signals.items() if signal is not None}
+    if len(set(lengths.values())) > 1:
+        counts = ", ".join(f"{role} has {length}" for role, length in lengths.items())
+        raise InputError(f"{where}: the arrays differ in length: {counts} samples")
 
 
 def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:

@@ -50,23 +50,7 @@ def join_recordings(
         raise InputError("there are no recordings to join")
     read = [recording_of(one) for one in recordings]
     first = read[0]
-    for other in read:
-        if abs(other.period_s / first.period_s - 1) > 1e-3:
-            raise InputError(
-                f"{other.name} is sampled every {other.period_s:g} s and {first.name} every "
-                f"{first.period_s:g} s: they cannot be one; analyse them apart"
-            )
-        units = (other.force_unit, other.position_unit)
-        if units != (first.force_unit, first.position_unit):
-            raise InputError(
-                f"{other.name} is in {units[0]} and {units[1]}, {first.name} in "
-                f"{first.force_unit} and {first.position_unit}: give both in the same units"
-            )
-        if other.samples < FEWEST_SAMPLES:
-            raise InputError(
-                f"{other.name}: {other.samples} samples are too few even for a piece; leave it "
-                f"out, or record at least {FEWEST_SAMPLES}"
-            )
+    _refuse_unlike(read)
     if len(read) == 1:
         return first
     pieces = [piece for recording in read for piece in recording.pieces]
@@ -88,6 +72,28 @@ def join_recordings(
         reference=_references(pieces),
         sensed=_sensed(pieces),
     )
+
+
+def _refuse_unlike(recordings: Sequence[Recording]) -> None:
+    """Refuse what has another period or other units than the first, or is far too short."""
+    first, apart = recordings[0], 1e-3  # of a period: what clocks' stamps differ by
+    for other in recordings:
+        if abs(other.period_s / first.period_s - 1) > apart:
+            raise InputError(
+                f"{other.name} is sampled every {other.period_s:g} s and {first.name} every "
+                f"{first.period_s:g} s: they cannot be one; analyse them apart"
+            )
+        units = (other.force_unit, other.position_unit)
+        if units != (first.force_unit, first.position_unit):
+            raise InputError(
+                f"{other.name} is in {units[0]} and {units[1]}, {first.name} in "
+                f"{first.force_unit} and {first.position_unit}: give both in the same units"
+            )
+        if other.samples < FEWEST_SAMPLES:
+            raise InputError(
+                f"{other.name}: {other.samples} samples are too few even for a piece; leave it "
+                f"out, or record at least {FEWEST_SAMPLES}"
+            )
 
 
 def _refuse_twice(pieces: Sequence[Recording]) -> None:
