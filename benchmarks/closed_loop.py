@@ -23,6 +23,7 @@ from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG, Way
+from bayeshaptic.inference.time_domain.white_force import in_white_force
 from bayeshaptic.inference.time_domain.widths import FREEDOM
 from bayeshaptic.models import rigid
 from bayeshaptic.recordings import recording_from_arrays
@@ -266,6 +267,7 @@ def main(count: int) -> None:
         began = time.process_time()
         try:
             found, laws, doubts = with_laws(case.recording, None)
+            found = in_white_force(found, case.recording)
         except InputError as error:
             print(error)
             continue
@@ -297,7 +299,7 @@ def beside_the_bound(count: int, noise: float) -> None:
     for seed in range(1000, 1000 + count):
         case = make(seed, noise)
         try:
-            found = fit_motion(case.recording)
+            found = in_white_force(fit_motion(case.recording), case.recording)
         except InputError as error:
             print(error)
             continue

@@ -13,6 +13,7 @@ from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
+from bayeshaptic.inference.time_domain.white_force import in_white_force
 from bayeshaptic.inference.time_domain.widths import SURELY
 from bayeshaptic.models import HalfNormal
 from bayeshaptic.models.parameter import unit_of
@@ -73,9 +74,13 @@ class InLoop:
 def follow_in_loop(recording: Recording) -> InLoop | None:
     """Fit the motion of one mass; None where none can be found beside the measured one."""
     found = _with_halves(recording)
-    if found is None or few_tones(recording) is None:
-        return found
-    return replace(found, motion=_like_one_mass(found.motion, recording))
+    if found is None:
+        return None
+    # Whatever was asked of it was asked of the fit with equal weights, as its halves are.
+    motion = in_white_force(found.motion, recording)
+    if few_tones(recording) is not None:
+        motion = _like_one_mass(motion, recording)
+    return replace(found, motion=motion)
 
 
 def _like_one_mass(motion: MotionFit, recording: Recording) -> MotionFit:

@@ -21,6 +21,7 @@ import numpy as np
 
 from bayeshaptic.inference.time_domain.descent import Descended, descend
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
+from bayeshaptic.inference.time_domain.innovations.filter import Disturbance
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
 from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, NAMES, Hum, MassInLoop
 from bayeshaptic.inference.time_domain.start import by_inverse_dynamics
@@ -64,6 +65,8 @@ class MotionFit:
         Of all values.
     hums : tuple of Hum
         In the first piece.
+    disturbed : Disturbance or None
+        What values and covariance allow for, where that is white; None with equal weights.
     """
 
     values: Floats
@@ -81,6 +84,7 @@ class MotionFit:
     forces: MassForces
     whole_sd: Floats
     hums: tuple[Hum, ...] = ()
+    disturbed: Disturbance | None = None
 
     @property
     def numbers(self) -> Floats:

@@ -122,7 +122,13 @@ def motion(analysis: Analysis) -> str:
         text += f" Tones were fitted with it, as forces on the mass: {in_words(tones, force)}."
     rms = float(np.sqrt(np.mean(np.square(recording.force))))
     worth_naming = 1e-4  # of the force
-    if found.motion.uneven_rms > worth_naming * rms:
+    if (disturbed := found.motion.disturbed) is not None:
+        text += (
+            f" What is left is as a white force of {quantity(disturbed.force_sd, force)} rms and "
+            f"noise of {quantity(disturbed.position_sd, unit)} rms in the position leave it; every "
+            "sample is weighed accordingly (the innovations of a Kalman filter)."
+        )
+    elif found.motion.uneven_rms > worth_naming * rms:
         text += (
             " A force that changes along the way and with the direction, "
             f"{quantity(found.motion.uneven_rms, force)} rms, was fitted with it: how much of it "

@@ -1,0 +1,147 @@
+"""What a Kalman filter cannot foresee of a mass that a white force and its encoder disturb.
+
+Errors of a motion that a follower leads are correlated.  Where a white force disturbs the mass, and
+counts its measured position, the filter of R. E. Kalman ("A new approach to linear filtering and
+prediction problems", Journal of Basic Engineering 82, 1960) makes of them errors that are not, the
+innovations, and their least squares have the least variance that there is (L. Ljung, System
+Identification, 1999, chapter 7).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.types import Floats, Ints
+
+_UNKNOWN = 100.0  # counts a sample, that a velocity may be off where a piece begins
+_FORGOTTEN = 5  # samples, after which it no longer matters how a piece begins
+_CLEAR = 1.5  # of the least variance: above it friction may have either sign
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Standard deviations of what disturbs a mass: a force from sample to sample, a position."""
+
+    force_sd: float
+    position_sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class Innovations:
+    """A linear map of errors to innovations, each over its standard deviation.
+
+    Attributes
+    ----------
+    motion : ndarray, shape (2, 2)
+        Position and velocity a sample later, without a force.
+    gains : ndarray, shape (N, 2)
+    variances : ndarray, shape (N,)
+    unled : Follower
+        What takes the follower off: its answer to an error is added to the error.
+    pieces : tuple of slice
+    """
+
+    motion: Floats
+    gains: Floats = field(repr=False)
+    variances: Floats = field(repr=False)
+    unled: Follower
+    pieces: tuple[slice, ...]
+
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """Samples at which dry friction has one sign for certain, shape (N,)."""
+        usual = np.quantile(self.variances, 0.1)
+        known = self.variances < _CLEAR * usual
+        for piece in self.pieces:
+            known[piece.start : piece.start + _FORGOTTEN] = False
+        return known
+
+    def __call__(self, error: Floats) -> Floats:
+        """Of errors that were led, shape (N,)."""
+        from scipy.signal import lfilter
+
+        from bayeshaptic.inference.time_domain.innovations.kernels import innovations_of
+
+        above, below = self.unled.above, self.unled.below
+        alone = [error[piece] + lfilter(above, below, error[piece]) for piece in self.pieces]
+        starts = _starts(self.pieces)
+        args = self.motion, self.gains, self.variances, starts, np.concatenate(alone)
+        return np.asarray(innovations_of(*args))
+
+
+def innovations(
+    values: Floats,
+    follower: Follower,
+    velocity: Floats,
+    pieces: Sequence[slice],
+    disturbed: Disturbance,
+    period_s: float,
+) -> Innovations:
+    """The filter beside a simulated motion.
+
+    Dry friction has one sign or the other: where the velocity is no further from zero than the
+    filter knows it, that is as good as a white force of its size.
+
+    Parameters
+    ----------
+    values : ndarray, shape (5,)
+        Mass, viscous damping, dry friction, constant force, delay.
+    follower : Follower
+        That led the motion.
+    velocity : ndarray, shape (N,)
+        Of that motion.
+    pieces : sequence of slice
+    disturbed : Disturbance
+    period_s : float
+    """
+    from bayeshaptic.inference.time_domain.innovations.kernels import gains_of
+
+    mass, damping, dry, _, delay_s = values[:5]
+    motion, push = _held(mass, damping, period_s)
+    unknown = _UNKNOWN * disturbed.position_sd / period_s
+    sizes = np.array([disturbed.force_sd, disturbed.position_sd, dry, unknown])
+    gains, variances = gains_of(motion, push, sizes, velocity, _starts(pieces))
+    above, below = _position_over_force(mass, damping, delay_s, period_s)
+    unled = Follower(np.convolve(above, follower.above), np.convolve(below, follower.below))
+    return Innovations(motion, gains, variances, unled, tuple(pieces))
+
+
+def _starts(pieces: Sequence[slice]) -> Ints:
+    return np.array([piece.start for piece in pieces])
+
+
+def _held(mass: float, damping: float, span_s: float) -> tuple[Floats, Floats]:
+    """Position and velocity `span_s` later, (2, 2), and what a held unit force adds, (2,)."""
+    rate = damping / mass
+    slight = 1e-6  # of a velocity, lost in the time: a series then is exact
+    if rate * span_s > slight:
+        kept = math.exp(-rate * span_s)
+        once = (1 - kept) / rate
+        twice = (span_s - once) / rate
+    else:
+        kept = 1 - rate * span_s
+        once, twice = span_s * (1 - 0.5 * rate * span_s), 0.5 * span_s**2
+    return np.array([[1.0, once], [0.0, kept]]), np.array([twice, once]) / mass
+
+
+def _position_over_force(
+    mass: float, damping: float, delay_s: float, period_s: float
+) -> tuple[Floats, Floats]:
+    """Position over a command, held and late: numerator and denominator in powers of 1/z."""
+    whole = math.floor(delay_s / period_s)
+    late_s = delay_s - whole * period_s
+    motion, _ = _held(mass, damping, period_s)
+    after, now = _held(mass, damping, period_s - late_s)
+    _, before = _held(mass, damping, late_s)
+    far, kept = motion[0, 1], motion[1, 1]
+    above = np.zeros(whole + 4)
+    for first, (moved, faster) in ((whole, now), (whole + 1, after @ before)):
+        above[first + 1] += moved
+        above[first + 2] += far * faster - kept * moved
+    return above, np.array([1.0, -1.0 - kept, kept])

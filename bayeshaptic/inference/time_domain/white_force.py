@@ -1,0 +1,196 @@
+"""The motion of one mass fitted to its innovations, where a white force is all that disturbs it.
+
+Equal weights (`bayeshaptic.inference.time_domain.fit`) are right on average whatever force remains,
+and several times as far from the truth as need be where that is white.  Which of the two it is the
+innovations show: a force that depends on the position or the direction does not leave them white.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.descent import Descended, descend
+from bayeshaptic.inference.time_domain.fit import MotionFit
+from bayeshaptic.inference.time_domain.innovations.filter import (
+    Disturbance,
+    Innovations,
+    innovations,
+)
+from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, NAMES, MassInLoop
+from bayeshaptic.inference.time_domain.uneven import WAVES
+from bayeshaptic.inference.time_domain.widths import SURELY, mean_of_uneven
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.types import Floats
+
+_SIZES = 10.0 ** np.arange(-6.0, 0.1, 0.25)  # of the command, that a white force may have
+_NEAR = 10.0 ** np.linspace(-0.2, 0.2, 5)  # of the size that was found last
+_SETTLES = 4  # looks at which samples are clear, and how large the disturbance is in these
+_ROUNDS = 2  # fits, each with the filter of the last
+_LAGS = 20  # samples
+_RARE = 1e-3  # how often chance is told from white noise by a test
+
+
+@dataclass(frozen=True)
+class WhitenedLoop(MassInLoop):
+    """A loop whose errors are innovations, over their standard deviations.
+
+    Attributes
+    ----------
+    filtered : Innovations
+    """
+
+    filtered: Innovations | None = None
+
+    @property
+    def independent(self) -> float:
+        """How many independent samples this is worth."""
+        assert self.filtered is not None
+        return float(np.count_nonzero(self.filtered.clear))
+
+    def error(self, values: Floats, uneven: Floats, more: Floats | float = 0.0) -> Floats:
+        """Innovations of the measured less the simulated position, shape (N,)."""
+        assert self.filtered is not None
+        return self.filtered(super().error(values, uneven, more))
+
+
+def in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
+    """Fitted to its innovations where they are white; else as it was.
+
+    Where it is fitted anew, values and covariances are those of the innovations, and everything
+    else (what the errors are, the force along the way) remains.
+
+    Parameters
+    ----------
+    motion : MotionFit
+        Of the recording, with equal weights.
+    recording : Recording
+    """
+    try:
+        return _in_white_force(motion, recording)
+    except (InputError, np.linalg.LinAlgError):  # no motion stays near, or two columns are one
+        return motion
+
+
+def _in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
+    loop = motion.loop(recording)
+    disturbed = _usual(loop)
+    tried, values = _SIZES * float(np.std(loop.force)), motion.whole
+    for _ in range(_ROUNDS):
+        disturbed, filtered = _disturbance(loop, values, disturbed, tried)
+        whitened = _whitened(loop, filtered)
+        if not _like_noise(whitened, values):
+            return motion
+        found = descend(whitened, values, recording.name)
+        tried, values = disturbed.force_sd * _NEAR, found.inside
+    if not (found.converged and _agree(motion, found)):
+        return motion
+    shared = len(NAMES)
+    spread = found.covariance[:shared, :shared].copy()
+    for index in FORCES:
+        spread[index, index] += mean_of_uneven(found.found)
+    return replace(
+        motion,
+        values=found.values[:shared],
+        inside=found.inside[:shared],
+        covariance=spread,
+        whole=found.inside,
+        whole_sd=np.sqrt(np.diag(found.covariance)),
+        disturbed=disturbed,
+    )
+
+
+def _usual(loop: MassInLoop) -> Disturbance:
+    """Nothing but counts."""
+    moves = float(np.std(np.diff(loop.position)))
+    unit = increment_unit(loop.position) or 1e-3 * moves
+    return Disturbance(0.0, unit / np.sqrt(12))
+
+
+def _whitened(loop: MassInLoop, filtered: Innovations) -> WhitenedLoop:
+    kept = {name: getattr(loop, name) for name in loop.__dataclass_fields__}
+    return WhitenedLoop(**kept, filtered=filtered)
+
+
+def _disturbance(
+    loop: MassInLoop, values: Floats, disturbed: Disturbance, tried: Floats
+) -> tuple[Disturbance, Innovations]:
+    """The likeliest sizes beside a motion, all values fitted with them; and their filter."""
+    assert loop.follower is not None
+    waves = np.zeros(2 * WAVES)
+    error = loop.error(values, waves)
+    slopes = loop.columns(values, waves, error)[:, : loop.plain]
+    simulated = loop.position - error
+    velocity = [np.gradient(simulated[piece], loop.period_s) for piece in loop.pieces]
+    beside = values, loop.follower, np.concatenate(velocity), loop.pieces
+    clear = np.ones(len(error), dtype=bool)
+    position_sd = disturbed.position_sd
+    for _ in range(_SETTLES):
+        lacks = []
+        for force_sd in tried:
+            sizes = Disturbance(float(force_sd), position_sd)
+            filtered = innovations(*beside, sizes, loop.period_s)
+            left = _left(filtered, error, slopes)[clear]
+            power = float(np.mean(left**2))
+            lack = np.log(power) + np.mean(np.log(filtered.variances[clear]))
+            lacks.append((float(lack), float(force_sd), power, filtered))
+        _, force_sd, power, filtered = min(lacks, key=lambda one: one[0])
+        # A common factor of both sizes, and of what friction is beside them.
+        position_sd *= np.sqrt(power)
+        tried = force_sd * np.sqrt(power) * _NEAR
+        clear = filtered.clear
+    best = Disturbance(force_sd * float(np.sqrt(power)), float(position_sd))
+    return best, innovations(*beside, best, loop.period_s)
+
+
+def _left(filtered: Innovations, error: Floats, slopes: Floats) -> Floats:
+    """Innovations that the columns do not explain, shape (N,)."""
+    target = filtered(error)
+    columns = np.stack([filtered(column) for column in slopes.T], axis=1)
+    scale = np.linalg.norm(columns, axis=0)
+    scale[scale == 0] = 1.0
+    return np.asarray(target - columns / scale @ np.linalg.lstsq(columns / scale, target)[0])
+
+
+def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
+    """Whether innovations are white, and owe nothing to the way, as far as a line says.
+
+    Correlations of 20 lags (G. E. P. Box and D. A. Pierce, Journal of the American Statistical
+    Association 65, 1970), where friction is clear, for half of the recording at least; and whether
+    forces along the way explain more than chance does.
+    """
+    from scipy.stats import chi2
+
+    assert loop.filtered is not None
+    clear = loop.filtered.clear
+    if np.mean(clear) < 0.5:
+        return False
+    waves = np.zeros(2 * WAVES)
+    error = loop.error(values, waves)
+    columns = loop.columns(values, waves, error)
+    scale = np.linalg.norm(columns, axis=0)
+    scale[scale == 0] = 1.0
+    columns = columns / scale
+    plain, with_waves = (
+        error - part @ np.linalg.lstsq(part, error)[0]
+        for part in (columns[:, : loop.plain], columns)
+    )
+    along = len(error) * (plain @ plain / (with_waves @ with_waves) - 1)
+    noise = np.where(clear, plain, 0.0)
+    noise /= np.sqrt(np.mean(noise[clear] ** 2))
+    known = clear.astype(float)
+    lags = range(1, _LAGS + 1)
+    correlated = sum((noise[k:] @ noise[:-k]) ** 2 / (known[k:] @ known[:-k]) for k in lags)
+    return bool(correlated < chi2.isf(_RARE, _LAGS) and along < chi2.isf(_RARE, 2 * WAVES))
+
+
+def _agree(motion: MotionFit, found: Descended) -> bool:
+    """Whether the values are no further apart than their variances are (Hausman)."""
+    shared = len(NAMES)
+    variance = motion.sd**2 - np.diag(found.covariance)[:shared]
+    least = 0.1 * motion.sd**2
+    apart = np.abs(found.values[:shared] - motion.values)
+    return bool(np.all(apart < SURELY * np.sqrt(np.maximum(variance, least))))
