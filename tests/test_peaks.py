@@ -72,6 +72,15 @@ def test_the_density_of_what_is_proposed_is_one_in_all(about):
     assert ratio.mean() == pytest.approx(1.0, abs=4 * ratio.std() / 200)
 
 
+def test_shares_of_peaks_are_one_in_all_however_large_the_likelihood(about):
+    """Of a table with known standard deviations log likelihoods are 1e9, and draws were refused."""
+    for log_likelihood in (0.0, -6e9, 3.3e10):
+        held = log_likelihood + np.array([0.0, -0.75])
+        weights = SeveralPeaks.of(tuple(one.proposal for one in about), held).weights
+        assert weights.sum() == pytest.approx(1.0, abs=1e-14)
+        assert weights[0] == pytest.approx(0.05 + 0.9 / (1 + np.exp(-0.75)), abs=1e-5)
+
+
 def test_a_checkpoint_keeps_all_peaks(about):
     proposal = SeveralPeaks.of(tuple(one.proposal for one in about), np.log([0.7, 0.3]))
     again = restored(proposal.to_arrays())

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.inference.sampling.proposal import Proposal, acceptance, fitted, generator_of
-from bayeshaptic.inference.sampling.several_peaks import SeveralPeaks
+from bayeshaptic.inference.sampling.several_peaks import SeveralPeaks, shares_of
 from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.types import Floats, LogDensity
 
@@ -182,7 +182,7 @@ def joined(
     own, last = seed.spawn(2)
     rng = np.random.default_rng(own)
     proposal = SeveralPeaks.of(tuple(one.proposal for one in peaks), held)
-    ends = np.cumsum(np.exp(held - np.logaddexp.reduce(held)))
+    ends = np.cumsum(shares_of(held))
     starts = []
     for ensemble in range(ENSEMBLES):
         places = (np.arange(WALKERS) + rng.uniform()) / WALKERS  # systematic: no peak by chance

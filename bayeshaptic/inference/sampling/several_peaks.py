@@ -35,8 +35,7 @@ class SeveralPeaks:
     @classmethod
     def of(cls, peaks: tuple[Proposal, ...], held: Floats) -> SeveralPeaks:
         """With weights by how much of the density each has `held`, logarithms of shape (K,)."""
-        shares = np.exp(held - np.logaddexp.reduce(held))
-        return cls(peaks, (1 - _LEAST) * shares + _LEAST / len(peaks))
+        return cls(peaks, (1 - _LEAST) * shares_of(held) + _LEAST / len(peaks))
 
     @property
     def straightening(self) -> Straightening:
@@ -102,6 +101,15 @@ def restored(arrays: Mapping[str, NDArray[Any]]) -> Proposal | SeveralPeaks:
     """The proposal that a checkpoint kept."""
     kind = SeveralPeaks if "weights of peaks" in arrays else Proposal
     return kind.from_arrays(arrays)
+
+
+def shares_of(held: Floats) -> Floats:
+    """Of logarithms, shape (K,), which may be of any size: what each is of the whole, one in all.
+
+    Known standard deviations make log likelihoods of 1e9, where a logarithm is rounded to 1e-7.
+    """
+    parts = np.exp(held - np.max(held))
+    return np.asarray(parts / parts.sum())
 
 
 def log_held(density: LogDensity, proposal: Proposal) -> float:
