@@ -97,6 +97,27 @@ def test_the_variance_that_coherence_implies(tmp_path: Path, averages: int) -> N
     assert formula.mean(axis=0).sum() / error.mean(axis=0).sum() == pytest.approx(1, abs=0.05)
 
 
+def test_what_digits_leave_open_is_in_the_variance(tmp_path: Path) -> None:
+    """A quiet table with two digits after the point: its scatter is that of the rounding."""
+    rng = np.random.default_rng(7)
+    gain_db, phase_deg = rng.uniform(-90, -40, 2000), rng.uniform(-180, 180, 2000)
+    response = 10 ** (gain_db / 20) * np.exp(1j * np.radians(phase_deg))
+    columns = {"frequency_hz": np.linspace(2.0, 300.0, 2000), "sd": 1e-7 * np.abs(response)}
+    columns |= {"gain_db": np.round(gain_db, 2), "phase_deg": np.round(phase_deg, 1)}
+    etfe = read_frf(write(tmp_path / "a.csv", **columns), period_s=1e-3, kind="rotational")
+    pull = np.abs(etfe.value - response) ** 2 / etfe.variance
+    assert pull.mean() == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_coherence_that_was_rounded_to_one(tmp_path: Path) -> None:
+    """As analysers write it: half of its last digit is what may be missing."""
+    coherence = np.where(np.arange(len(FREQUENCY)) < 9, 0.9997, 1.0)
+    etfe = read_frf(write(tmp_path / "a.csv", **base(coherence=coherence, averages=9)), 1e-3)
+    missing = np.where(coherence < 1, 3e-4, 5e-5)
+    expected = np.abs(RESPONSE) ** 2 * missing / (1 - missing) / 8
+    np.testing.assert_allclose(etfe.variance, expected)
+
+
 def test_units(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", **base(sd=1.0))
     for columns, kind, unit, factor in (

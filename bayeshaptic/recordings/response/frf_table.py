@@ -22,6 +22,7 @@ from bayeshaptic.recordings.response.frf_kinds import (
     told,
     with_images_allowed_for,
 )
+from bayeshaptic.recordings.response.table_rounding import relative_variance, within_half_a_digit
 from bayeshaptic.recordings.response.table_spectra import TableSpectra
 from bayeshaptic.recordings.units import base_unit, choose_units
 from bayeshaptic.types import Complexes
@@ -54,6 +55,9 @@ def read_frf(
 
       (for large n Bendat and Piersol, *Random Data*, section 9.2: their relative error of the
       magnitude, :math:`\sqrt{1 - \gamma^2} / (|\gamma| \sqrt{2 n})`, is one of two components).
+      A coherence that was rounded to 1 is taken half of its last digit lower.
+
+    What rounding to the digits of gain and phase leaves open is added to the variance.
 
     ``receptance_db``, ``mobility_db`` or ``accelerance_db`` (position, velocity or acceleration
     over a measured force) in the place of ``gain_db`` say that the response is that of a continuous
@@ -122,6 +126,7 @@ def frf_from_arrays(
     phase = np.exp(1j * np.radians(columns["phase_deg"]))
     value: Complexes = np.asarray(10 ** (columns[of] / 20) * phase)
     variance, averages = _variance(path, columns, value)
+    variance = variance + np.abs(value) ** 2 * relative_variance(columns[of], columns["phase_deg"])
     own = None
     if of in STRUCTURAL:
         value, own = as_held(value, variance, frequency, period_s, derivatives)
@@ -234,7 +239,7 @@ def _variance(
     if "sd" in columns:
         check("sd", columns["sd"] > 0, "above 0 (position over force, not dB)")
         return columns["sd"] ** 2, np.full(len(value), np.inf)
-    coherence, averages = columns["coherence"], columns["averages"]
+    coherence, averages = within_half_a_digit(columns["coherence"]), columns["averages"]
     check("coherence", (coherence > 0) & (coherence < 1), "between 0 and 1")
     check("averages", averages >= 2, "at least 2, or the scatter cannot be known")
     return np.abs(value) ** 2 * (1 - coherence) / (coherence * (averages - 1)), averages
