@@ -107,6 +107,23 @@ def test_a_motion_of_less_than_a_count_a_sample_has_lost_no_rows(seed: int) -> N
     assert faults(as_recorded(recording_from_arrays(force, counts, 1e-3))).lost == 0
 
 
+def test_a_wild_sample_is_found_where_nothing_that_is_left_tells_of_the_force() -> None:
+    """Beside pulses whose samples are all known to be wrong: the force has no visible effect."""
+    rng = np.random.default_rng(4)
+    starts = np.cumsum(rng.integers(200, 1500, size=40))
+    force = np.zeros(starts[-1] + 1500)
+    for start in starts:
+        force[start : start + 3] = rng.choice([-1.0, 1.0])
+    position = lfilter([0.0, 0.0, 0.5, 0.5], np.convolve([1, -1], [1, -0.99]), force)
+    position = np.round(300 * position)
+    wild = int(starts[9] + starts[10]) // 2
+    position[wild] += 300
+    recording = recording_from_arrays(force, position, 1e-3)
+    struck = np.convolve(force != 0, np.ones(6))[: len(force)] > 0
+    found = faults(as_recorded(recording).without(struck))
+    assert found.lost == 0 and list(np.flatnonzero(found.wild)) == [wild]
+
+
 def rubbing(seed: int, samples: int = 20000) -> tuple[np.ndarray, np.ndarray]:
     """White force on two masses of which the motor's rubs; no noise."""
     force = np.random.default_rng(seed).standard_normal(samples)

@@ -209,7 +209,8 @@ def _trial(
         design[j:, j] = predictor.past[: equations - j]
     for j in range(force):
         design[j:, position + j] = -predictor.force[: equations - j]
-    scale = np.abs(design).max(axis=0)
+    # Between pulses nothing tells of the force, and the predictor gives it no effect.
+    scale = np.maximum(np.abs(design).max(axis=0), np.finfo(float).tiny)
     values = np.linalg.lstsq(design / scale, -errors, rcond=1e-10)[0] / scale
     if missing:  # their forces were commanded as those of the other rows
         values[position:] = np.clip(values[position:], *samples.range_of_force)

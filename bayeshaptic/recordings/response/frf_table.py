@@ -240,7 +240,8 @@ def _variance(
         check("sd", columns["sd"] > 0, "above 0 (position over force, not dB)")
         return columns["sd"] ** 2, np.full(len(value), np.inf)
     coherence, averages = within_half_a_digit(columns["coherence"]), columns["averages"]
-    check("coherence", (coherence > 0) & (coherence < 1), "between 0 and 1")
+    expected = "between 0 and 1; where no digit of it is less than 1, give a column sd"
+    check("coherence", (coherence > 0) & (coherence < 1), expected)
     check("averages", averages >= 2, "at least 2, or the scatter cannot be known")
     return np.abs(value) ** 2 * (1 - coherence) / (coherence * (averages - 1)), averages
 
