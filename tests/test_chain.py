@@ -103,3 +103,18 @@ def test_a_held_chain_is_found(tmp_path):
     )
     assert found == pytest.approx(limit, rel=0.02)
     assert bh.least_squares(bh.grasped(delay_s=2e-4), table).reduced_chi_square > 2
+
+
+MASSES = {"m1": 0.49, "m2": 0.037, "m3": 0.19, "m4": 0.28}
+SPRINGS = {"kc": 2900.0, "bc": 0.24, "k3": 4300.0, "c3": 1.4, "k4": 35000.0, "c4": 9.7}
+GROUND = {"b1": 1.0, "b2": 0.0, "b3": 0.0, "b4": 1.0}
+
+
+def test_a_fit_that_grew_a_mode_where_none_is_moves_it(tmp_path):
+    """Of 48 simulated chains of three to five masses 20 were left far from the noise."""
+    model = bh.chain(3, delay_s=2e-4, period_s=1e-3)
+    values = MASSES | SPRINGS | GROUND
+    truth = np.array([values[name] for name in model.names])
+    frequency = np.geomspace(1.0, 400.0, 400)
+    table = noisy_table(tmp_path, frequency, model.response(truth, frequency), 3e-4, seed=14)
+    assert bh.least_squares(model, table).reduced_chi_square < 1.2

@@ -22,7 +22,7 @@ from bayeshaptic.inference.fit import (
 )
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
-from bayeshaptic.models.chains import shorter_chain, with_one_more_mode
+from bayeshaptic.models.chains import shorter_chain, with_a_mode_moved, with_one_more_mode
 from bayeshaptic.models.start import informed, starting_points
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.recordings.response.etfe import Etfe, compress
@@ -67,7 +67,7 @@ def least_squares(
     bound the search (at six standard deviations).  The windows are compressed anew around each
     fit, because only the ratio to a good first fit is smooth beside a resonance.  Where the model
     misfits, another set of starting points follows, until two end alike; some of these have a mode
-    above half the sampling rate.
+    above half the sampling rate.  Of a chain one mode after the other is looked for elsewhere.
 
     Parameters
     ----------
@@ -98,8 +98,10 @@ def least_squares(
     if start is not None:
         return replace(_fit(model, etfe, start), etfe=etfe)
     fit = _fit(model, etfe, _starts(model, etfe, seed, shorter))
+    if shorter_chain(model) is not None:
+        return replace(_with_modes_moved(fit, etfe, most_sets - 1), etfe=etfe)
     for another in range(1, most_sets):
-        if not fit.misfits or shorter_chain(model) is not None:
+        if not fit.misfits:
             break
         rng = np.random.default_rng([seed, another])
         # Of a position that is early an image takes up the lead that no delay leaves over.
@@ -169,6 +171,19 @@ def _starts(model: Model, etfe: Etfe, seed: int, known: Fit | None) -> Floats:
     return with_one_more_mode(shorter, known.theta, model, etfe)
 
 
+def _with_modes_moved(fit: Fit, etfe: Etfe, rounds: int) -> Fit:
+    """A chain's fit, or a better one that it leads to with one mode after the other elsewhere."""
+    idle, modes = 0, fit.model.structure.modes
+    for step in range(rounds * modes):
+        if not fit.misfits or idle == modes:
+            break
+        start = with_a_mode_moved(fit.model, fit.theta, 1 + step % modes, etfe)
+        other = _fit(fit.model, etfe, start)
+        better = other.reduced_chi_square < (1 - _ONE_VALLEY) * fit.reduced_chi_square
+        fit, idle = (other, 0) if better else (fit, idle + 1)
+    return fit
+
+
 @dataclass(frozen=True)
 class Optimum:
     """Where starting points ended.
@@ -206,10 +221,6 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
 
     Of the optima found, that with the highest posterior density: masses may swap their parts in
     the motion and fit as well, and the priors tell which is which.
-
-    Returns
-    -------
-    Optimum
     """
     here, low, high = search_box(model)
     residuals = weighted_residuals(Likelihood(model, windows), here)
@@ -233,7 +244,7 @@ def refine(model: Model, windows: Windows, start: Floats) -> Optimum:
 
 
 def refine_anew(model: Model, etfe: Etfe, windows: Windows, start: Floats) -> Optimum:
-    """`refine`, and from starting points of the model's own where what is left is not noise."""
+    """`refine`, and from starting points of the model's own where that leaves more than noise."""
     found = refine(model, windows, start)
     return anew(model, etfe, windows, found) or found
 
@@ -273,8 +284,7 @@ def _valleys(
     """Sift the starting points and lead the better ones into their valleys."""
     with np.errstate(all="ignore"):
         cost = np.einsum("bn,bn->b", *(2 * [residuals(phi)]))
-    order = np.argsort(np.where(np.isfinite(cost), cost, np.inf))
-    phi = phi[order[:_KEPT_STARTS]]
+    phi = phi[np.argsort(np.where(np.isfinite(cost), cost, np.inf))[:_KEPT_STARTS]]
     return minimise(residuals, phi, low, high, _STEPS_TO_A_VALLEY, 1e-2, CREEPS)
 
 

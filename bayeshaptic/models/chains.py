@@ -11,14 +11,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import nnls
 
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.structures import chain
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
 
-_SHARES = (0.03, 0.1, 0.3, 1.0, 3.0)  # weight of a new mode over that of the whole mass
-_DAMPING = (0.01, 0.05)  # ratios
+_SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # weight of a new mode over that of all masses
+_DAMPING = (0.01, 0.05)  # ratios of a new mode
+_LEAST = 0.002  # ratio of a spring between its masses
 
 
 def shorter_chain(model: Model) -> Model | None:
@@ -39,31 +41,75 @@ def with_one_more_mode(shorter: Model, theta: Floats, model: Model, etfe: Etfe) 
     ndarray, shape (S, P)
     """
     values = dict(zip(shorter.names, theta, strict=True)) | dict(shorter.fixed)
-    squares, weights = _modes_of(values, model.structure.modes)
+    return _with_a_mode(values, _modes_of(values, model.structure.modes), model, etfe)
+
+
+def with_a_mode_moved(model: Model, theta: Floats, moved: int, etfe: Etfe) -> Floats:
+    """Vectors of `model` whose modes are those at `theta` but one, which is anywhere else.
+
+    The mode of a shorter chain lies between two that it had to stand for, and a fit that grows from
+    there may keep it, though no mode is where it is.
+
+    Parameters
+    ----------
+    model : Model
+    theta : ndarray, shape (P,)
+    moved : int
+        Which mode, from 1 on by its frequency.
+    etfe : Etfe
+
+    Returns
+    -------
+    ndarray, shape (S, P)
+    """
+    values = dict(zip(model.names, theta, strict=True)) | dict(model.fixed)
+    modes = _modes_of(values, model.structure.modes + 1)
+    return _with_a_mode(values, tuple(np.delete(part, moved) for part in modes), model, etfe)
+
+
+def _with_a_mode(
+    values: dict[str, float], modes: tuple[Floats, ...], model: Model, etfe: Etfe
+) -> Floats:
+    """Vectors with these modes and one more, shape (S, P); all else is as in `values`."""
     low, high = etfe.band_hz
     found = []
     frequencies = 45
     for frequency in np.geomspace(low, 1.2 * high, frequencies):
         for share in _SHARES:
-            masses, springs = _as_chain(
-                np.append(squares, (2 * np.pi * frequency) ** 2),
-                np.append(weights, share * weights[0]),
+            square = (2 * np.pi * frequency) ** 2
+            new = square, share * modes[1][0], 0.0
+            squares, weights, rates = (
+                np.append(part, one) for part, one in zip(modes, new, strict=True)
             )
+            masses, springs = _as_chain(squares, weights)
             for ratio in _DAMPING:
-                named = _named(values, masses, springs, ratio)
+                rates[-1] = 2 * ratio * np.sqrt(square)
+                named = _named(values, masses, springs, squares, rates)
                 found.append([named[name] for name in model.names])
     return np.array(found)
 
 
-def _modes_of(values: dict[str, float], count: int) -> tuple[Floats, Floats]:
-    """Squared angular frequencies, the rigid body's zero first, and weights, shape (n,)."""
+def _modes_of(values: dict[str, float], count: int) -> tuple[Floats, Floats, Floats]:
+    """Of so many masses the squared angular frequencies, weights and rates of decay, shape (n,).
+
+    The rigid body's zero comes first; rates are 2 zeta omega.
+    """
     masses = np.array([values[f"m{n}"] for n in range(1, count + 1)])
     springs = np.array([values["kc"], *(values[f"k{n}"] for n in range(3, count + 1))])
+    dampers = np.array([values["bc"], *(values[f"c{n}"] for n in range(3, count + 1))])
+    ground = np.array([values[f"b{n}"] for n in range(1, count + 1)])
+    squares, shapes = _shapes(masses, springs)
+    rates = np.diff(shapes, axis=0).T ** 2 @ dampers + shapes.T**2 @ ground
+    return squares, shapes[0] ** 2, rates
+
+
+def _shapes(masses: Floats, springs: Floats) -> tuple[Floats, Floats]:
+    """Squared angular frequencies (n,), and motions (mass, mode), of mass one."""
     diagonal = np.concatenate([springs, [0.0]]) + np.concatenate([[0.0], springs])
     stiffness = np.diag(diagonal) - np.diag(springs, 1) - np.diag(springs, -1)
     scale = 1 / np.sqrt(masses)
     squares, vectors = np.linalg.eigh(stiffness * np.outer(scale, scale))
-    return np.maximum(squares, 0.0), (vectors[0] * scale[0]) ** 2
+    return np.maximum(squares, 0.0), vectors * scale[:, None]
 
 
 def _as_chain(squares: Floats, weights: Floats) -> tuple[Floats, Floats]:
@@ -85,15 +131,23 @@ def _as_chain(squares: Floats, weights: Floats) -> tuple[Floats, Floats]:
 
 
 def _named(
-    values: dict[str, float], masses: Floats, springs: Floats, ratio: float
+    values: dict[str, float], masses: Floats, springs: Floats, squares: Floats, rates: Floats
 ) -> dict[str, float]:
-    """The chain's parameters by name; its dampers are those of a damping ratio."""
-    reduced = 1 / (1 / masses[:-1] + 1 / masses[1:])
-    dampers = 2 * ratio * np.sqrt(springs * reduced)
+    """The chain's parameters by name, with the dampers that let its modes decay so, as they can."""
+    # The new mass rubs on the ground as much as the others do on average, and all as they did.
+    before = np.array([values[f"b{n}"] for n in range(1, len(masses))])
+    ground = np.append(before, before.mean()) * (1 - 1 / len(masses))
+    _, shapes = _shapes(masses, springs)
+    order = np.argsort(squares)[1:]  # as the shapes are, and without the rigid body
+    wanted = np.maximum(rates[order] - (shapes.T**2 @ ground)[1:], 0.0) / rates[order]
+    stretched = np.diff(shapes, axis=0).T[1:] ** 2 / rates[order][:, None]
+    size = np.linalg.norm(stretched, axis=0)
+    # From nothing at all a fit does not find back.
+    least = 2 * _LEAST * np.sqrt(springs / (1 / masses[:-1] + 1 / masses[1:]))
+    dampers = np.maximum(nnls(stretched / size, wanted)[0] / size, least)
     named = dict(values) | {f"m{n}": m for n, m in enumerate(masses, start=1)}
+    named |= {f"b{n}": b for n, b in enumerate(ground, start=1)}
     named |= {"kc": springs[0], "bc": dampers[0]}
     for n, (spring, damper) in enumerate(zip(springs[1:], dampers[1:], strict=True), start=3):
         named |= {f"k{n}": spring, f"c{n}": damper}
-    # The new mass rubs on the ground as much as the others do on average.
-    ground = [values[f"b{n}"] for n in range(1, len(masses))]
-    return named | {f"b{len(masses)}": sum(ground) / len(ground)}
+    return named
