@@ -191,7 +191,8 @@ def choose_model(
     best, candidates, noise = _compared(fits)
     # Where two masses that nobody holds explain it, a third has nothing to explain.
     if held is None and (fits[best].misfits or candidates[best].held):
-        fit_to(_CHAIN, shorter=fits["free"])
+        # Where a hand explains it, the chain can begin there, too.
+        fit_to(_CHAIN, fits["free"], most_sets=SETS if fits["grasped"].misfits else 1)
         if fits[_CHAIN].misfits:
             fits[_CHAIN] = _from_the_hand(fits[_CHAIN], fits["grasped"], etfes[_CHAIN])
         best, candidates, noise = _compared(fits)
