@@ -16,6 +16,7 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import t as student
 
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
 from bayeshaptic.errors import InputError
@@ -258,10 +259,8 @@ def innovations(case: Case, columns: Floats) -> tuple[Floats, float]:
 
 def main(count: int) -> None:
     """Print the coverage of every parameter and of K_CR."""
-    from scipy.stats import t as student
-
     reach = student.ppf(0.95, FREEDOM)
-    inside, ranks, widths, seconds = [], [], [], 0.0
+    inside, ranks, widths, white, seconds = [], [], [], [], 0.0
     for seed in range(100, 100 + count):
         case = make(seed)
         began = time.process_time()
@@ -272,6 +271,7 @@ def main(count: int) -> None:
             print(error)
             continue
         seconds += time.process_time() - began
+        white.append(found.disturbed is not None)
         inside.append(np.abs(found.values - case.truth) < reach * found.sd)
         limits = limit_draws(case.truth, found.values, found.covariance, seed)
         if len(limits) > DRAWS // 10:
@@ -281,8 +281,11 @@ def main(count: int) -> None:
         named = ", ".join(law.effect.name for law in laws)
         print(f"seed {seed}: {case.what}  {named} {' '.join(doubts)}")
     print(f"{len(inside)} recordings, {seconds / len(inside):.2f} s of CPU time each")
-    for name, share in zip(NAMES, np.mean(inside, axis=0), strict=True):
-        print(f"{name:8s} 90 % interval holds the truth in {100 * share:.0f} %")
+    held, known = np.array(inside), np.array(white)
+    for what, some in (("all", held), ("a white force", held[known]), ("others", held[~known])):
+        shares = zip(NAMES, np.mean(some, axis=0), strict=True)
+        told = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
+        print(f"{what} ({len(some)}): 90 % intervals hold {told}")
     rank, width = np.array(ranks), np.array(widths)
     for widest in (np.inf, 6.0, 3.0):
         some = rank[width < widest]
@@ -295,7 +298,8 @@ def main(count: int) -> None:
 
 def beside_the_bound(count: int, noise: float) -> None:
     """Print how wide posteriors are, and errors, beside the Cramer-Rao bound."""
-    widths, errors = [], []
+    widths, errors, inside, white = [], [], [], []
+    reach = student.ppf(0.95, FREEDOM)
     for seed in range(1000, 1000 + count):
         case = make(seed, noise)
         try:
@@ -306,10 +310,16 @@ def beside_the_bound(count: int, noise: float) -> None:
         least = bound(case)
         widths.append(found.sd / least)
         errors.append(np.abs(found.values - case.truth) / least)
-    print(f"a white force of {100 * noise:g} % of the command, {len(widths)} recordings, medians:")
-    middles = np.nanmedian(widths, axis=0), np.nanmedian(errors, axis=0)
-    for name, width, error in zip(NAMES, *middles, strict=True):
-        print(f"{name:8s} sd over the bound {width:.3g}, |error| over the bound {error:.3g}")
+        inside.append(np.abs(found.values - case.truth) < reach * found.sd)
+        white.append(found.disturbed is not None)
+    known = np.array(white)
+    print(f"a white force of {100 * noise:g} % of the command, {len(widths)} recordings:")
+    for what, some in (("all", known | True), ("told to be white", known)):
+        middles = (np.nanmedian(np.array(one)[some], axis=0) for one in (widths, errors))
+        held = np.mean(np.array(inside)[some], axis=0)
+        print(f"{what} ({np.count_nonzero(some)}), medians of sd and |error| over the bound, held:")
+        for name, width, error, share in zip(NAMES, *middles, held, strict=True):
+            print(f"{name:8s} {width:.3g}  {error:.3g}  {100 * share:.0f} %")
 
 
 if __name__ == "__main__":

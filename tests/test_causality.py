@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import chirp, lfilter
+from scipy.signal import butter, chirp, lfilter, sosfilt
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.errors import InputError
@@ -93,6 +93,19 @@ def test_a_position_recorded_a_sample_early_is_no_feedback(case: str) -> None:
         assert judge(force[:-1], position[1:]).early_position
 
 
+def test_noise_of_a_band_is_told_from_a_loop_by_its_own_far_past() -> None:
+    """Its far past is in the position, and nothing else of the position tells of it."""
+    rng = np.random.default_rng(11)
+    edges = butter(2, [8.0, 300.0], "band", fs=1 / PERIOD, output="sos")
+    noise = sosfilt(edges, rng.standard_normal((2, SAMPLES)))
+    case = CASES[0]
+    scale = SCALE[case.split()[0]]
+    for force, position in zip(*record(case, scale["rms"] * noise, rng), strict=True):
+        found = judge(force, position)
+        assert not found.has_feedback or found.far_past
+        assert not (found.swapped or found.opposite)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_virtual_walls_and_servos_are_feedback(case: str) -> None:
     rng = np.random.default_rng(7)
@@ -151,7 +164,7 @@ def servo(where: str, ahead: int) -> tuple[np.ndarray, np.ndarray]:
 def test_steps_under_a_controller_are_feedback(where: str, ahead: int) -> None:
     found = judge(*servo(where, ahead))
     assert found.has_feedback
-    assert not (found.swapped or found.opposite or found.early_position)
+    assert not (found.swapped or found.opposite or found.early_position or found.far_past)
 
 
 @pytest.mark.parametrize("case", CASES)

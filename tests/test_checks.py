@@ -240,7 +240,7 @@ def test_a_doubt_of_feedback_is_no_certainty(monkeypatch: pytest.MonkeyPatch) ->
     for has_feedback in (True, False):
         found = SimpleNamespace(
             has_feedback=has_feedback, doubtful=True, evidence="", relay=False, swapped=False,
-            opposite=False, early_position=False,
+            opposite=False, early_position=False, far_past=False,
         )  # fmt: skip
         monkeypatch.setattr(what_drives_what, "causality", lambda _, found=found: found)
         notices = check_recording(held())

@@ -36,7 +36,7 @@ def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> 
     if found.relay:
         raise _relay(recording, where)
     if found.has_feedback:
-        return [_feedback(found.evidence, against)]
+        return [_feedback(found.evidence, against, found.far_past)]
     if not measured and (share := share_by_a_law(recording)) > 0:
         known = "the positions" if recording.reference is None else "positions and reference"
         law = f"in {percent(share)} of the samples a linear law of {known} makes it exactly"
@@ -106,13 +106,21 @@ def _velocity(where: str) -> InputError:
     )
 
 
-def _feedback(evidence: str, against: bool) -> Notice:
-    """That the force was computed from the motion."""
-    text = (
-        f"The force was computed from the motion ({evidence}): the recording was made in closed "
-        "loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force that does "
-        "not depend on the motion."
-    )
+def _feedback(evidence: str, against: bool, far_past: bool = False) -> Notice:
+    """That the force was computed from the motion; or may be noise of a band."""
+    if far_past:
+        text = (
+            f"The force was computed from the motion, or is noise of a band ({evidence}, and so "
+            "does the force's own far past). Nothing in the recording says which, so it is read as "
+            "one of a closed loop, which holds in open loop, too. Noise without a lower edge, as "
+            "white noise is, leaves no doubt."
+        )
+    else:
+        text = (
+            f"The force was computed from the motion ({evidence}): the recording was made in "
+            "closed loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force "
+            "that does not depend on the motion."
+        )
     if against:
         text += (
             " The position goes against the force: if this was an open loop, one of them has the "

@@ -98,6 +98,32 @@ def _at_places(
     return count
 
 
+def is_relay(force: Floats, position: Floats) -> bool:
+    """Whether a force of two levels opposes the position, taken from zero or from its middle.
+
+    Parameters
+    ----------
+    force, position : ndarray, shape (N,)
+    """
+    low, high = force.min(), force.max()
+    near = 1e-6 * (high - low)
+    if not np.all((force - low <= near) | (high - force <= near)):
+        return False
+    pushes_up = force > (low + high) / 2
+    if not 0.2 < np.mean(pushes_up) < 0.8:
+        return False
+    levels = (0.0, float(np.median(position)), float((position.min() + position.max()) / 2))
+    for level in levels:
+        # Close to the level counts, noise and a hysteresis decide.
+        away = np.abs(position - level)
+        clear = away > np.quantile(away, 0.2)
+        for lag in range(3):
+            sides = (pushes_up == np.roll(position < level, lag))[clear & np.roll(clear, lag)]
+            if np.mean(sides) > 0.99:
+                return True
+    return False
+
+
 def is_switched(force: Floats, position: Floats) -> bool:
     """A force of two levels that switches where the position passes the same places.
 

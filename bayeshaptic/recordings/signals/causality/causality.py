@@ -10,7 +10,7 @@ gives way to the force. So the sign tells them apart.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from bayeshaptic.recordings.signals.causality.innovations import innovations_ans
 from bayeshaptic.recordings.signals.causality.prediction import Share, predict
 from bayeshaptic.recordings.signals.excitation import Repetition, find_repetition
 from bayeshaptic.recordings.signals.sweeps import is_sweep
-from bayeshaptic.recordings.signals.switching import is_switched
+from bayeshaptic.recordings.signals.switching import is_relay, is_switched
 from bayeshaptic.types import Bools, Floats
 
 # Share of the force's error that the position's past must remove, its z, and the floor: errors
@@ -83,6 +83,9 @@ class Causality:
     smooth_position : bool
         The position is smoother than the force, as that of every mass is, or as smooth, as a
         spring's is.
+    far_past : bool
+        What looks like feedback the force's own far past says as well: noise that was band-passed,
+        whose far past the position knows, or feedback of nothing but what the force did.
     """
 
     feedback: tuple[Share, ...]
@@ -95,6 +98,7 @@ class Causality:
     repeats: bool
     relay: bool
     smooth_position: bool
+    far_past: bool = False
 
     @property
     def has_feedback(self) -> bool:
@@ -201,7 +205,8 @@ def causality(recording: Recording) -> Causality:
     few long ones hold other frequencies than those beside them, predictions of both signals fail
     together there, and what they leave is correlated.  Of a force that repeats but for noise what
     does not repeat must answer to what the position does not repeat: a controller's does, noise of
-    a sensor of force, past which the position knows what was commanded, does not.
+    a sensor of force, past which the position knows what was commanded, does not.  What is feedback
+    after that is asked once more beside the force's own far past.
 
     Parameters
     ----------
@@ -223,7 +228,12 @@ def causality(recording: Recording) -> Causality:
         rest = [_unrepeated(signal, found) for signal in signals]
         again = _causality(rest[0], rest[1], stretches=10)
     milder = again is not None and again.doubt < first.doubt
-    return again if again and milder and not (again.swapped or again.opposite) else first
+    if again and milder and not (again.swapped or again.opposite):
+        return again
+    if first.relay or not first.has_feedback:
+        return first
+    beside = _causality(*signals, stretches=10, remembered=True)
+    return replace(first, far_past=not beside.has_feedback)
 
 
 def _unrepeated(signal: Floats, found: Repetition) -> Floats:
@@ -232,16 +242,18 @@ def _unrepeated(signal: Floats, found: Repetition) -> Floats:
     return np.asarray((periods - periods.mean(axis=0)).ravel())
 
 
-def _causality(force: Floats, position: Floats, stretches: int) -> Causality:
+def _causality(
+    force: Floats, position: Floats, stretches: int, remembered: bool = False
+) -> Causality:
     most_samples = 60_000
     start = max(0, (len(force) - most_samples) // 2)
     force, position = (signal[start : start + most_samples] for signal in (force, position))
     at_limits = _at_limits(force)
     saturates = float(np.mean(at_limits))
     repeats = find_repetition(force, _SAME, noise=0.0) is not None
-    relay = _is_relay(force, position) or (not repeats and is_switched(force, position))
+    relay = is_relay(force, position) or (not repeats and is_switched(force, position))
     left_out = at_limits if 0 < saturates < _MOST_AT_LIMIT else None
-    of_force = predict(force, position, left_out, stretches)
+    of_force = predict(force, position, left_out, stretches, remembered)
     of_position = predict(position, force, stretches=stretches)
     return Causality(
         feedback=tuple(of_force.past(floor) for _, _, floor in _LADDER),
@@ -277,24 +289,3 @@ def _at_limits(force: Floats) -> Bools:
 def _roughness(signal: Floats) -> float:
     """Power of the increments over that of the signal: 2 for white noise."""
     return float(np.var(np.diff(signal)) / np.var(signal))
-
-
-def _is_relay(force: Floats, position: Floats) -> bool:
-    """A force of two levels that opposes the position, taken from zero or from its middle."""
-    low, high = force.min(), force.max()
-    near = 1e-6 * (high - low)
-    if not np.all((force - low <= near) | (high - force <= near)):
-        return False
-    pushes_up = force > (low + high) / 2
-    if not 0.2 < np.mean(pushes_up) < 0.8:
-        return False
-    levels = (0.0, float(np.median(position)), float((position.min() + position.max()) / 2))
-    for level in levels:
-        # Close to the level counts, noise and a hysteresis decide.
-        away = np.abs(position - level)
-        clear = away > np.quantile(away, 0.2)
-        for lag in range(3):
-            sides = (pushes_up == np.roll(position < level, lag))[clear & np.roll(clear, lag)]
-            if np.mean(sides) > 0.99:
-                return True
-    return False

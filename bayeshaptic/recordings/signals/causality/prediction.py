@@ -17,6 +17,8 @@ from bayeshaptic.types import Bools, Floats, Ints
 # The other signal by differences over wider and wider spans: each coefficient more costs a share of
 # 1/samples of what can be seen.
 _SPANS = (1, 2, 3, 5, 8, 13, 21, 34, 55, 89)
+# Samples after which sums of the signal's own past forget it.
+_MEMORIES = (32, 64, 128, 256, 512, 1024)
 _BLOCKS = 40  # of samples, each a vote in the z of what is removed
 # Relative ridge, far below the floor, which keeps the normal equations of such signals solvable.
 _RIDGE = 1e-9
@@ -123,7 +125,11 @@ class Prediction:
 
 
 def predict(
-    target: Floats, other: Floats, left_out: Bools | None = None, stretches: int = 10
+    target: Floats,
+    other: Floats,
+    left_out: Bools | None = None,
+    stretches: int = 10,
+    remembered: bool = False,
 ) -> Prediction:
     """Predict each increment of `target` from the past of both signals.
 
@@ -135,12 +141,14 @@ def predict(
         Samples of the target that are not to be predicted, such as those at a limit.
     stretches : int
         Coefficients are from every second of so many.
+    remembered : bool
+        Whether the target's far past may predict it, too: sums that forget it slowly.
 
     Returns
     -------
     Prediction
     """
-    rows, columns, own = _regressors(target, other, left_out)
+    rows, columns, own = _regressors(target, other, left_out, remembered)
     wanted = _scaled(target[rows] - target[rows - 1])
     beside = np.stack([other[rows + lead] - other[rows - 1] for lead in _LEADS], axis=1)
     beside = (beside - beside.mean(axis=0)) / max(float(beside[:, -1].std()), _TINY)
@@ -165,7 +173,7 @@ def predict(
 
 
 def _regressors(
-    target: Floats, other: Floats, left_out: Bools | None
+    target: Floats, other: Floats, left_out: Bools | None, remembered: bool
 ) -> tuple[np.ndarray, Floats, int]:
     """Rows to predict, the columns that may predict them, and how many are of the target itself."""
     samples = len(target)
@@ -179,11 +187,21 @@ def _regressors(
     summed = np.cumsum(other - other.mean())
     own = [np.linspace(-1, 1, len(rows)), target[before]]
     own += [steps[before - lag] for lag in range(1, lags + 1)]
+    own += [memory[before] for memory in _memories(target)] if remembered else []
     theirs = [other[before], summed[before]]
     theirs += [other[before] - other[before - span] for span in spans]
     columns = np.column_stack([_scaled(column) for column in (*own, *theirs)])
     columns = np.column_stack([np.ones(len(rows)), columns])
     return rows, columns, len(own) + 1
+
+
+def _memories(signal: Floats) -> list[Floats]:
+    """What a signal was long ago: sums that forget it more and more slowly."""
+    from scipy.signal import lfilter
+
+    centred = signal - signal.mean()
+    kept = [np.exp(-1 / samples) for samples in _MEMORIES if samples <= len(signal) / 20]
+    return [np.asarray(lfilter([1.0], [1.0, -keep], centred)) for keep in kept]
 
 
 def _scaled(signal: Floats) -> Floats:
