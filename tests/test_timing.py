@@ -147,3 +147,34 @@ def test_a_force_of_two_levels_is_put_back_between_them() -> None:
     found = recording_from_arrays(held[kept], position[kept], time=EVEN[kept]).force
     assert np.abs(found).max() <= 1
     assert np.std((found - held)[lost]) < 0.3
+
+
+@pytest.mark.parametrize("later_s", [3000.0, 20000.0])
+def test_stamps_of_single_precision_are_an_even_clock(later_s: float) -> None:
+    stamps = np.float32(later_s + 1e-3 * np.arange(12_000))
+    found = sampling_period(stamps.astype(float))
+    assert found.period_s == pytest.approx(1e-3, rel=1e-6)
+    assert found.jitter == 0.0 and not found.notices
+
+
+def test_a_gap_in_stamps_of_single_precision_is_seen() -> None:
+    index = np.arange(12_000)
+    index[6_000:] += 3
+    stamps = np.float32(3000.0 + 1e-3 * index).astype(float)
+    found = sampling_period(stamps)
+    assert found.rows is not None and found.rows[-1] == index[-1]
+
+
+@pytest.mark.parametrize("often", [2, 5])
+def test_rows_that_are_written_several_times_are_read_once(often: int) -> None:
+    rng = np.random.default_rng(3)
+    force, position = rng.standard_normal(2000), np.round(50 * rng.standard_normal(2000)) / 50
+    twice = [np.repeat(one, often)[1:] for one in (force, position)]
+    found = recording_from_arrays(*twice, period_s=1e-3 / often)
+    assert found.period_s == pytest.approx(1e-3)
+    # The first row is the last of its kind.
+    assert np.array_equal(found.force[-1990:], force[-1990:])
+    assert np.array_equal(found.position[-1990:], position[-1990:])
+    assert any(f"stands {often} times" in notice.text for notice in found.notices)
+    held = recording_from_arrays(twice[0], rng.standard_normal(len(twice[0])), period_s=1e-3)
+    assert held.samples == len(twice[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.runs import written_each
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped
 from bayeshaptic.recordings.units import choose_units
@@ -80,6 +83,12 @@ def recording_from_arrays(
 
         force, position, followed = put_back(force, position, followed, timing.rows, where)
     notices += timing.notices
+    often, first = written_each((force, position))
+    if often > 1:
+        force, position = (signal[first % often :: often] for signal in (force, position))
+        followed = None if followed is None else followed[first % often :: often]
+        timing = replace(timing, period_s=often * timing.period_s)
+        notices += (_written_each(often, timing.period_s),)
     if force_unit is None and position_unit is None:
         text = (
             f"No units were given: the force is taken to be in {unit_of_force}, the position in "
@@ -99,6 +108,15 @@ def recording_from_arrays(
         notices=notices,
         reference=followed,
     )
+
+
+def _written_each(often: int, period_s: float) -> Notice:
+    text = (
+        f"Every row stands {often} times in a row, as where a log is faster than the loop: one of "
+        f"each was read, and the loop's period is taken to be {quantity(period_s, 's')}. Say "
+        "otherwise with --period-s, which is that of a row."
+    )
+    return Notice("note", "time stamps", text)
 
 
 def _refuse_lengths(where: str, **signals: Floats | None) -> None:

@@ -113,7 +113,7 @@ def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
     if len(bad):
         raise InputError(f"{where}: the time in row {bad[0] + 1} is {time_s[bad[0]]}")
     slope, scatter = _clock(time_s)
-    if slope > 0 and scatter <= 0.75 * _rounding(time_s):
+    if slope > 0 and scatter <= max(0.75 * _rounding(time_s), 0.6 * _grid(time_s, slope)):
         return Timing(slope, 0.0)
     steps = np.diff(time_s)
     period = float(np.median(steps))
@@ -173,6 +173,27 @@ def _rounding(time_s: NDArray[np.float64]) -> float:
         if tolerance < 0.05 and np.abs(scaled - np.round(scaled)).max() < tolerance:
             return float(10.0**-digits)
     return 0.0
+
+
+def _grid(time_s: NDArray[np.float64], slope: float) -> float:
+    """What stamps of few digits, as of single precision, were rounded to; zero where to nothing.
+
+    Steps then have two to four lengths, one grid apart.  A grid as long as the period is that of
+    every clock, of which gaps are multiples.
+    """
+    steps = np.sort(np.diff(time_s))
+    jumps = np.diff(steps)
+    apart = float(jumps.max())
+    edges = np.flatnonzero(jumps > 0.5 * apart)
+    groups = np.split(steps, edges + 1)
+    middles = np.diff([np.mean(group) for group in groups])
+    tight = max(float(np.ptp(group)) for group in groups) < 0.2 * apart
+    even = np.all(np.abs(middles / apart - 1) < 0.2)
+    # Gaps are of few steps.
+    often = 2 <= len(groups) <= 4 and min(map(len, groups)) > 0.02 * len(steps)
+    if steps[0] < 0 or not (often and tight and even) or 0.6 < apart / slope < 1.2:
+        return 0.0
+    return float(np.mean(middles))
 
 
 def _gaps(time_s: NDArray[np.float64], period: float) -> NDArray[np.intp]:
