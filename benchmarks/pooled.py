@@ -19,6 +19,7 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
+from bayeshaptic.inference.time_domain.white_force import in_white_force
 from bayeshaptic.inference.time_domain.widths import FREEDOM
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
@@ -95,18 +96,19 @@ def of_steps(count: int) -> None:
     from scipy.stats import t as student
 
     reach = student.ppf(0.95, FREEDOM)
-    inside, held, widths, seconds = [], [], [], 0.0
+    inside, held, widths, white, seconds = [], [], [], 0, 0.0
     for seed in range(count):
         recording, truth = steps(seed)
         began = time.process_time()
-        found = fit_motion(recording)
+        found = in_white_force(fit_motion(recording), recording)
+        white += found.disturbed is not None
         seconds += time.process_time() - began
         inside.append(np.abs(found.values - truth) < reach * found.sd)
         limits = limit_draws(truth, found.values, found.covariance, seed)
         low, high = np.quantile(limits[1:], [0.05, 0.95])
         held.append(low < limits[0] < high)
         widths.append(20 * np.log10(high / low))
-    print(f"{count} series of four steps, {seconds / count:.2f} s of CPU time each")
+    print(f"{count} series of four steps, {seconds / count:.2f} s of CPU time each, {white} white")
     for name, share in zip(NAMES, np.mean(inside, axis=0), strict=True):
         print(f"{name:8s} 90 % interval holds the truth in {100 * share:.0f} %")
     print(f"K_CR     {100 * np.mean(held):.0f} %, median width {np.median(widths):.2g} dB")

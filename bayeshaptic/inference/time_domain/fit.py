@@ -11,6 +11,7 @@ noise does not explain.
 
 Errors have equal weights on purpose.  Weights by the residual's own spectrum hand friction over to
 the noise where the remaining force depends on position and direction: such a force is in the model.
+Where a white force is all that remains, `white_force` weighs them better.
 """
 
 from __future__ import annotations

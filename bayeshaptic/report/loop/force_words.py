@@ -124,9 +124,9 @@ def motion(analysis: Analysis) -> str:
     worth_naming = 1e-4  # of the force
     if (disturbed := found.motion.disturbed) is not None:
         text += (
-            f" What is left is as a white force of {quantity(disturbed.force_sd, force)} rms and "
-            f"noise of {quantity(disturbed.position_sd, unit)} rms in the position leave it; every "
-            "sample is weighed accordingly (the innovations of a Kalman filter)."
+            f" What is left looks like a white force of {quantity(disturbed.force_sd, force)} rms "
+            f"and noise of {quantity(disturbed.position_sd, unit)} rms in the position; every "
+            "sample is weighed accordingly (by the innovations of a Kalman filter)."
         )
     elif found.motion.uneven_rms > worth_naming * rms:
         text += (
