@@ -26,9 +26,10 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
-_SIZES = 10.0 ** np.arange(-6.0, 0.1, 0.25)  # of the command, that a white force may have
-_NEAR = 10.0 ** np.linspace(-0.2, 0.2, 5)  # of the size that was found last
-_SETTLES = 4  # looks at which samples are clear, and how large the disturbance is in these
+_SIZES = 10.0 ** np.arange(-6.0, 0.1, 0.4)  # of the command, that a white force may have
+# Decades either side of the size that was found last: looks at which samples are clear, and how
+# large the disturbance is in these.
+_CLOSER = (0.2, 0.05, 0.012, 0.003)
 _ROUNDS = 2  # fits, each with the filter of the last
 _LAGS = 20  # samples
 _RARE = 1e-3  # how often chance is told from white noise by a test
@@ -85,7 +86,7 @@ def _in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
         if not _like_noise(whitened, values):
             return motion
         found = descend(whitened, values, recording.name)
-        tried, values = disturbed.force_sd * _NEAR, found.inside
+        tried, values = _around(disturbed.force_sd, _CLOSER[0]), found.inside
     if not (found.converged and _agree(motion, found)):
         return motion
     shared = len(NAMES)
@@ -110,6 +111,10 @@ def _usual(loop: MassInLoop) -> Disturbance:
     return Disturbance(0.0, unit / np.sqrt(12))
 
 
+def _around(size: float, decades: float) -> Floats:
+    return np.asarray(size * 10.0 ** np.linspace(-decades, decades, 5))
+
+
 def _whitened(loop: MassInLoop, filtered: Innovations) -> WhitenedLoop:
     kept = {name: getattr(loop, name) for name in loop.__dataclass_fields__}
     return WhitenedLoop(**kept, filtered=filtered)
@@ -128,7 +133,7 @@ def _disturbance(
     beside = values, loop.follower, np.concatenate(velocity), loop.pieces
     clear = np.ones(len(error), dtype=bool)
     position_sd = disturbed.position_sd
-    for _ in range(_SETTLES):
+    for decades in _CLOSER:
         lacks = []
         for force_sd in tried:
             sizes = Disturbance(float(force_sd), position_sd)
@@ -140,7 +145,7 @@ def _disturbance(
         _, force_sd, power, filtered = min(lacks, key=lambda one: one[0])
         # A common factor of both sizes, and of what friction is beside them.
         position_sd *= np.sqrt(power)
-        tried = force_sd * np.sqrt(power) * _NEAR
+        tried = _around(force_sd * np.sqrt(power), decades)
         clear = filtered.clear
     best = Disturbance(force_sd * float(np.sqrt(power)), float(position_sd))
     return best, innovations(*beside, best, loop.period_s)
