@@ -33,6 +33,8 @@ _CLOSER = (0.2, 0.05, 0.012, 0.003)
 _ROUNDS = 2  # fits, each with the filter of the last
 _LAGS = 20  # samples
 _RARE = 1e-3  # how often chance is told from white noise by a test
+_MOSTLY = 0.5  # of the time, for which the sign of friction must be clear
+_ALIKE = 0.1  # of a variance: no less is allowed for between estimates that know as much
 
 
 @dataclass(frozen=True)
@@ -59,10 +61,10 @@ class WhitenedLoop(MassInLoop):
 
 
 def in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
-    """Fitted to its innovations where they are white; else as it was.
+    """The motion fitted to its innovations where these are white, else as it was.
 
-    Where it is fitted anew, values and covariances are those of the innovations, and everything
-    else (what the errors are, the force along the way) remains.
+    Where it is fitted anew, values and covariances are those that the innovations give; the errors
+    and the force along the way remain those of equal weights.
 
     Parameters
     ----------
@@ -171,7 +173,7 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
 
     assert loop.filtered is not None
     clear = loop.filtered.clear
-    if np.mean(clear) < 0.5:
+    if np.mean(clear) < _MOSTLY:
         return False
     waves = np.zeros(2 * WAVES)
     error = loop.error(values, waves)
@@ -196,6 +198,6 @@ def _agree(motion: MotionFit, found: Descended) -> bool:
     """Whether the values are no further apart than their variances are (Hausman)."""
     shared = len(NAMES)
     variance = motion.sd**2 - np.diag(found.covariance)[:shared]
-    least = 0.1 * motion.sd**2
+    least = _ALIKE * motion.sd**2
     apart = np.abs(found.values[:shared] - motion.values)
     return bool(np.all(apart < SURELY * np.sqrt(np.maximum(variance, least))))
