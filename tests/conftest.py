@@ -12,6 +12,8 @@ from bayeshaptic.threads import one_thread_from_the_start
 
 one_thread_from_the_start()
 os.environ.setdefault("MPLBACKEND", "Agg")
+# Processes of tests are started as users start them: unbuffered, they hide what a pipe cannot do.
+os.environ.pop("PYTHONUNBUFFERED", None)
 
 MEASURED = Path(
     os.environ.get("BAYESHAPTIC_MEASURED", Path(__file__).parents[2] / "shared" / "measured")

@@ -195,6 +195,15 @@ def test_every_format(tmp_path: Path, name: str) -> None:
     assert (recording.force_unit, recording.position_unit) == ("N", "m")
 
 
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_process_apart_reads_whatever_its_output_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unbuffered: str
+) -> None:
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
+    WRITERS["a.mat"](tmp_path / "a.mat")
+    assert_is_the_recording(read_recording(tmp_path / "a.mat", mapping_of("a.mat")))
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_an_array_that_is_not_there(tmp_path: Path, name: str) -> None:
     WRITERS[name](tmp_path / name)

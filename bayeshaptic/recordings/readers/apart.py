@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import IO
 
 import numpy as np
@@ -77,9 +78,12 @@ def write_arrays(reader: Reader, path: Path, seconds: int) -> None:
         for name, values in arrays.items():
             names.setdefault(id(values), []).append(name)
         out.write(json.dumps(list(names.values())).encode() + b"\n")
+        # NumPy asks a file where it stands, which a pipe does not know: one that can only be
+        # written to is not asked.
+        pipe = SimpleNamespace(write=out.write)
         for same in names.values():
             values = np.ascontiguousarray(arrays[same[0]])
-            np.lib.format.write_array(out, values, allow_pickle=False)
+            np.lib.format.write_array(pipe, values, allow_pickle=False)  # type: ignore[arg-type]
         out.flush()
     except (InputError, MemoryError) as error:
         what = str(error) if isinstance(error, InputError) else f"{path}: too large to be read"
