@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import _thread
 import argparse
+import io
 import os
 import re
 import signal
@@ -84,6 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; never a traceback unless asked for."""
     one_thread_from_the_start()
     collect_garbage_rarely()
+    _write_what_can_be()
     parser = build_parser()
     arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
     if not hasattr(arguments, "run"):
@@ -110,6 +112,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             "the output of the same command and --debug"
         )
         return 1
+
+
+def _write_what_can_be() -> None:
+    """Have terminals that lack a sign (µ, a bar of a picture) show another one in its place."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 class _Stopped(BaseException):

@@ -708,3 +708,14 @@ def test_simulate_from_a_posterior_and_from_its_priors(run: Run, tmp_path: Path)
 def test_effects_are_parsed() -> None:
     assert parse_effect("reflex") == ("reflex", {})
     assert parse_effect("a=x:1.5,y:-2e-3") == ("a", {"x": 1.5, "y": -2e-3})
+
+
+def test_a_terminal_that_lacks_a_sign_shows_another(phantom: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "bayeshaptic", "inspect", str(phantom)],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"position" in done.stdout and b"?" in done.stdout
