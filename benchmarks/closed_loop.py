@@ -130,10 +130,11 @@ class Along:
         return np.asarray(np.sum(self.height[which] * np.sin(at), axis=-1))
 
 
-def make(seed: int, noise: float | None = None) -> Case:
+def make(seed: int, noise: float | None = None, along_too: bool = False) -> Case:
     """One recording; controllers and references in turn.
 
-    With `noise` there is a white force, as a share of the command's size, and none along the way.
+    With `noise` there is a white force, as a share of the command's size, and none along the way
+    unless `along_too`.
     """
     rng = np.random.default_rng(seed)
     controller = CONTROLLERS[seed % 5]
@@ -148,7 +149,7 @@ def make(seed: int, noise: float | None = None) -> Case:
     uneven = 0.0 if rng.uniform() < 0.3 else rng.uniform(0.01, 0.06) * size
     white = np.zeros(len(wanted))
     if noise is not None:
-        uneven = 0.0
+        uneven = uneven if along_too else 0.0
         white = noise * size * np.random.default_rng([seed, 1]).standard_normal(len(wanted))
     offset = rng.uniform(-0.1, 0.1) * size
     apart = rng.uniform(-0.3, 0.3) * dry if uneven else 0.0
@@ -296,12 +297,12 @@ def main(count: int) -> None:
         )
 
 
-def beside_the_bound(count: int, noise: float) -> None:
+def beside_the_bound(count: int, noise: float, along_too: bool = False) -> None:
     """Print how wide posteriors are, and errors, beside the Cramer-Rao bound."""
     widths, errors, inside, white = [], [], [], []
     reach = student.ppf(0.95, FREEDOM)
     for seed in range(1000, 1000 + count):
-        case = make(seed, noise)
+        case = make(seed, noise, along_too)
         try:
             found = in_white_force(fit_motion(case.recording), case.recording)
         except InputError as error:
@@ -313,7 +314,8 @@ def beside_the_bound(count: int, noise: float) -> None:
         inside.append(np.abs(found.values - case.truth) < reach * found.sd)
         white.append(found.disturbed is not None)
     known = np.array(white)
-    print(f"a white force of {100 * noise:g} % of the command, {len(widths)} recordings:")
+    beside = ", and one along the way in seven of ten" if along_too else ""
+    print(f"a white force of {100 * noise:g} % of the command{beside}, {len(widths)} recordings:")
     for what, some in (("all", known | True), ("told to be white", known)):
         middles = (np.nanmedian(np.array(one)[some], axis=0) for one in (widths, errors))
         held = np.mean(np.array(inside)[some], axis=0)
@@ -329,3 +331,4 @@ if __name__ == "__main__":
     main(asked)
     for share in (0.003, 0.01, 0.03):
         beside_the_bound(asked // 4, share)
+    beside_the_bound(asked // 2, 0.01, along_too=True)

@@ -1,7 +1,7 @@
 """How often feedback is missed, and how often a good open-loop recording is taken for it.
 
     python -m benchmarks.door [--each 360] [--part 0 --of 1] [--keep LINES] [--replay]
-        [--trapezoids]
+        [--trapezoids] [--bands]
     python -m benchmarks.door --show LINES...
 
 Open loops and closed ones of random devices (`recordings/door.py`), judged as `check_recording`
@@ -29,7 +29,14 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import causality
 from bayeshaptic.recordings.signals.controller import share_by_a_law
 from bayeshaptic.rig import simulate
-from benchmarks.recordings.door import TRAPEZOIDS, Case, closed_case, open_case, written_down
+from benchmarks.recordings.door import (
+    TRAPEZOIDS,
+    Case,
+    band_case,
+    closed_case,
+    open_case,
+    written_down,
+)
 
 WEIGHTS = (10.0, 100.0)
 VERDICTS = ("feedback", "undecided", "open loop")
@@ -44,7 +51,11 @@ def main() -> None:
     parser.add_argument("--replay", action="store_true", help="K_CR of what was missed")
     parser.add_argument("--trapezoids", action="store_true", help="closed loops that follow them")
     parser.add_argument("--show", type=Path, nargs="+", help="tables of such files, no new ones")
+    parser.add_argument("--bands", action="store_true", help="noise of a band, taken for feedback?")
     options = parser.parse_args()
+    if options.bands:
+        bands(options.each)
+        return
     if options.show:
         lines = [json.loads(line) for path in options.show for line in path.open()]
     else:
@@ -53,6 +64,18 @@ def main() -> None:
         print(f"\n{name}\n")
         show(table.items())
     replays(lines)
+
+
+def bands(count: int) -> None:
+    """How often the force's own far past says what looks like feedback, in open loop and closed."""
+    for what, case in (("open loops under noise of a band", band_case), ("closed", closed_case)):
+        found = [causality(case(seed).recording) for seed in range(count)]
+        seen = [one for one in found if one.has_feedback]
+        far, doubtful = sum(one.far_past for one in seen), sum(one.doubtful for one in found)
+        print(
+            f"{count} {what}: {len(seen)} called feedback, {far} of which the far past says as "
+            f"well; {doubtful} undecided"
+        )
 
 
 def made(options: argparse.Namespace) -> Iterable[dict[str, Any]]:

@@ -294,9 +294,7 @@ def _other_valleys(phi: Floats, cost: Floats) -> Floats:
     Points of one valley differ little in their cost.
     """
     order = np.argsort(cost)
-    step = cost[order][1:] > (1 + _ONE_VALLEY) * cost[order][:-1]
-    valley = np.concatenate([[0], np.cumsum(step)])
+    valley = np.append(0, np.cumsum(cost[order][1:] > (1 + _ONE_VALLEY) * cost[order][:-1]))
     _, first, size = np.unique(valley, return_index=True, return_counts=True)
-    largest = 1 + np.argsort(-size[1:], kind="stable")
-    kept = [i for i in largest if size[i] > 1][:_OTHER_VALLEYS]
+    kept = [i for i in 1 + np.argsort(-size[1:], kind="stable") if size[i] > 1][:_OTHER_VALLEYS]
     return phi[order[first[kept]]]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import butter, sosfilt
 
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
@@ -76,6 +77,27 @@ def open_case(seed: int) -> Case:
             break
     recording = written_down(made.force, made.position, bench, logged)
     return Case(False, kind, "", logged, device, friction, 0.0, recording, bench)
+
+
+def band_case(seed: int) -> Case:
+    """An open-loop recording of a random device under noise that was band-passed.
+
+    From 0.002 to 0.02 of the sampling rate on, up to 0.2 to 0.45 of it.
+    """
+    rng = np.random.default_rng((4, seed))
+    while True:
+        bench, device, friction = _bench(rng)
+        samples = round(float(np.exp(rng.uniform(np.log(8.0), np.log(30.0)))) / bench.period_s)
+        low, high = float(10 ** rng.uniform(-2.7, -1.7)), float(rng.uniform(0.2, 0.45))
+        order = int(rng.choice([1, 2, 2, 4]))
+        edges = butter(order, [2 * low, 2 * high], "band", output="sos")
+        noise = sosfilt(edges, rng.standard_normal(samples))
+        force = bench.force_rms * noise / noise.std()
+        made = simulate(bench, force, seed=int(rng.integers(1e9)))
+        if np.ptp(made.position) > _FEWEST_COUNTS * bench.encoder_resolution:
+            break
+    recording = written_down(made.force, made.position, bench, LOGGED[0])
+    return Case(False, "band", "", LOGGED[0], device, friction, 0.0, recording, bench)
 
 
 def closed_case(seed: int, reference: str | None = None) -> Case:
