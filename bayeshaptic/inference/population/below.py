@@ -19,6 +19,7 @@ class Below:
     Attributes
     ----------
     level : Hyperparameters
+        The hyperparameters below which the draws lie, n of them.
     beta : ndarray, shape (n, q)
         Mean hand, then the device in each configuration; in the coordinates of the study, with the
         prior's mean added.
@@ -38,19 +39,28 @@ def draw_below(
     rng: np.random.Generator,
     spike: Floats | None = None,
 ) -> Below:
-    """One draw below each vector phi of shape (n, Q).
+    """Draw device, people and recordings once below each vector of hyperparameters.
 
-    A damper that the device does not have is in none of the recordings of that configuration.
+    A damper that the device does not have, because its draw is at the wall, is at the wall in all
+    recordings of that configuration, too.
 
     Parameters
     ----------
     hierarchy : Hierarchy
     phi : ndarray, shape (n, Q)
+        Draws of the hyperparameters.
     walls : ndarray, shape (D,)
         Lowest value of each coordinate of the mean; -inf where there is none.
     rng : numpy.random.Generator
     spike : ndarray, shape (D,), optional
-        Standard deviations of what all recordings know that weigh as much as the wall itself does.
+        How much the wall itself weighs: as much as so many of the standard deviations with which
+        all recordings together know the coordinate.  By default the wall has no weight.
+
+    Returns
+    -------
+    Below
+        Drawn by conditioning a draw of prior and noise on what was seen (Matheron's rule; A. G.
+        Journel, C. J. Huijbregts, "Mining Geostatistics", Academic Press 1978).
     """
     spike = np.zeros(len(walls)) if spike is None else spike
     chunk = 256
@@ -65,6 +75,7 @@ def draw_below(
 def _draw(
     hierarchy: Hierarchy, phi: Floats, walls: Floats, rng: np.random.Generator, spike: Floats
 ) -> tuple[Floats, Floats]:
+    """`Below.beta` and `Below.recordings` for a part of the vectors phi, shape (b, Q)."""
     given = hierarchy.given(phi)
     order = np.concatenate([hierarchy.hand, *[hierarchy.device] * (int(hierarchy.place.max()) + 1)])
     low = (walls - hierarchy.prior_mean)[order]
@@ -86,7 +97,19 @@ def _draw(
 
 
 def _at_walls(x: Floats, at_wall: Bools, low: Floats, given: Conditionals) -> Floats:
-    """Recordings with those coordinates at their walls, shape (B, R, D), the others given them."""
+    """Recordings with some coordinates moved to their walls, the others conditioned on that.
+
+    Parameters
+    ----------
+    x : ndarray, shape (B, R, D)
+        Coordinates of every recording, less the prior's mean.
+    at_wall : ndarray of bool, shape (B, R, D)
+        Which of them are at their walls.
+    low : ndarray, shape (D,)
+        The walls, less the prior's mean.
+    given : Conditionals
+        What the recordings say below the same hyperparameters.
+    """
     spread = given.spread[:, None, :]
     left = -spread[..., None] * given.weight * spread[:, :, None, :]
     left += spread[..., None] * np.eye(x.shape[2])  # covariance about the levels, (B, R, D, D)

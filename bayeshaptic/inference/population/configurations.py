@@ -34,6 +34,7 @@ class Configurations:
     measured : ndarray, shape (C,)
         Coordinates that were measured, in order, each once.
     model : Model
+        The model that all recordings were fitted with, P parameters.
     chains : LevelChains
         Of the amplitudes, the scatters and the length.
     notices : tuple of Notice
@@ -47,16 +48,42 @@ class Configurations:
     _here: Coordinates | None = field(default=None, repr=False)
 
     def grid(self, points: int) -> Floats:
-        """At least `points` coordinates between the outermost measured ones, these among them."""
+        """Coordinates from the lowest measured one to the highest, all measured ones among them.
+
+        Parameters
+        ----------
+        points : int
+            How many there would be, evenly spaced.  Those that lie near a measured coordinate make
+            room for it.
+
+        Returns
+        -------
+        ndarray, shape (G,)
+            In order, nearly `points` of them.
+        """
         even = np.linspace(self.measured[0], self.measured[-1], points)
         gap = np.ptp(self.measured) / (points - 1)
         near = np.abs(even[:, None] - self.measured).min(axis=1) < 0.4 * gap
         return np.sort(np.concatenate([even[~near], self.measured]))
 
     def predict(self, coordinate: Floats, rng: np.random.Generator, count: int) -> Floats:
-        """Parameters along `coordinate` (G,), `count` joint draws of them: (count, G, P).
+        """Draw the parameters along the coordinate, jointly for all its values.
 
-        Natural values in the order of `model.names`.
+        Paths on which a damper would be negative are thrown away.  Where fewer than one in five
+        are left, they are mirrored at zero instead.
+
+        Parameters
+        ----------
+        coordinate : ndarray, shape (G,)
+            Where to predict, in the unit of `measured`.
+        rng : numpy.random.Generator
+        count : int
+            Number of draws.
+
+        Returns
+        -------
+        ndarray, shape (count, G, P)
+            Natural values in the order of `model.names`.
         """
         assert self._path is not None and self._here is not None
         low = self._here.lowest
@@ -89,7 +116,7 @@ def infer_configurations(
     posteriors : sequence of Posterior
         One a recording, of models with the same parameters.
     coordinate : sequence of float
-        Of each recording.
+        Of each recording, in any unit.
     seed : int
     progress : callable, optional
         Called with the share done and a word about it.
@@ -101,7 +128,8 @@ def infer_configurations(
     Raises
     ------
     InputError
-        With fewer than three different configurations, or different models.
+        With fewer than three different configurations, another number of coordinates than of
+        posteriors, or posteriors of models with different parameters.
     """
     report = progress or silent
     measured = np.unique(np.asarray(coordinate, float))

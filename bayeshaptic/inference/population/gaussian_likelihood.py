@@ -30,9 +30,11 @@ class GaussianLikelihood:
     Attributes
     ----------
     mean : ndarray, shape (D,)
-        In the coordinates of the study.
+        The peak, in the coordinates of the study.
     precision, covariance : ndarray, shape (D, D)
+        Curvature of the logarithm at the peak, and its inverse.
     constant : float
+        Log likelihood at the peak.
     """
 
     mean: Floats
@@ -47,7 +49,19 @@ class GaussianLikelihood:
 
 
 def gaussian_likelihood(posterior: Posterior, here: Coordinates) -> GaussianLikelihood:
-    """The likelihood of a recording, described over the draws of its own posterior."""
+    """The likelihood of a recording, described over the draws of its own posterior.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Of the recording.  Of many draws 5,000 are looked at.
+    here : Coordinates
+        The coordinates of the study.
+
+    Returns
+    -------
+    GaussianLikelihood
+    """
     most_points = 5000
     every = -(-len(posterior.draws) // most_points)
     x = here.coordinate(posterior.draws[::every])
@@ -55,7 +69,23 @@ def gaussian_likelihood(posterior: Posterior, here: Coordinates) -> GaussianLike
 
 
 def exact_likelihood(posterior: Posterior, here: Coordinates, x: Floats) -> Floats | None:
-    """Log likelihood at points of shape (B, D), by the model; None without the measurement."""
+    """Log likelihood of a recording by its model, without any description.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Of the recording.
+    here : Coordinates
+        The coordinates of the study.
+    x : ndarray, shape (B, D)
+        Points in these coordinates.
+
+    Returns
+    -------
+    ndarray, shape (B,), or None
+        -inf where the model cannot be evaluated; None where the posterior was saved without its
+        measurement.
+    """
     if posterior.windows is None:
         return None
     with np.errstate(all="ignore"):  # far-away points may overflow: they are refused
@@ -68,15 +98,22 @@ def linearised(
 ) -> GaussianLikelihood | None:
     """The likelihood around one point, with the model linear there.
 
-    None without the measurement, and where there is no such model.  Each window's curvature is
-    exact but for second derivatives of the model, and never negative.
+    Each window's curvature is exact but for second derivatives of the model, and never negative
+    (Gauss-Newton for the likelihood of docs/statistics.md, whose noise is integrated out).
 
     Parameters
     ----------
     posterior : Posterior
+        Of the recording.
     here : Coordinates
+        The coordinates of the study.
     x, step : ndarray, shape (D,)
-        Where, and how far to go for the derivatives.
+        Where, and how far to go to either side for the derivatives.
+
+    Returns
+    -------
+    GaussianLikelihood or None
+        None without the measurement, and where the model cannot be evaluated.
     """
     if posterior.windows is None:
         return None
@@ -104,10 +141,21 @@ def linearised(
 
 
 def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
-    """Fit a quadratic function to the log likelihood of points of shape (B, D), shape (B,).
+    """Fit a quadratic function to a log likelihood over a cloud of points, by least squares.
 
-    Directions that it does not fall off in get next to no curvature, so that the description is a
-    (very wide) distribution.
+    Directions in which the log likelihood does not fall off get next to no curvature, so that the
+    description is a (very wide) distribution.
+
+    Parameters
+    ----------
+    x : ndarray, shape (B, D)
+        The points.
+    log_likelihood : ndarray, shape (B,)
+        The log likelihood at each.
+
+    Returns
+    -------
+    GaussianLikelihood
     """
     middle = x.mean(axis=0)
     values, vectors = np.linalg.eigh(np.cov(x.T))
@@ -136,9 +184,24 @@ def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
 def at_peak(
     x: Floats, gradient: Floats, curvature: Floats, value: float, unit: Floats, least: float
 ) -> GaussianLikelihood:
-    """The quadratic function around `x` written around its peak.
+    """A quadratic function that is known around `x`, written around its peak.
 
-    Its curvature is at least `least` in every direction, with coordinates in units of `unit`.
+    Parameters
+    ----------
+    x, gradient : ndarray, shape (D,)
+        A point, and the slope there.
+    curvature : ndarray, shape (D, D)
+        Negative second derivatives.
+    value : float
+        The function at `x`.
+    unit : ndarray, shape (D,)
+        Units of the coordinates in which `least` is meant.
+    least : float
+        The least curvature that a direction may have; what bends less, or the other way, gets it.
+
+    Returns
+    -------
+    GaussianLikelihood
     """
     bends, axes = np.linalg.eigh(curvature * np.outer(unit, unit))
     bends = np.maximum(bends, least)

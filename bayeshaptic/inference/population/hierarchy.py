@@ -42,7 +42,7 @@ class Hierarchy:
     hand, device : ndarray of int, shape (H,), (D - H,)
         Which coordinates are the hand's and which are the device's.
     prior_mean, prior_sd : ndarray, shape (D,)
-        Of the mean hand and of the device.
+        Of the mean hand and of the device, in the coordinates of the study.
     """
 
     likelihoods: Sequence[GaussianLikelihood] = field(repr=False)
@@ -55,6 +55,7 @@ class Hierarchy:
 
     @cached_property
     def layout(self) -> Unknowns:
+        """Where each hyperparameter stands in phi, Q of them."""
         repeated = len(self.user) > len(np.unique(self.user))
         return Unknowns(len(self.hand), len(self.device), repeated)
 
@@ -65,6 +66,7 @@ class Hierarchy:
 
     @cached_property
     def covariance(self) -> Floats:
+        """Covariances V_r of the likelihoods; shape (R, D, D)."""
         return np.stack([one.covariance for one in self.likelihoods])
 
     @cached_property
@@ -90,12 +92,12 @@ class Hierarchy:
         return np.equal.outer(np.arange(int(self.user.max()) + 1), self.user).astype(float)
 
     def guess(self) -> tuple[Floats, Floats]:
-        """Middle and width of phi by the scatter of the recordings' own estimates."""
+        """Middle and width of phi by the scatter of the recordings' own estimates; (Q,) each."""
         seen = self.mean[:, self.hand].std(axis=0)
         return self.layout.guess(np.clip(seen, *_SCATTER))
 
     def spread(self, level: Hyperparameters) -> Floats:
-        """Diagonal of T, shape (B, D)."""
+        """Diagonal of T for each of B hyperparameters: between trials, or recordings; (B, D)."""
         spread = np.empty((len(level.trial_sd), len(self.prior_mean)))
         spread[:, self.hand] = level.trial_sd[:, None] ** 2
         spread[:, self.device] = level.device_sd**2
@@ -115,7 +117,17 @@ class Hierarchy:
         return value
 
     def expected(self, phi: Floats) -> tuple[Floats, Floats]:
-        """Mean and covariance of recordings' coordinates given one phi, (R, D) and (R, D, D)."""
+        """Mean and covariance of every recording's coordinates, given all recordings.
+
+        Parameters
+        ----------
+        phi : ndarray, shape (Q,)
+            One vector of hyperparameters.
+
+        Returns
+        -------
+        mean, covariance : ndarray, shape (R, D), (R, D, D)
+        """
         given = self.given(phi[None])
         spread = given.spread[0]
         means, covariances = [], []
@@ -128,7 +140,20 @@ class Hierarchy:
         return np.stack(means) + self.prior_mean, np.stack(covariances)
 
     def before(self, given: Conditionals, r: int) -> tuple[Floats, Floats]:
-        """Mean, less the prior's, and covariance of A_r beta + E v_u; shapes (B, D), (B, D, D)."""
+        """Where the levels above recording `r` put it: A_r beta + E v_u, without t_r.
+
+        Parameters
+        ----------
+        given : Conditionals
+            Of B hyperparameters.
+        r : int
+            Index of the recording.
+
+        Returns
+        -------
+        mean, covariance : ndarray, shape (B, D), (B, D, D)
+            The mean is less the prior's.
+        """
         own = given.own_covariance[:, self.user[r]]
         slope = np.tile(self.design[r], (len(own), 1, 1))
         slope[:, self.hand] -= given.gain[:, self.user[r]]
@@ -139,7 +164,16 @@ class Hierarchy:
         return mean, covariance
 
     def given(self, phi: Floats) -> Conditionals:
-        """Everything below the hyperparameters phi of shape (B, Q)."""
+        """Everything below given hyperparameters, integrated in closed form.
+
+        Parameters
+        ----------
+        phi : ndarray, shape (B, Q)
+
+        Returns
+        -------
+        Conditionals
+        """
         level = self.layout.read(phi)
         spread = self.spread(level)
         marginal = self.covariance + spread[:, None, :, None] * np.eye(spread.shape[1])
@@ -181,6 +215,7 @@ class Conditionals:
     Attributes
     ----------
     level : Hyperparameters
+        The hyperparameters by name.
     spread : ndarray, shape (B, D)
         Diagonal of T.
     weight : ndarray, shape (B, R, D, D)
@@ -190,6 +225,7 @@ class Conditionals:
     own_covariance, own_score, gain : ndarray, shape (B, U, H, H), (B, U, H), (B, U, H, q)
         Of v_u given beta: the mean is own_covariance own_score - gain beta.
     log_density : ndarray, shape (B,)
+        Log posterior density of the hyperparameters, up to a constant.
     """
 
     level: Hyperparameters
@@ -203,7 +239,18 @@ class Conditionals:
     log_density: Floats
 
     def draw_people(self, beta: Floats, rng: np.random.Generator) -> Floats:
-        """v_u for beta of shape (B, q); shape (B, U, H)."""
+        """Draw v_u, how far each person's hand is from the mean hand.
+
+        Parameters
+        ----------
+        beta : ndarray, shape (B, q)
+            Mean hand and device, one vector for each of the B hyperparameters.
+        rng : numpy.random.Generator
+
+        Returns
+        -------
+        ndarray, shape (B, U, H)
+        """
         mean = np.einsum("buij,buj->bui", self.own_covariance, self.own_score)
         mean -= np.einsum("buiq,bq->bui", self.gain, beta)
         root = np.linalg.cholesky(self.own_covariance)

@@ -27,15 +27,16 @@ class Hyperparameters:
     Attributes
     ----------
     hand_sd : ndarray, shape (B, H)
-        Over people.
+        Standard deviation of each of the hand's parameters over people, of its logarithm.
     correlation_root : ndarray, shape (B, H, H)
         Lower Cholesky factor of the correlation over people.
     device_sd : ndarray, shape (B, D - H)
-        Between recordings of one device.
+        Standard deviation between recordings of one device, in the coordinates of the study.
     trial_sd : ndarray, shape (B,)
-        Between recordings of one person's hand; 0 where nobody has two.
+        Standard deviation between recordings of one person's hand, the same for all parameters; 0
+        where nobody has two.
     log_prior : ndarray, shape (B,)
-        Density of phi.
+        Log prior density of phi, up to a constant.
     """
 
     hand_sd: Floats
@@ -69,14 +70,16 @@ class Unknowns:
 
     @property
     def pairs(self) -> int:
+        """Number of correlations between the hand's parameters."""
         return self.hand * (self.hand - 1) // 2
 
     @property
     def size(self) -> int:
+        """Q, the number of hyperparameters."""
         return self.hand + self.pairs + self.device + self.trials
 
     def sane(self, phi: Floats) -> NDArray[np.bool_]:
-        """Which vectors stand for covariances that can be inverted, shape (B,)."""
+        """Which vectors phi of shape (B, Q) stand for covariances that can be inverted; (B,)."""
         partial = np.zeros(self.size, bool)
         partial[self.hand : self.hand + self.pairs] = True
         return np.all(
@@ -84,7 +87,7 @@ class Unknowns:
         )
 
     def read(self, phi: Floats) -> Hyperparameters:
-        """The hyperparameters of vectors phi of shape (B, Q)."""
+        """The hyperparameters by name, with their log prior, of vectors phi of shape (B, Q)."""
         ends = np.cumsum([self.hand, self.pairs, self.device])
         log_hand, partial, log_device, log_trial = np.split(phi, ends, axis=1)
         hand, device = np.exp(log_hand), np.exp(log_device)
@@ -99,7 +102,17 @@ class Unknowns:
         return Hyperparameters(hand, root, device, trial, log_prior)
 
     def guess(self, hand_sd: Floats) -> tuple[Floats, Floats]:
-        """A middle and a width of every entry of phi to begin with, where people differ so."""
+        """Where to begin with phi.
+
+        Parameters
+        ----------
+        hand_sd : ndarray, shape (H,)
+            How far people seem to differ, of logarithms.
+
+        Returns
+        -------
+        middle, width : ndarray, shape (Q,)
+        """
         ends = [self.hand, self.pairs, self.device, int(self.trials)]
         ones = [np.zeros(self.pairs), np.full(self.device, -6.5), np.full(1, -3.5)]
         middle: list[Floats] = [np.log(hand_sd), *ones]
@@ -128,6 +141,13 @@ def _correlation(partial: Floats, size: int) -> tuple[Floats, Floats]:
         Inverse hyperbolic tangents, row after row of the lower triangle.
     size : int
         H.
+
+    Returns
+    -------
+    root : ndarray, shape (B, H, H)
+        Lower Cholesky factors.
+    log_prior : ndarray, shape (B,)
+        Up to a constant; the Jacobian of the hyperbolic tangent is in it.
     """
     root = np.zeros((len(partial), size, size))
     root[:, 0, 0] = 1.0

@@ -130,10 +130,22 @@ def infer_population(
 def study_coordinates(model: Model, posteriors: Sequence[Posterior] = ()) -> Coordinates:
     """Coordinates that recordings share: hands always as logarithms, the others by their priors.
 
-    Spreads of a device are shares of its parameters, of what is not a logarithm in units of its
-    prior's width.  The prior of dampers that may be zero is as wide as nobody knows of them: their
-    units are those of a device whose file gives what they are together, in the median of the
-    `posteriors`.
+    The spread of a device between recordings is a share of its parameters.  Of a parameter that is
+    not sampled as a logarithm it is in units of its prior's width.  The prior of dampers that may
+    be zero is too wide for that, so that their unit is the one of a device whose file gives them
+    together: the median over `posteriors` of their sum.
+
+    Parameters
+    ----------
+    model : Model
+        P parameters.
+    posteriors : sequence of Posterior
+        One a recording; without any, units come from the priors alone.
+
+    Returns
+    -------
+    Coordinates
+        As many as parameters: D = P.
     """
     small = [name for name in model.names if isinstance(model.prior(name), MaybeZero)]
     if small and posteriors:
@@ -148,10 +160,19 @@ def study_coordinates(model: Model, posteriors: Sequence[Posterior] = ()) -> Coo
 
 
 def prior_moments(model: Model, here: Coordinates) -> tuple[Floats, Floats]:
-    """Middle and width of the priors in the coordinates `here`; shape (D,) each.
+    """Middle and width of the priors, as if each was normal in the coordinates of the study.
 
     Of a damper that may be zero the wall is the middle: its half-normal is one half of a normal.
     So it is for one of which a single recording believes that it is near zero.
+
+    Parameters
+    ----------
+    model : Model
+    here : Coordinates
+
+    Returns
+    -------
+    mean, sd : ndarray, shape (D,)
     """
     priors = [model.prior(name) for name in model.names]
     low, middle, high = (
@@ -166,7 +187,13 @@ def prior_moments(model: Model, here: Coordinates) -> tuple[Floats, Floats]:
 
 
 def common_model(posteriors: Sequence[Posterior]) -> Model:
-    """The model that all recordings were fitted with; an InputError where there are several."""
+    """The model that all recordings were fitted with.
+
+    Raises
+    ------
+    InputError
+        Without a recording, and where the parameters of two recordings have different names.
+    """
     if not posteriors:
         raise InputError("no recording: a study's levels need at least one.")
     model = posteriors[0].model
@@ -186,7 +213,13 @@ def _hierarchy(
     places: Sequence[float | str | None],
     here: Coordinates,
 ) -> tuple[Hierarchy, tuple[str, ...], tuple[float | str | None, ...]]:
-    """The levels with their first description; users and configurations as they first come."""
+    """The levels with their first description; users and configurations as they first come.
+
+    Raises
+    ------
+    InputError
+        Where there are more or fewer users or configurations than posteriors.
+    """
     if not len(users) == len(places) == len(posteriors):
         raise InputError(
             f"{len(posteriors)} posteriors, but {len(users)} users and {len(places)} "

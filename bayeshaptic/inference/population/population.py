@@ -28,17 +28,20 @@ class Population(Shown):
     parameters : tuple of str
         Names of the hand's parameters, H of them.
     log_mean, log_sd : ndarray, shape (n, H)
-        Of the logarithms over people.
+        Of the logarithms over people, in n draws of the population.
     correlation : ndarray, shape (n, H, H)
         Of the logarithms over people.
     users : tuple of str
     places : tuple
         Configurations that people were measured in; (None,) without.
     model : Model
+        The model that all recordings were fitted with, P parameters.
     recordings : tuple of Reweighted
         Every recording's parameters given all recordings, in the order that they came.
     notices : tuple of Notice
+        What a reader should know: chains that have not converged, recordings left by themselves.
     seconds : float
+        How long it took.
     chains : LevelChains or None
         Of the spreads and correlations, with what it takes to trust them.
     walkers : int
@@ -100,7 +103,7 @@ class Population(Shown):
         return self._below.level.device_sd
 
     def of_user(self, user: str) -> tuple[Reweighted, ...]:
-        """The recordings of one user."""
+        """The recordings of one user, by the name in `users`; none for another name."""
         return tuple(one for one in self.recordings if one.user == user)
 
     def new_person(self, rng: np.random.Generator, each: int = 1, place: int = 0) -> Floats:

@@ -1,7 +1,7 @@
 """Every recording's parameters given the whole study, by its exact likelihood.
 
 Three ways, the cheapest first; all of them lead to the same distribution, the recording's exact
-likelihood times what the others say (`population_cavity`):
+likelihood times what the others say (`cavity.py`):
 
 - draws of the levels, weighed by exact over described likelihood: where the study knows more than
   the recording does, and the description is good;
@@ -84,12 +84,13 @@ def reweight(
     here: Coordinates,
     seed: np.random.SeedSequence,
 ) -> tuple[Reweighted, ...]:
-    """Draws of every recording given the study.
+    """Draws of every recording given the study, in the order of the recordings.
 
     Parameters
     ----------
     posteriors : sequence of Posterior
     users : sequence of str
+        One a recording.
     hierarchy : Hierarchy
     below : Below
         Draws of what lies below the hyperparameters `phi`, shape (n, Q).
@@ -141,6 +142,7 @@ def _one(
     here: Coordinates,
     seed: np.random.SeedSequence,
 ) -> Reweighted:
+    """Recording `r` by the cheapest way that is good enough, else by the best of all three."""
     rng = np.random.default_rng(seed)
     count = len(below.recordings)
     first = _from_levels(posterior, user, r, hierarchy, below, here, rng)
@@ -288,7 +290,7 @@ def _alone(posterior: Posterior, user: str, count: int) -> Reweighted:
 
 
 def inside(x: Floats, here: Coordinates) -> Floats:
-    """Mirrored at the walls, so that no damper is negative."""
+    """Points `x`, shape (n, D), mirrored at the walls, so that no damper is negative."""
     low = here.lowest
     with np.errstate(invalid="ignore"):
         return np.where(x < low, 2 * low - x, x)

@@ -20,10 +20,10 @@ TOLERABLE = 1.02  # R-hat from which chains are not to be used
 
 
 class Level(Protocol):
-    """Hyperparameters with a density, and where to begin with them."""
+    """Hyperparameters with a density, and where to begin with them; Q numbers."""
 
     def log_density(self, phi: Floats) -> Floats:
-        """Log density of vectors of shape (B, Q); shape (B,)."""
+        """Log density of vectors phi of shape (B, Q), up to a constant; shape (B,)."""
 
     def guess(self) -> tuple[Floats, Floats]:
         """A middle and a width of each, shape (Q,)."""
@@ -46,14 +46,25 @@ class LevelChains:
     walkers: tuple[Walkers, ...] = field(default=(), repr=False)
 
     def thinned(self, count: int, rng: np.random.Generator) -> Floats:
-        """`count` draws, shape (count, Q), in random order."""
+        """Draws in random order, shape (count, Q); some come again where there are fewer."""
         flat = self.chains.reshape(-1, self.chains.shape[-1])
         return flat[rng.choice(len(flat), count, replace=len(flat) < count)]
 
     def in_order(self, count: int) -> tuple[Floats, int]:
-        """At most `count` draws, walker after walker, and the number of walkers.
+        """Draws walker after walker, evenly spread over the steps.
 
         Nothing is drawn twice, and how far neighbours are alike can still be seen.
+
+        Parameters
+        ----------
+        count : int
+            The most draws to take; a draw of each walker at least.
+
+        Returns
+        -------
+        draws : ndarray, shape (n, Q)
+        walkers : int
+            Number of chains of equal length that the draws consist of.
         """
         ensembles, steps, walkers, size = self.chains.shape
         kept = max(1, min(steps, count // (ensembles * walkers)))
@@ -67,6 +78,7 @@ class LevelChains:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
+        """A warning where R-hat is too large, else nothing."""
         worst = float(self.diagnostics.rhat.max())
         if worst < RHAT_LIMIT:
             return ()
@@ -92,7 +104,12 @@ def sample_level(
     before : LevelChains, optional
         Chains of nearly the same, to go on from.
     steps : int, optional
-        So many and no more; by default until R-hat is below 1.01 with 500 effective draws.
+        So many and no more; by default until R-hat is below 1.01 with 500 effective draws, or
+        5,000 steps are over.
+
+    Returns
+    -------
+    LevelChains
     """
     density = level.log_density
     if before is None:
@@ -119,8 +136,22 @@ def sample_level(
 def run_ensembles(ensembles: Ensembles, rng: np.random.Generator, ess: float) -> LevelChains:
     """Draws of a few parameters on ridges, from ensembles that are warmed up.
 
-    Their proposal is fitted again until one that is frozen gives `ess` effective draws; or until
-    several times the steps give hardly more of them, where walkers hang that no longer run frees.
+    The proposal is fitted again, up to four times, until a frozen one gives enough effective draws;
+    or until several times the steps give hardly more of them, because walkers hang that no longer
+    run frees.
+
+    Parameters
+    ----------
+    ensembles : Ensembles
+    rng : numpy.random.Generator
+        For the fits of the proposal.
+    ess : float
+        Effective draws to reach, with R-hat below 1.01.
+
+    Returns
+    -------
+    LevelChains
+        Of the last run; whether that is enough its `diagnostics` tell.
     """
     first_steps = 100
     steps = first_steps
@@ -140,6 +171,7 @@ def run_ensembles(ensembles: Ensembles, rng: np.random.Generator, ess: float) ->
 
 
 def _done(diagnostics: Diagnostics) -> bool:
+    """Whether chains of hyperparameters are long enough."""
     return bool(diagnostics.ess >= ESS and diagnostics.rhat.max() < RHAT_LIMIT)
 
 

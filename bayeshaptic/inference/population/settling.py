@@ -23,19 +23,27 @@ _SETTLED = 0.02  # move, in posterior standard deviations, that is none
 def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: Floats) -> L:
     """A study's levels with likelihoods linearised at the expected parameters given `phi`.
 
-    Ridges of one recording are bent and far longer than what the study leaves of them: each
-    expectation is found with the model linear there, in turns (Newton's method, as in an iterated
-    extended Kalman filter), near its own draws, a standard deviation at a time at most, and every
-    second move half as far so that two points cannot take turns.
+    Ridges of one recording are bent, and far longer than what the study leaves of them.  So each
+    likelihood is described where the study expects the recording's parameters, with the model
+    linear there.  That place depends on the descriptions, so both are found in turns (Newton's
+    method, as in an iterated extended Kalman filter; B. M. Bell, F. W. Cathey, IEEE Transactions on
+    Automatic Control 38, 1993).  A place stays near the recording's own draws, and moves by a
+    standard deviation at a time at most.  Every second move is half as far, so that two points
+    cannot take turns.  Eight rounds are made at most.
 
     Parameters
     ----------
     level : Hierarchy or Trend
     posteriors : sequence of Posterior
-        Those without their measurement keep the description that they have.
+        One a recording.  Those without their measurement keep the description that they have.
     here : Coordinates
     phi : ndarray, shape (Q,)
         Hyperparameters.
+
+    Returns
+    -------
+    Hierarchy or Trend
+        `level` with its new descriptions.
     """
     own = [here.coordinate(one.draws) for one in posteriors]
     sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
@@ -61,8 +69,8 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
 def _expected(level: Hierarchy | Trend, phi: Floats, walls: Floats) -> Floats:
     """The expected coordinates of every recording where none is below its wall, shape (R, D).
 
-    Without the walls the point would run off to where there is no device, dampers below zero, and
-    all that goes with them along a ridge would follow.
+    Without the walls the point would run off to where there is no device: to dampers below zero,
+    and all that goes with them along a ridge would follow.
     """
     mean, covariance = level.expected(phi)
     if not np.isfinite(walls).any():

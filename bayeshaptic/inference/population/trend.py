@@ -41,6 +41,7 @@ class Trend:
     likelihoods : sequence of GaussianLikelihood
         R of them.
     coordinate : ndarray, shape (R,)
+        The configuration c_r of each recording, in any unit.
     hand : ndarray of bool, shape (D,)
         Which parameters are the hand's: they scatter more.
     prior_mean, prior_sd : ndarray, shape (D,)
@@ -55,6 +56,7 @@ class Trend:
 
     @cached_property
     def range(self) -> float:
+        """From the lowest measured configuration to the highest, in the coordinate's unit."""
         return float(np.ptp(self.coordinate))
 
     @cached_property
@@ -74,10 +76,11 @@ class Trend:
 
     @cached_property
     def covariance(self) -> Floats:
+        """Covariances of the likelihoods; shape (R, D, D)."""
         return np.stack([one.covariance for one in self.likelihoods])
 
     def guess(self) -> tuple[Floats, Floats]:
-        """Middle and width of the prior of phi: logarithms of a, s and the length."""
+        """Middle and width of the prior of phi (logarithms of a, s and the length); (2 D + 1,)."""
         scatter = np.where(self.hand[:, None], HAND_SCATTER, DEVICE_SCATTER)
         table = np.concatenate([np.tile(AMPLITUDE, (len(self.hand), 1)), scatter, [LENGTH]])
         return np.log(table[:, 0]), table[:, 1]
@@ -97,7 +100,16 @@ class Trend:
         return value - 0.5 * np.sum(off**2, axis=1)
 
     def seen(self, phi: Floats) -> Seen:
-        """Recordings of one configuration taken together, given phi of shape (B, 2 D + 1)."""
+        """Recordings of one configuration taken together, which is exact.
+
+        Parameters
+        ----------
+        phi : ndarray, shape (B, 2 D + 1)
+
+        Returns
+        -------
+        Seen
+        """
         scatter = self._read(phi)[1]
         marginal = self.covariance + (scatter**2)[:, None, :, None] * np.eye(len(self.hand))
         weight = inverse(marginal)  # (B, R, D, D)
@@ -112,7 +124,17 @@ class Trend:
         return Seen(mean, together, weight, 0.5 * left)
 
     def expected(self, phi: Floats) -> tuple[Floats, Floats]:
-        """Mean and covariance of recordings' coordinates given one phi, (R, D) and (R, D, D)."""
+        """Mean and covariance of every recording's coordinates, given all recordings.
+
+        Parameters
+        ----------
+        phi : ndarray, shape (2 D + 1,)
+            One vector of hyperparameters.
+
+        Returns
+        -------
+        mean, covariance : ndarray, shape (R, D), (R, D, D)
+        """
         size, count = len(self.hand), len(self.places)
         amplitude, scatter, length = self._read(phi[None])
         seen = self.seen(phi[None])
@@ -129,9 +151,21 @@ class Trend:
         return np.stack(means) + self.prior_mean, np.stack(covariances)
 
     def draw(self, phi: Floats, grid: Floats, rng: np.random.Generator) -> Floats:
-        """Coordinates along `grid` (G,), one path for each phi (B, 2 D + 1); shape (B, G, D).
+        """Draw paths: the coordinates of a device along the configurations.
 
         The scatter of a path is one draw for all of it: the device of one day.
+
+        Parameters
+        ----------
+        phi : ndarray, shape (B, 2 D + 1)
+            Hyperparameters, one path for each.
+        grid : ndarray, shape (G,)
+            Configurations, in the unit of `coordinate`.
+        rng : numpy.random.Generator
+
+        Returns
+        -------
+        ndarray, shape (B, G, D)
         """
         amplitude, scatter, length = self._read(phi)
         size, count, places = len(self.hand), len(phi), len(self.places)
@@ -151,6 +185,7 @@ class Trend:
         return path + (scatter * rng.standard_normal((count, size)))[:, None] + self.prior_mean
 
     def _read(self, phi: Floats) -> tuple[Floats, Floats, Floats]:
+        """Amplitudes a and scatters s, shape (B, D) each, and the length, shape (B,)."""
         size = len(self.hand)
         values = np.exp(phi)
         return values[:, :size], values[:, size : 2 * size], values[:, -1]

@@ -30,6 +30,7 @@ class Walkers:
     density : callable
         Log density of points of shape (B, Q).
     positions : ndarray, shape (walkers, Q)
+        Where the walkers stand now.
     state : tuple
         State of a `numpy.random.RandomState`.
     """
@@ -48,7 +49,7 @@ class Walkers:
         self.sampler.random_state = self.state
 
     def advance(self, steps: int) -> Floats:
-        """Go on by `steps`: every fifth position, (steps / 5, walkers, Q)."""
+        """Go on by `steps`, and hand back every fifth position: (steps // 5, walkers, Q)."""
         self.sampler.reset()
         last = self.sampler.run_mcmc(
             self.positions, steps // EVERY, skip_initial_state_check=True, thin_by=EVERY
@@ -58,6 +59,7 @@ class Walkers:
 
 
 def _subspace_move() -> Any:
+    """The move of `subspace_steps` as emcee takes it."""
     from emcee.moves.red_blue import RedBlueMove
 
     class Subspace(RedBlueMove):  # type: ignore[misc]
@@ -72,7 +74,24 @@ def _subspace_move() -> Any:
 
 
 def subspace_steps(walkers: Floats, others: Floats, rng: np.random.RandomState) -> Floats:
-    """Proposals, as probable there as back: differences of two others in a few coordinates."""
+    """Propose a step for each walker: the difference of two others, in a few coordinates.
+
+    A step is as probable there as back, so that proposals need no correction.
+
+    Parameters
+    ----------
+    walkers : ndarray, shape (W, Q)
+        Those that are to move.
+    others : ndarray, shape (V, Q)
+        Those that stand still meanwhile.
+    rng : numpy.random.RandomState
+
+    Returns
+    -------
+    ndarray, shape (W, Q)
+        Each moved in one to four coordinates, by a length around 2.38 / sqrt(2 d) for d of them
+        (ter Braak 2006).
+    """
     count, size = walkers.shape
     most = 4  # coordinates at a time
     many = rng.randint(1, min(most, size) + 1, size=count)
