@@ -118,8 +118,22 @@ def as_known(
 ) -> tuple[tuple[BindingCrossing, ...], Ints]:
     """Crossings and groups as of `group_crossings`, by the names that they have elsewhere.
 
-    What a model leaves over bends its response, so that the phase crosses a little beside where it
-    does without, which is the same crossing, or at another place altogether.
+    What a model leaves over bends its response.  The phase then crosses a little beside where it
+    does without, which is the same crossing; or at another place altogether.
+
+    Parameters
+    ----------
+    crossings : tuple of BindingCrossing
+    group : ndarray of int, shape (n,)
+        Which of them binds in each draw.
+    known : iterable of BindingCrossing
+        Those that have been named already.
+
+    Returns
+    -------
+    crossings : tuple of BindingCrossing
+        Those with one name are one, with the probability of all.
+    group : ndarray of int, shape (n,)
     """
     names = [_known_as(one, known) for one in crossings]
     labels = list(dict.fromkeys(one.label for one in names))
@@ -134,6 +148,7 @@ def as_known(
 
 
 def _known_as(crossing: BindingCrossing, known: Iterable[BindingCrossing]) -> BindingCrossing:
+    """The known crossing of the same kind nearby, with this one's probability; else this one."""
     beside = 0.25  # of the frequency: as far as the draws of one crossing lie apart anyway
     kind = crossing.label.partition(" at ")[0]
     for one in known:

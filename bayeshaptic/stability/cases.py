@@ -107,7 +107,10 @@ class DeviceLimit:
         return shares
 
     def quantile(self, p: ArrayLike) -> Any:
-        """The stiffness that the limit is below with probability `p`; a float, or an array."""
+        """The stiffness, in `unit`, that the limit is below with probability `p` (0 to 1).
+
+        A float, or an array of the shape of `p`.
+        """
         levels = np.asarray(p, float)
         found = quantiles(self.samples, levels)
         return float(found) if levels.ndim == 0 else found
@@ -118,7 +121,10 @@ class DeviceLimit:
             return 20 * np.log10(self.quantile(p))
 
     def probability_unstable(self, stiffness: ArrayLike) -> Any:
-        """P(limit < stiffness), a float, or an array as `stiffness`."""
+        """The share of draws whose limit is below a stiffness: P(limit < stiffness).
+
+        A float, or an array of the shape of `stiffness`, which is in `unit`.
+        """
         below = np.searchsorted(np.sort(self.samples), stiffness, side="left")
         return below / len(self.samples)
 

@@ -92,7 +92,7 @@ class CriticalStiffness(Shown):
 
     @at_the_door
     def probability_unstable(self, stiffness: ArrayLike) -> Any:
-        """P(K_CR < stiffness), a float, or an array as `stiffness`."""
+        """P(K_CR < stiffness), the share of draws below it; a float, or an array as `stiffness`."""
         below = np.searchsorted(self._ordered, stiffness, side="left")
         return below / len(self.samples)
 
@@ -131,7 +131,7 @@ class CriticalStiffness(Shown):
 
     @at_the_door
     def effective_below(self, risk: float) -> float:
-        """Effective number of draws below the stiffness of probability `risk`."""
+        """How many effective draws lie below the stiffness at which the loop fails with `risk`."""
         return self.effective_at(self.quantile(risk)) * risk
 
     @at_the_door
@@ -260,6 +260,7 @@ def _limits(
     approximation: str,
     before: CriticalStiffness | None,
 ) -> CriticalStiffness:
+    """The limit of each vector, shape (n, P), with what binds; `before` has those known already."""
     by_chain = vectors.reshape(chains, -1, vectors.shape[1])
     known = None
     if before is not None and before.chains == chains:

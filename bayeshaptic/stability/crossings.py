@@ -70,7 +70,19 @@ def find_crossings(
 def response_of(
     system: LinearSystem | EvaluableSystem, period_s: float, exact: bool = True
 ) -> Response:
-    """The response of a batch of loops in the form that its kind of system allows."""
+    """The response of a batch of loops in the form that its kind of system allows.
+
+    From poles where there are finitely many, with dynamic links as poles and a remainder, else by
+    evaluation alone.
+
+    Parameters
+    ----------
+    system : LinearSystem or EvaluableSystem
+    period_s : float
+        Sampling period, s.
+    exact : bool
+        False: the continuous approximation P(s) e^{-s (td + T/2)}.
+    """
     if isinstance(system, LinearSystem) and system.has_rational_form:
         found = pole_response(system, period_s, exact)
         if np.isfinite(found.poles).all():
@@ -86,7 +98,21 @@ def rational(system: LinearSystem | EvaluableSystem) -> bool:
 
 
 def search(response: Response, period_s: float) -> Crossings:
-    """Every crossing of `response` and the real ends: compiled where it has finitely many poles."""
+    """Every crossing of a response, with its ends at zero frequency and at the Nyquist frequency.
+
+    Compiled where the response has finitely many poles.
+
+    Parameters
+    ----------
+    response : Response
+        Of B loops.
+    period_s : float
+        Sampling period, s.
+
+    Returns
+    -------
+    Crossings
+    """
     if isinstance(response, PoleResponse):
         row, theta, gain = _compiled_search(response)
     else:
@@ -133,6 +159,12 @@ def _compiled_search(response: PoleResponse) -> tuple[Ints, Floats, Floats]:
 
 def plain_search(response: Response) -> tuple[Ints, Floats, Floats]:
     """Crossings between the ends: scan, look into the dips, refine.
+
+    This is the slow, obvious form of `crossings_kernel.py`, and serves where there are no poles.
+
+    Parameters
+    ----------
+    response : Response
 
     Returns
     -------

@@ -49,12 +49,13 @@ def opened(source: Any) -> tuple[Model, Any, Any]:
 
 
 def vectors_given(model: Model, theta: ArrayLike) -> Floats:
-    """Parameter vectors of a caller, shape (n, P).
+    """Parameter vectors as a caller gives them, checked; shape (n, P).
 
     Raises
     ------
     InputError
-        For what is no number, another number of parameters, and a mass that is none.
+        For NaN and infinity, another number of parameters than the model has, and a mass that is
+        not above zero.
     """
     vectors = np.atleast_2d(np.asarray(theta, float))
     if not np.all(np.isfinite(vectors)):
@@ -68,7 +69,7 @@ def vectors_given(model: Model, theta: ArrayLike) -> Floats:
 
 
 def draws_of(posterior: Any) -> Floats:
-    """The draws of a posterior in the order of the samples of its `critical_stiffness`."""
+    """The draws of a posterior, (n, P), in the order of the samples of its `critical_stiffness`."""
     return vectors_of(posterior, None, None)[0]
 
 
@@ -78,7 +79,27 @@ def most_draws(model: Model, vector: Floats) -> int:
 
 
 def vectors_of(source: Any, theta: ArrayLike | None, max_draws: int | None) -> tuple[Floats, int]:
-    """Parameter vectors, chain after chain, and the number of chains."""
+    """Parameter vectors, chain after chain, and the number of chains.
+
+    Parameters
+    ----------
+    source : Model, Fit, Posterior, Case, Analysis or Closed
+    theta : array_like, shape (n, P) or (P,), or None
+        Vectors to take in the place of the source's own.
+    max_draws : int or None
+        The most to take of a posterior's draws, at equal steps; None: as `most_draws` says.
+
+    Returns
+    -------
+    vectors : ndarray, shape (n, P)
+    chains : int
+        Number of chains of equal length; n where the vectors are independent.
+
+    Raises
+    ------
+    InputError
+        As `opened` and `vectors_given` do.
+    """
     model, holder, _ = opened(source)
     if theta is not None or isinstance(holder, Model):
         vectors = vectors_given(model, model.values if theta is None else theta)

@@ -7,10 +7,21 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def effective_draws(chains: ArrayLike) -> float:
-    """Effective sample size of the mean, over chains of shape (C, S).
+    """Effective sample size of the mean.
 
     Each walker is a chain: walkers laid end to end would count as independent what is not.  Chains
-    of one step are independent draws and count as they are; so does a constant.
+    of fewer than four steps are taken as independent draws and count as they are; so does a
+    constant.
+
+    Parameters
+    ----------
+    chains : array_like, shape (C, S)
+        C chains of S steps.
+
+    Returns
+    -------
+    float
+        At most C S log10(C S): chains whose steps repel each other are worth more than they have.
 
     References
     ----------

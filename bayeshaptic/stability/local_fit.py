@@ -120,7 +120,19 @@ class LocalFit:
         return float(np.sqrt(self.covariance[0, 0].real / 2) / abs(self.coefficients[0]))
 
     def draws(self, rng: np.random.Generator, count: int, frequency_hz: Floats) -> Complexes:
-        """1/G at frequencies (L,) for coefficients drawn from their covariance, (count, L)."""
+        """Draw 1/G from what the data leave open.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+        count : int
+        frequency_hz : ndarray, shape (L,)
+
+        Returns
+        -------
+        ndarray of complex, shape (count, L)
+            Each row is one polynomial, its coefficients drawn from their covariance.
+        """
         # Not Cholesky's factor: directions that the data hardly see round to below zero.
         values, vectors = np.linalg.eigh(self.covariance / 2)
         half = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -225,5 +237,6 @@ def _equations(
 
 
 def _powers(frequency_hz: Floats, centre_hz: float, span: float, order: int) -> Floats:
+    """Powers 0 to `order` of the scaled frequency, along a new last axis."""
     x = (frequency_hz / centre_hz - 1) / span
     return np.moveaxis(np.stack([x**0, *np.cumprod([x] * order, axis=0)]), 0, -1)

@@ -45,7 +45,19 @@ def passivity_limit(
 ) -> Floats:
     """Passivity of a rigid device without delay: b > K T/2 + abs(B), so K = 2 (b - abs(B)) / T.
 
-    Zero where the virtual damping B alone exceeds the physical damping b.
+    Parameters
+    ----------
+    damping : array_like
+        Physical damping b to the ground, force over velocity.
+    period_s : float
+        Sampling period T, s.
+    virtual_damping : array_like
+        Damping B of the wall, in the unit of `damping`.
+
+    Returns
+    -------
+    ndarray
+        Stiffness; zero where the virtual damping alone exceeds the physical one.
 
     References
     ----------

@@ -83,7 +83,23 @@ def low_quantile(
 def quantile_with_error(
     ordered: Floats, p: float, effective: Callable[[float], float]
 ) -> LowQuantile:
-    """The quantile at `p` of draws in ascending order, half of what its error in p covers."""
+    """A quantile of draws with its Monte-Carlo error.
+
+    Parameters
+    ----------
+    ordered : ndarray, shape (n,)
+        The draws in ascending order.
+    p : float
+        Probability of what is below.
+    effective : callable
+        From a threshold to the number of independent draws that would give the share below it as
+        well.
+
+    Returns
+    -------
+    LowQuantile
+        Its error is half of what one standard deviation of p to either side covers.
+    """
     value = float(quantiles(ordered, p))
     sd = np.sqrt(p * (1 - p) / max(effective(value), 1.0))
     low, high = quantiles(ordered, np.clip([p - sd, p + sd], 0, 1))
@@ -91,7 +107,7 @@ def quantile_with_error(
 
 
 def quantiles(samples: Floats, p: ArrayLike) -> Any:
-    """Quantiles of samples of which some may be infinite."""
+    """Quantiles of samples of which some may be infinite; of the shape of `p`."""
     levels = np.asarray(p, float)
     if np.isfinite(samples).all():
         return np.quantile(samples, levels)

@@ -116,7 +116,19 @@ def elasticities(source: Any, draws: int = DRAWS) -> tuple[Elasticities, ...]:
 
 
 def with_delay(model: Model, vectors: Floats) -> tuple[Model, Floats]:
-    """The model with its delay among the parameters, where it is known, too."""
+    """The model with its delay among the parameters, also where the delay is known.
+
+    Parameters
+    ----------
+    model : Model
+    vectors : ndarray, shape (n, P)
+
+    Returns
+    -------
+    model : Model
+    vectors : ndarray, shape (n, P) or (n, P + 1)
+        With the known delay, s, as the last column.
+    """
     if "delay_s" not in model.fixed:
         return model, vectors
     left = {name: value for name, value in model.fixed.items() if name != "delay_s"}

@@ -53,7 +53,17 @@ def guidance(source: Any, slow: bool = False) -> Guidance:
 
 
 def usual_sweeps(source: Any, draws: int = DRAWS) -> tuple[Sweep, ...]:
-    """Over the stiffness of the transmission and of the link, and over added damping."""
+    """K_CR over what a designer may change.
+
+    That is the stiffness of the transmission and of the link, as far as the model has them, and
+    damping added to the ground, up to four times what is there.
+
+    Parameters
+    ----------
+    source : Posterior, Case or Analysis
+    draws : int
+        How many parameter vectors to look at.
+    """
     loops = loops_of(source, draws=draws)
     model: Model = loops.model
     found = [sweep(source, name, draws=draws) for name in _STIFFNESSES if name in model.names]

@@ -127,7 +127,18 @@ def variance_shares(source: Any, draws: int = DRAWS) -> VarianceShares:
 
 
 def tied_groups(scores: Floats) -> list[list[int]]:
-    """Columns of `scores` (n, P) joined where their correlation is beyond `TIED`."""
+    """Which parameters are to be taken together, because the data know only their sum or ratio.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n, P)
+        Normal scores of the parameters over n draws.
+
+    Returns
+    -------
+    list of list of int
+        Columns; those whose correlation is beyond `TIED` are in one group, directly or by a third.
+    """
     size = scores.shape[1]
     tied = np.abs(_correlation(scores)) > TIED
     label = np.arange(size)
@@ -137,7 +148,23 @@ def tied_groups(scores: Floats) -> list[list[int]]:
 
 
 def explained(columns: Floats, values: Floats, effective: float) -> float:
-    """Share of the variance of `values` (n,) that a function of normal scores (n, g) explains."""
+    """Share of a variance that some parameters explain, less what chance explains.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, g)
+        Normal scores of g parameters over n draws.  Of one parameter the function is a polynomial
+        of its rank, of several one of their principal scores.
+    values : ndarray, shape (n,)
+        What varies.
+    effective : float
+        Effective number of the draws.
+
+    Returns
+    -------
+    float
+        From 0 to 1.
+    """
     from scipy.special import ndtr
 
     if columns.shape[1] == 1:
@@ -160,6 +187,7 @@ def _share(
     effective: float,
     scale: float,
 ) -> Share:
+    """The share of one group of tied parameters; `scale` puts it to the variance that is stated."""
     share = scale * explained(scores[:, group], log_k, effective)
     inside = np.tril(_correlation(scores[:, group]), -1) if len(group) > 1 else np.zeros((1, 1))
     strongest = float(inside.flat[np.argmax(np.abs(inside))])
@@ -192,6 +220,7 @@ def _normal_scores(values: Floats) -> Floats:
 
 
 def _correlation(scores: Floats) -> Floats:
+    """Correlations between columns, shape (P, P); 0 beside a constant one."""
     with np.errstate(invalid="ignore", divide="ignore"):
         found = np.corrcoef(scores, rowvar=False)
     return np.nan_to_num(np.atleast_2d(found))

@@ -177,6 +177,7 @@ def _most(kinds: NDArray[np.int_], hertz: Floats) -> tuple[int, float]:
 
 
 def _jumps(values: Floats, binding: list[tuple[int, float]]) -> tuple[Jump, ...]:
+    """Where another kind of crossing, or one at another frequency, becomes the most probable."""
     jumps = []
     for i in range(len(values) - 1):
         (kind, hertz), (after, after_hz) = binding[i], binding[i + 1]

@@ -16,7 +16,19 @@ BLOCKS = 10  # of the jackknife
 
 @dataclass(frozen=True)
 class SegmentFit:
-    """Of one set of segments: what the jackknife repeats."""
+    """What is read of one set of segments, and what the jackknife repeats.
+
+    Attributes
+    ----------
+    frequency_hz : float
+        Of the oscillation.
+    gain, phase_deg : float
+        1/|G| there, a stiffness, and the phase of G from -180 degrees.
+    crossing_hz : float
+        Where the phase is -180 degrees; infinite where it is nowhere near.
+    critical : float
+        The stiffness there; nan without a crossing.
+    """
 
     frequency_hz: float
     gain: float
@@ -26,9 +38,20 @@ class SegmentFit:
 
 
 def estimate(spectra: PieceSpectra, order: int) -> SegmentFit:
-    """U = D Y around the oscillation by least squares, D a polynomial; its value and crossing.
+    """Fit the response around the oscillation, and read its value and its crossing.
 
-    The dynamic stiffness D = 1/G is smooth where G has a resonance.
+    U = D Y is fitted by least squares with D a polynomial in the frequency, because the dynamic
+    stiffness D = 1/G is smooth where G has a resonance.
+
+    Parameters
+    ----------
+    spectra : PieceSpectra
+    order : int
+        Of the polynomial.
+
+    Returns
+    -------
+    SegmentFit
     """
     centre, width = oscillation(spectra)
     lines = 4  # reach of the local fit on either side, at least
@@ -59,7 +82,22 @@ def _nearest_root(coefficients: Floats) -> float:
 
 
 def jackknife(spectra: PieceSpectra, whole: SegmentFit) -> dict[str, float]:
-    """Standard deviations: of the frequency in Hz, of the stiffnesses' logarithms."""
+    """Standard deviations of what is read, by leaving out one block of segments after the other.
+
+    Segments that overlap are not independent, so that ten blocks of neighbours are left out (B.
+    Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", SIAM 1982).
+
+    Parameters
+    ----------
+    spectra : PieceSpectra
+    whole : SegmentFit
+        Of all segments.
+
+    Returns
+    -------
+    dict of str to float
+        Of ``frequency_hz`` in Hz; of ``gain`` and ``critical`` in their logarithms.
+    """
     count = len(spectra.force)
     blocks = np.array_split(np.arange(count), min(BLOCKS, count))
     without = [estimate(spectra.only(np.setdiff1d(np.arange(count), block)), 2) for block in blocks]
@@ -77,7 +115,10 @@ def jackknife(spectra: PieceSpectra, whole: SegmentFit) -> dict[str, float]:
 
 
 def oscillation_share(spectra: PieceSpectra, frequency_hz: float) -> float:
-    """The oscillation's share of the motion's variance, above half its frequency."""
+    """The oscillation's share of the motion's variance above half its frequency, 0 to 1.
+
+    Below that a hand wanders.
+    """
     power = (np.abs(spectra.position) ** 2).mean(axis=0)
     counted = spectra.frequency_hz > 0.5 * frequency_hz
     near = np.abs(spectra.frequency_hz - frequency_hz) < NEAR * frequency_hz

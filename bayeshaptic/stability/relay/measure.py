@@ -54,7 +54,13 @@ class _Part:
 
 
 def _about_one_set_point(recording: Recording) -> _Part:
-    """All of it, or the stretch with the most switches where the set point changes."""
+    """All of a recording, or the stretch with the most switches where the set point changes.
+
+    Raises
+    ------
+    InputError
+        Where force or position never changes.
+    """
     force, position = np.asarray(recording.force), np.asarray(recording.position)
     if np.ptp(force) == 0 or np.ptp(position) == 0:
         raise InputError(
@@ -70,7 +76,13 @@ def _about_one_set_point(recording: Recording) -> _Part:
 
 
 def _refuse_no_relay(part: _Part, name: str) -> None:
-    """Refuse a force of many levels, and one that does not switch with the position."""
+    """Refuse what is no relay.
+
+    Raises
+    ------
+    InputError
+        For a force of many levels, and for one that does not switch with the position.
+    """
     force = part.force
     level = np.median(np.abs(force))
     at_level = np.mean(np.abs(np.abs(force) - level) <= _NEAR_LEVEL * level)
@@ -93,7 +105,13 @@ def _refuse_no_relay(part: _Part, name: str) -> None:
 
 
 def _segment(samples: int, name: str) -> int:
-    """Samples of a segment, an even number; refused where these would be too short."""
+    """How many samples a segment has, an even number.
+
+    Raises
+    ------
+    InputError
+        Where segments would be too short.
+    """
     segment = min(SEGMENT, 2 * samples // (LEAST_SEGMENTS + 1) // 2 * 2)
     shortest = 64
     if segment < shortest:

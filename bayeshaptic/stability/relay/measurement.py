@@ -78,6 +78,7 @@ class RelayMeasurement(Shown):
 
     @property
     def gain_margin_sd_db(self) -> float:
+        """Standard deviation of the gain margin in decibels, to first order."""
         return relative_db(self.gain_margin_sd / self.gain_margin)
 
     @property
@@ -88,10 +89,12 @@ class RelayMeasurement(Shown):
 
     @property
     def critical_sd_db(self) -> float | None:
+        """Standard deviation of the critical stiffness in decibels; None without one."""
         if self.critical_stiffness is None or self.critical_stiffness_sd is None:
             return None
         return relative_db(self.critical_stiffness_sd / self.critical_stiffness)
 
 
 def relative_db(relative: float) -> float:
+    """A small relative error in decibels, to first order: 20 / ln(10) of it."""
     return float(20 / np.log(10) * relative)

@@ -16,7 +16,7 @@ LEAST_STEADY_S = 15.0  # what Diaz and Gil recorded
 
 
 def one_of_several(measured: RelayMeasurement, unit: str) -> Notice:
-    """That the set point changes, and which stretch was used; `unit` is the position's."""
+    """A note that the set point changes, and which stretch was used; `unit` is the position's."""
     begin, end = measured.steady_s
     return Notice(
         "note",
@@ -50,6 +50,7 @@ def notices_of(
 def _not_steady(
     recording: Recording, force: Floats, position: Floats, segment: int
 ) -> list[Notice]:
+    """A warning where amplitude or frequency of the oscillation change from piece to piece."""
     frequency, level = pieces(force, position, recording.period_s, segment)
     swing = float(np.abs(level - np.median(level)).max())
     shift = float(np.abs(frequency / np.median(frequency) - 1).max())

@@ -16,26 +16,37 @@ NEAR = 0.3  # a line reaches so far to either side, relative to its frequency
 
 @dataclass(frozen=True)
 class PieceSpectra:
-    """Hann-windowed, detrended, half-overlapping segments: force and position, shape (S, L)."""
+    """Spectra of S half-overlapping segments, each detrended and under a Hann window.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (L,)
+    force, position : ndarray of complex, shape (S, L)
+        Discrete Fourier transforms, in the units of force and position.
+    """
 
     frequency_hz: Floats
     force: Complexes
     position: Complexes
 
     def only(self, segments: NDArray[np.int_]) -> PieceSpectra:
+        """The spectra of some of the segments, by their indices."""
         return PieceSpectra(self.frequency_hz, self.force[segments], self.position[segments])
 
     @property
     def bin_hz(self) -> float:
+        """Distance between lines, Hz."""
         return float(self.frequency_hz[1])
 
 
 def spectra_of(force: Floats, position: Floats, period_s: float, segment: int) -> PieceSpectra:
+    """Spectra of force and position, shape (N,) each, in segments of `segment` samples."""
     frequency = np.asarray(np.fft.rfftfreq(segment, period_s), float)
     return PieceSpectra(frequency, _transformed(force, segment), _transformed(position, segment))
 
 
 def _transformed(signal: Floats, segment: int) -> Complexes:
+    """Transforms of a signal's segments, less their straight lines, shape (S, L)."""
     segments = np.lib.stride_tricks.sliding_window_view(signal, segment)[:: segment // 2]
     line = np.linspace(-1, 1, segment)
     slope = segments @ line / (line @ line)
@@ -44,7 +55,17 @@ def _transformed(signal: Floats, segment: int) -> Complexes:
 
 
 def oscillation(spectra: PieceSpectra) -> tuple[float, float]:
-    """Centre and rms width of the oscillation's line in the force's power spectral density."""
+    """Where the oscillation is, by its line in the force's power spectral density.
+
+    Parameters
+    ----------
+    spectra : PieceSpectra
+
+    Returns
+    -------
+    centre, width : float
+        Mean frequency of the line's power and its rms width, Hz.
+    """
     power = (np.abs(spectra.force) ** 2).mean(axis=0)
     power[:2] = 0.0  # what is left of a slow drift
     frequency = spectra.frequency_hz
@@ -56,7 +77,21 @@ def oscillation(spectra: PieceSpectra) -> tuple[float, float]:
 
 
 def pieces(force: Floats, position: Floats, period_s: float, length: int) -> tuple[Floats, Floats]:
-    """Frequency and amplitude (dB, any reference) of the oscillation, piece by piece."""
+    """How the oscillation goes on, piece by piece.
+
+    Parameters
+    ----------
+    force, position : ndarray, shape (N,)
+    period_s : float
+        Sampling period, s.
+    length : int
+        Samples of a piece; pieces overlap by half.
+
+    Returns
+    -------
+    frequency_hz, level_db : ndarray, shape (S,)
+        Its frequency, and its amplitude in dB over any reference.
+    """
     spectra = spectra_of(force, position, period_s, length)
     lines = [oscillation(spectra.only(np.array([k]))) for k in range(len(spectra.force))]
     frequency = np.array([centre for centre, _ in lines])
@@ -66,7 +101,23 @@ def pieces(force: Floats, position: Floats, period_s: float, length: int) -> tup
 
 
 def steady_from(force: Floats, position: Floats, period_s: float, segment: int) -> int:
-    """The first sample after the transient: where both settle to what the second half shows."""
+    """The first sample after the transient.
+
+    There amplitude and frequency have settled to what the second half shows, by 3 dB and a tenth.
+
+    Parameters
+    ----------
+    force, position : ndarray, shape (N,)
+    period_s : float
+        Sampling period, s.
+    segment : int
+        Samples of a piece.
+
+    Returns
+    -------
+    int
+        Half of the samples at most.
+    """
     frequency, level = pieces(force, position, period_s, segment)
     half = len(level) // 2
     off = np.abs(level - np.median(level[half:])) > STEADY_DB

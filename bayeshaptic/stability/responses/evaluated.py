@@ -14,31 +14,41 @@ from bayeshaptic.types import Complexes, Floats, Ints
 
 
 class EvaluableSystem(Protocol):
-    """A batch of loops of which the response can be evaluated, and nothing else be known."""
+    """A batch of B loops of which the response can be evaluated, and nothing else be known."""
 
     @property
-    def batch(self) -> int: ...
+    def batch(self) -> int:
+        """B."""
 
     @property
-    def delay_s(self) -> Floats: ...
+    def delay_s(self) -> Floats:
+        """Loop delay of each, s; shape (B,)."""
 
-    def rows(self, index: Ints) -> Self: ...
+    def rows(self, index: Ints) -> Self:
+        """Those loops of the batch."""
 
-    def sampled_response(self, frequency_hz: Floats, period_s: float) -> Complexes: ...
+    def sampled_response(self, frequency_hz: Floats, period_s: float) -> Complexes:
+        """G at frequencies (L,), hold and delay included; shape (B, L)."""
 
-    def continuous_approximation(self, frequency_hz: Floats, period_s: float) -> Complexes: ...
+    def continuous_approximation(self, frequency_hz: Floats, period_s: float) -> Complexes:
+        """P(s) e^{-s (td + T/2)} at frequencies (L,); shape (B, L)."""
 
 
 @dataclass(frozen=True)
 class EvaluatedResponse:
     """A sampled response known by evaluation alone; the search takes a fine grid.
 
+    It is a `Response`, whose attributes and methods are described there.
+
     Attributes
     ----------
     system : EvaluableSystem
     period_s : float
+        Sampling period, s.
     exact : bool
         False: the continuous approximation P(s) e^{-s (td + T/2)}.
+    log_points : int
+        Points of the grid.
     """
 
     system: EvaluableSystem
@@ -65,6 +75,7 @@ class EvaluatedResponse:
         return out
 
     def _evaluate(self, rows: Ints, theta: Floats) -> Complexes:
+        """Values of rows (M,) at the same angles (k,), shape (M, k)."""
         frequency = theta / (2 * np.pi * self.period_s)
         system = self.system.rows(rows)
         if self.exact:

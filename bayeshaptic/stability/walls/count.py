@@ -16,7 +16,7 @@ def pairs_of(stiffness: ArrayLike, damping: ArrayLike) -> tuple[Floats, Floats]:
     Raises
     ------
     InputError
-        Where they do not.
+        Where their shapes do not go together.
     """
     k, b = np.asarray(stiffness, float), np.asarray(damping, float)
     try:
@@ -30,9 +30,22 @@ def pairs_of(stiffness: ArrayLike, damping: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def unstable_at_start(curve: KbCurve, start: Floats, levels: Floats) -> Ints:
-    """Poles outside the unit circle at the stiffness `start` (n,) and dampings (J,); (n, J).
+    """How many poles are outside the unit circle where lines of constant damping begin.
 
-    There are none at `start` without damping; many are said of a loop whose `start` is nan.
+    Parameters
+    ----------
+    curve : KbCurve
+        The boundaries of n loops.
+    start : ndarray, shape (n,)
+        A stiffness at which each loop is stable without damping; nan for a loop that never is.
+    levels : ndarray, shape (J,)
+        Dampings.
+
+    Returns
+    -------
+    ndarray of int, shape (n, J)
+        At the stiffness `start` and each damping.  A loop that is never stable is said to have a
+        thousand.
     """
     events = along_damping(curve, np.where(np.isnan(start), 1.0, start))
     poles = np.zeros((len(start), len(levels)), int)
@@ -48,7 +61,25 @@ def unstable_at_start(curve: KbCurve, start: Floats, levels: Floats) -> Ints:
 def beyond_start(
     events: Events, rows: Ints, heights: Floats, levels: int, start: Floats
 ) -> NDArray[np.int_]:
-    """Poles outside the unit circle at each height, less those at the start, (rows, J, I)."""
+    """How many more poles are outside the unit circle than where the lines begin.
+
+    Parameters
+    ----------
+    events : Events
+        Where boundaries meet the lines.
+    rows : ndarray of int, shape (m,)
+        Neighbouring loops to count for.
+    heights : ndarray, shape (I,)
+        Stiffnesses, ascending.
+    levels : int
+        Number J of lines of constant damping.
+    start : ndarray, shape (n,)
+        The stiffness at which the lines of each of the n loops begin.
+
+    Returns
+    -------
+    ndarray of int, shape (m, J, I)
+    """
     mine = (events.row >= rows[0]) & (events.row <= rows[-1])
     row, level = events.row[mine] - rows[0], events.level[mine]
     place, poles = events.place[mine], events.poles[mine]

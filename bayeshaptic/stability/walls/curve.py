@@ -56,7 +56,7 @@ class InverseCurve:
     nyquist: Floats
 
     def at(self, rows: Ints, theta: Floats) -> Complexes:
-        """-1/G of rows (M,) at one angle each, shape (M,)."""
+        """-1/G of loops `rows`, shape (M,), at one angle each, shape (M,); complex, shape (M,)."""
         return -self.factor[rows] / self.response.at(rows, theta[:, None])[:, 0]
 
     def scaled(self, factor: Floats) -> InverseCurve:
@@ -90,12 +90,20 @@ class KbCurve:
     stiffness: Floats
 
     def rate(self, theta: Floats) -> Complexes:
-        """D at angles."""
+        """The velocity estimate D at angles `theta`, in 1/s; of their shape."""
         return derivative(self.kind, theta, self.inverse.period_s)
 
 
 def kb_curve(inverse: InverseCurve, kind: Damping) -> KbCurve:
-    """The boundaries of loops whose -1/G is known."""
+    """The boundaries in the K-B plane of loops whose -1/G is known.
+
+    At each angle K + B D = -1/G has one solution: B = Im(-1/G) / Im(D), K = Re(-1/G) - B Re(D).
+
+    Parameters
+    ----------
+    inverse : InverseCurve
+    kind : Damping
+    """
     rate = derivative(kind, inverse.theta, inverse.period_s)
     damping = inverse.value.imag / rate.imag
     return KbCurve(inverse, kind, damping, inverse.value.real - damping * rate.real)
@@ -131,7 +139,15 @@ class _Features:
 
 
 def inverse_curve(system: LinearSystem | EvaluableSystem, period_s: float) -> InverseCurve:
-    """-1/G of a batch of loops on a grid that follows every resonance and antiresonance."""
+    """-1/G of a batch of loops on a grid that follows every resonance and antiresonance.
+
+    Parameters
+    ----------
+    system : LinearSystem or EvaluableSystem
+        Of n loops.
+    period_s : float
+        Sampling period, s.
+    """
     response = response_of(system, period_s)
     features = response.features
     if isinstance(system, LinearSystem) and features.shape[1]:
@@ -154,9 +170,22 @@ def inverse_curve(system: LinearSystem | EvaluableSystem, period_s: float) -> In
 
 
 def along_stiffness(curve: KbCurve, levels: Floats, lowest_above: Floats | None = None) -> Events:
-    """Where the boundaries meet the lines B = `levels`, shape (J,), ascending; places are K.
+    """Where the boundaries meet lines of constant damping.
 
-    With `lowest_above`, shape (n,), those are left out that cannot be the lowest above it.
+    Parameters
+    ----------
+    curve : KbCurve
+        Of n loops.
+    levels : ndarray, shape (J,)
+        Dampings B of the lines, ascending.
+    lowest_above : ndarray, shape (n,), optional
+        A stiffness of each loop.  Only the first boundary above it is wanted, so that places which
+        cannot be that one are left out.
+
+    Returns
+    -------
+    Events
+        Their places are stiffnesses K.
     """
     inverse = curve.inverse
     row, level, segment, rising = _passages(curve.damping, levels)
@@ -179,7 +208,10 @@ def along_stiffness(curve: KbCurve, levels: Floats, lowest_above: Floats | None 
 
 
 def along_damping(curve: KbCurve, start: Floats) -> Events:
-    """Where each boundary meets its own line K = `start`, shape (n,); places are B."""
+    """Where the boundaries of each loop meet its own line K = `start`, shape (n,).
+
+    The places of the events are dampings B.
+    """
     inverse = curve.inverse
     row, level, segment, rising = _passages(curve.stiffness - start[:, None], np.zeros(1))
 
@@ -195,6 +227,7 @@ def along_damping(curve: KbCurve, start: Floats) -> Events:
 
 
 def _at_nyquist(curve: KbCurve) -> float:
+    """D(-1), which ties K and B together on the line of the Nyquist frequency."""
     return derivative_at_nyquist(curve.kind, curve.inverse.period_s)
 
 

@@ -17,12 +17,15 @@ class Damping(Protocol):
     """A velocity estimate v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1]) / T with its smoothing a."""
 
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """What a figure or a table calls it."""
 
     @property
-    def cutoff_hz(self) -> float | None: ...
+    def cutoff_hz(self) -> float | None:
+        """The frequency from which the velocity is smoothed, Hz; None without smoothing."""
 
-    def smoothing(self, period_s: float) -> float: ...
+    def smoothing(self, period_s: float) -> float:
+        """The factor a, 0 to below 1, at a sampling period of `period_s` seconds."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,21 @@ class LowPass:
 
 
 def derivative(damping: Damping, theta: Floats, period_s: float) -> Complexes:
-    """D(e^{j theta}), of the shape of `theta`; its imaginary part is positive inside (0, pi)."""
+    """The velocity estimate as a transfer function, D(z) = (1 - a) (1 - 1/z) / (T (1 - a/z)).
+
+    Parameters
+    ----------
+    damping : Damping
+    theta : ndarray
+        Angles of z = e^{j theta}, 2 pi f T.
+    period_s : float
+        Sampling period T, s.
+
+    Returns
+    -------
+    ndarray of complex, of the shape of `theta`
+        In 1/s; the imaginary part is positive inside (0, pi).
+    """
     a = damping.smoothing(period_s)
     sine, cosine = np.sin(0.5 * theta), np.cos(0.5 * theta)
     scale = 2 * (1 - a) / period_s * sine
@@ -89,6 +106,6 @@ def derivative(damping: Damping, theta: Floats, period_s: float) -> Complexes:
 
 
 def derivative_at_nyquist(damping: Damping, period_s: float) -> float:
-    """D(-1), a real number: 2/T for the backward difference."""
+    """D(-1), at the Nyquist frequency: a real number, 1/s; 2/T for the backward difference."""
     a = damping.smoothing(period_s)
     return 2 * (1 - a) / (period_s * (1 + a))

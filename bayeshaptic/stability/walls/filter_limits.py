@@ -91,6 +91,18 @@ class FilterLimits:
 def filter_limits(
     cases: Sequence[Case], region: JointRegion, risks: tuple[float, ...], draws: int
 ) -> FilterLimits:
+    """The limits of a device with one way to get the velocity.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    region : JointRegion
+        Of the same cases, with that velocity.
+    risks : tuple of float
+        Risks that are to be stated.
+    draws : int
+        How many draws of each case are looked at for the smallest of them.
+    """
     levels = region.dampings(risks, ROWS)
     limits = region.limits(levels)
     tails = None

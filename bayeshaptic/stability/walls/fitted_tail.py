@@ -64,10 +64,23 @@ def fitted_boundary(
 
 
 def effective_of(limit: CriticalStiffness, kept: int) -> Callable[[float], float]:
-    """Of `kept` draws of a limit, the effective number behind a share of the lowest.
+    """How many effective draws a share of the lowest limits is counted from.
 
-    Which draws have the lowest limits over damping changes from step to step of the sampler as
-    which have the lowest without.
+    Neighbouring draws of a sampler are alike.  Which of them have the lowest limits over damping
+    changes from step to step just as which have the lowest without damping, so that the number is
+    that of K_CR.
+
+    Parameters
+    ----------
+    limit : CriticalStiffness
+        Of the case, from all draws.
+    kept : int
+        How many draws the limits over damping were computed for.
+
+    Returns
+    -------
+    callable
+        From a share, 0 to 1, to the effective number of draws.
     """
 
     @cache

@@ -52,19 +52,41 @@ class JointRegion:
         return min(region.effective for region in self.regions) * risk >= ENOUGH_BELOW
 
     def limits(self, damping: ArrayLike) -> tuple[Floats, ...]:
-        """The limits of each case, (n_c, J) each; see `KbRegion.limits`."""
+        """The limits of each case at dampings (J,), shape (n_c, J) each; see `KbRegion.limits`."""
         return tuple(region.limits(damping) for region in self.regions)
 
     def probability_map(self, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
-        """P(stable in every case) on a grid (I,) and (J,), both ascending; shape (J, I)."""
+        """The probability of being stable in every case, on a grid.
+
+        Parameters
+        ----------
+        stiffness, damping : array_like, shape (I,), (J,)
+            Both ascending, in `unit` and `damping_unit`.
+
+        Returns
+        -------
+        ndarray, shape (J, I)
+        """
         maps = [region.probability_map(stiffness, damping) for region in self.regions]
         return np.asarray(np.prod(maps, axis=0))
 
     def dampings(self, risks: Sequence[float], count: int) -> Floats:
-        """Ascending dampings from zero on: `count` steps, and where each boundary ends.
+        """Dampings at which to compute boundaries.
 
         The steps are closest at zero, where limits rise most steeply, and reach the damping that
         is unstable in 95 % of the draws.
+
+        Parameters
+        ----------
+        risks : sequence of float
+            Risks of the boundaries; the damping at which each ends is among the result.
+        count : int
+            Number of steps.
+
+        Returns
+        -------
+        ndarray, shape (J,)
+            Ascending from zero, in `damping_unit`.
         """
         largest = [np.sort(region.largest_damping())[:, None] for region in self.regions]
         totals = [len(part) for part in largest]
@@ -92,7 +114,7 @@ def joint_region(cases: Sequence[Any], draws: int = DRAWS) -> JointRegion:
 
 
 def filtered(region: JointRegion, kind: Damping) -> JointRegion:
-    """The same with another way to get the velocity."""
+    """The region of the same draws with another way to get the velocity."""
     return replace(region, regions=tuple(with_damping(part, kind) for part in region.regions))
 
 
