@@ -22,7 +22,16 @@ POSITION_UNITS = {"N": "m", "Nm": "rad"}
 
 @dataclass(frozen=True)
 class Defaults:
-    """Sizes for a kind of device: excitation, tremor, wander in its force unit; the encoder."""
+    """Usual sizes for a kind of device.
+
+    Attributes
+    ----------
+    force_unit : {"N", "Nm"}
+    force_rms, tremor_rms, wander_rms : float
+        Of the excitation, and of the two forces of a hand, in that unit.
+    encoder_resolution : float
+        One count, m or rad.
+    """
 
     force_unit: str
     force_rms: float
@@ -120,6 +129,10 @@ class Bench:
         **changes
             Fields of the bench that are to be different.
 
+        Returns
+        -------
+        Bench
+
         Raises
         ------
         InputError
@@ -153,11 +166,12 @@ class Bench:
 
     @property
     def position_unit(self) -> str:
+        """m or rad, as goes with the force's unit."""
         return POSITION_UNITS[self.force_unit]
 
     @property
     def resolution(self) -> float:
-        """The count that positions are rounded to, effects included."""
+        """The count that positions are rounded to, m or rad, effects included."""
         resolution = self.encoder_resolution
         for effect in self.effects:
             resolution = effect.resolution(resolution)
@@ -176,6 +190,11 @@ class Bench:
         effect : str or Effect
         **changes
             Fields of a named effect that are to be different from the typical.
+
+        Raises
+        ------
+        InputError
+            For an unknown effect or field, and where the bench cannot have the effect.
         """
         if not isinstance(effect, Effect):
             effect = make_effect(effect, self.scales(), **changes)
@@ -192,7 +211,13 @@ class Bench:
         )
 
     def plant(self, progress: float = 0.0) -> Plant:
-        """State equations when a part `progress` (0..1) of the recording is over."""
+        """State equations when a part `progress` (0..1) of the recording is over.
+
+        Raises
+        ------
+        InputError
+            For a loop delay of more than 100 sampling periods.
+        """
         values = self.values
         for effect in self.effects:
             values = effect.parameters(values, progress)
@@ -212,5 +237,8 @@ class Bench:
         return motion_scales(replace(self, effects=()))
 
     def true_critical_stiffness(self, damping: float = 0.0) -> float:
-        """The stiffness at which a virtual wall loses stability; see `critical_limit`."""
+        """The stiffness at which a virtual wall with that damping B loses stability.
+
+        In N/m with B in N s/m, or N m/rad with B in N m s/rad; see `critical_limit`.
+        """
         return critical_limit(self, damping).stiffness

@@ -22,7 +22,25 @@ class Excitation(Protocol):
         """How many samples are recorded."""
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
-        """Commands, shape (lead + samples,); the first `lead` come before the recording."""
+        """Commands, N or N m.
+
+        Parameters
+        ----------
+        lead : int
+            Samples before the recording.
+        period_s : float
+            Sampling period, s.
+        rng : numpy.random.Generator
+
+        Returns
+        -------
+        ndarray, shape (lead + samples,)
+
+        Raises
+        ------
+        InputError
+            Where such a command cannot be made at that sampling period.
+        """
 
 
 @dataclass(frozen=True)
@@ -75,6 +93,7 @@ class Multisine:
     Attributes
     ----------
     rms : float
+        N or N m.
     low_hz, high_hz, spacing_hz : float
         First and last line, and the distance between lines: 1/spacing_hz is the period, which must
         be a whole number of samples. The lines are multiples of the spacing.
@@ -92,7 +111,7 @@ class Multisine:
     phase: str = "schroeder"
 
     def period_samples(self, period_s: float) -> int:
-        """Samples in a period of the multisine."""
+        """Samples in a period of the multisine; an `InputError` where they are no whole number."""
         samples = 1 / (self.spacing_hz * period_s)
         if abs(samples - round(samples)) > 1e-6:
             raise InputError(
@@ -102,7 +121,7 @@ class Multisine:
         return round(samples)
 
     def lines_hz(self, period_s: float) -> Array:
-        """The excited lines, shape (lines,)."""
+        """The excited lines, Hz, shape (lines,); an `InputError` where the band has none."""
         first = max(1, int(np.ceil(self.low_hz / self.spacing_hz - 1e-9)))
         last = int(np.floor(self.high_hz / self.spacing_hz + 1e-9))
         if last < first or 2 * last >= self.period_samples(period_s):
@@ -139,7 +158,9 @@ class Chirp:
     Attributes
     ----------
     rms : float
+        N or N m.
     low_hz, high_hz : float
+        Where it begins, at a cycle in the record at least, and where it ends.
     seconds : float
     """
 
@@ -171,6 +192,7 @@ class BinaryNoise:
     Attributes
     ----------
     rms : float
+        N or N m.
     upper_hz : float
         Half of the power lies below it: the level may change 2.5 times as often.
     seconds : float
@@ -202,6 +224,7 @@ class Steps:
     Attributes
     ----------
     rms : float
+        N or N m.
     hold_s : float
         Between two steps.
     seconds : float
@@ -233,7 +256,13 @@ class Prescribed:
 
 
 def sample_count(seconds: float, period_s: float) -> int:
-    """How many samples are so many seconds, where that is a recording."""
+    """How many samples are so many seconds.
+
+    Raises
+    ------
+    InputError
+        For fewer than two, and for more than the bench simulates.
+    """
     samples = round(seconds / period_s)
     if samples < 2:
         raise InputError(

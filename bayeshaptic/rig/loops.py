@@ -94,6 +94,7 @@ class _Run:
         self.done = 0
 
     def go(self, give_up: float) -> None:
+        """Run to the end, or until the position leaves +-give_up; `done` counts the samples."""
         whole, _ = split_delay(self.plant.delay_s, self.bench.period_s)
         acting = [0.0] * (whole + 1)
         hand = self.hand.tolist()
@@ -153,6 +154,11 @@ def run_relay(
     Returns
     -------
     SimulatedRecording
+
+    Raises
+    ------
+    InputError
+        For an amplitude that is not above zero, and a hysteresis below zero.
     """
     amplitude = 3 * bench.force_rms if amplitude is None else amplitude
     if not amplitude > 0 or not hysteresis >= 0:
@@ -189,6 +195,7 @@ class WallRun:
 
     @property
     def stable(self) -> bool:
+        """Whether the oscillation dies out."""
         return self.growth_per_s < 0
 
 
@@ -213,6 +220,7 @@ def run_wall(
     ----------
     bench : Bench
     stiffness, damping : float
+        N/m and N s/m, or N m/rad and N m s/rad.
     seconds : float
         Long enough for the faster modes to die out and the slowest to show its trend.
     push : float, optional

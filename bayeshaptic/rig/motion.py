@@ -48,7 +48,23 @@ def epochs(bench: Bench, progress: Array) -> list[Epoch]:
 
 
 def initial_state(plant: Plant, start: Start | None) -> Array:
-    """The state, shape (n,), in which the masses move as told, and all else is at rest."""
+    """The state in which the masses move as told, and all else is at rest.
+
+    Parameters
+    ----------
+    plant : Plant
+    start : mapping of str to (position, velocity), or None
+        By the names of the masses.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Raises
+    ------
+    InputError
+        For a mass that the bench does not have.
+    """
     state = np.zeros(plant.states)
     for node, motion in (start or {}).items():
         if node not in plant.places:
@@ -72,8 +88,9 @@ def respond(
     ----------
     bench : Bench
     force : ndarray, shape (N,)
-        What the actuator is told.
+        What the actuator is told, N or N m.
     hand : ndarray, shape (N + 1,)
+        Force of the hand, at the samples and at the end.
     progress : ndarray, shape (N,)
     start, substeps, halvings
         As in `simulate`.

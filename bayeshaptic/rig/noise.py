@@ -24,11 +24,17 @@ def shaped_noise(
         Frequencies in Hz, shape (F,), to densities, shape (F,).
     samples : int
     period_s : float
+        Sampling period, s.
     rng : numpy.random.Generator
 
     Returns
     -------
     ndarray, shape (samples,)
+
+    Raises
+    ------
+    ValueError
+        Where the density is zero on every line.
     """
     length = scipy.fft.next_fast_len(samples + samples // 4 + 16, real=True)
     frequency = np.fft.rfftfreq(length, period_s)
@@ -45,10 +51,21 @@ def shaped_noise(
 
 
 def tremor_density(band_hz: tuple[float, float]) -> Callable[[Array], Array]:
-    """A hump over the band with skirts that fall with the fourth power of the frequency.
+    """The power spectral density of a tremor, in any scale.
 
-    The squared gain of two resonators in series, centred in the band, at a quarter of the top at
-    its edges.
+    It is a hump over the band with skirts that fall with the fourth power of the frequency: the
+    squared gain of two resonators in series, centred in the band, at a quarter of the top at its
+    edges.
+
+    Parameters
+    ----------
+    band_hz : tuple of float
+        Lowest and highest frequency.
+
+    Returns
+    -------
+    callable
+        From frequencies in Hz to densities, as `shaped_noise` takes it.
     """
     low, high = band_hz
     centre, width = np.sqrt(low * high), high - low
@@ -61,7 +78,19 @@ def tremor_density(band_hz: tuple[float, float]) -> Callable[[Array], Array]:
 
 
 def wander_density(corner_hz: float) -> Callable[[Array], Array]:
-    """Flat up to the corner, falling with the eighth power of the frequency above it."""
+    """The power spectral density of a hand that wanders, in any scale.
+
+    It is flat up to the corner, and falls with the eighth power of the frequency above it.
+
+    Parameters
+    ----------
+    corner_hz : float
+
+    Returns
+    -------
+    callable
+        From frequencies in Hz to densities, as `shaped_noise` takes it.
+    """
 
     def density(frequency: Array) -> Array:
         return 1 / (1 + (frequency / corner_hz) ** 8)

@@ -14,9 +14,14 @@ from bayeshaptic.rig.setup import Setup
 
 
 def motion_scales(bench: Setup) -> MotionScales:
-    """Root mean squares under white noise in the bench's band, tremor and wander.
+    """How far and how fast a bench moves under white noise in its band, tremor and wander.
 
-    From the frequency response of the continuous chain, without hold and delay.
+    Root mean squares, from the frequency response of the continuous chain, without hold and delay.
+
+    Parameters
+    ----------
+    bench : Setup
+        Without effects.
     """
     plant = bench.plant()
     frequency = np.geomspace(1e-3, bench.band_hz[1], 4000)

@@ -23,7 +23,19 @@ class Streams:
 
 
 def hand_force(bench: Bench, samples: int, streams: Streams) -> Array:
-    """Tremor and wander of the hand at `samples` instants."""
+    """The hand's own force, tremor and wander.
+
+    Parameters
+    ----------
+    bench : Bench
+    samples : int
+    streams : Streams
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        N or N m; zero where nobody holds the device.
+    """
     force = np.zeros(samples)
     if bench.mechanism != "grasped":
         return force
@@ -51,7 +63,18 @@ class Encoder:
         ]
 
     def read(self, time_s: Array, position: Array, velocity: Array) -> Readings:
-        """Readings with stamps and counted positions, any number of them."""
+        """Read N positions.
+
+        Parameters
+        ----------
+        time_s, position, velocity : ndarray, shape (N,)
+            Of the motor, in front of the encoder.
+
+        Returns
+        -------
+        Readings
+            With the logger's time stamps, and positions in whole counts.
+        """
         if self.noise_rms > 0:
             position = position + self.rng.normal(0.0, self.noise_rms, len(position))
         samples = Readings(time_s, position, velocity)
@@ -76,7 +99,20 @@ class Encoder:
 
 
 def actuate(bench: Bench, command: Array, progress: Array, time_s: Array) -> Array:
-    """What the actuator gets of the commands."""
+    """What the actuator gets of the commands, all effects on it one after the other.
+
+    Parameters
+    ----------
+    bench : Bench
+    command : ndarray, shape (N,)
+    progress : ndarray, shape (N,)
+        Part of the recording that is over, 0 to 1.
+    time_s : ndarray, shape (N,)
+
+    Returns
+    -------
+    ndarray, shape (N,)
+    """
     for effect in bench.effects:
         command = effect.command(command, progress, time_s)
     return command
@@ -90,7 +126,26 @@ def write_down(
     true_position: Array,
     hand: Array,
 ) -> SimulatedRecording:
-    """The recording that the logger makes of what was commanded and read."""
+    """The recording that the logger makes of what was commanded and read.
+
+    Parameters
+    ----------
+    bench : Bench
+    streams : Streams
+    samples : Readings
+        What the encoder gave, N of them.
+    command : ndarray, shape (N,)
+        What was commanded.
+    true_position : ndarray, shape (N,)
+        In front of the encoder.
+    hand : ndarray, shape (N,)
+        The hand's force.
+
+    Returns
+    -------
+    SimulatedRecording
+        With fewer rows where the logger loses some.
+    """
     log = Log(samples.time_s, command, samples.position)
     for effect, rng in zip(bench.effects, streams.log, strict=True):
         log = effect.log(log, rng)

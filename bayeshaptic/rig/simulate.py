@@ -70,6 +70,13 @@ def simulate(
 
 
 def _excitation(bench: Bench, excitation: Excitation | ArrayLike | None) -> Excitation:
+    """The excitation that is meant: given, an array of commands, or the bench's usual noise.
+
+    Raises
+    ------
+    InputError
+        For an array that is no command.
+    """
     if excitation is None:
         return WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0])
     if isinstance(excitation, Excitation):

@@ -30,7 +30,7 @@ COARSE, FINE = 1, 8
 
 @dataclass(frozen=True)
 class TrueLimit:
-    """The critical stiffness, and the frequency of the eigenvalue on the unit circle there."""
+    """The critical stiffness, N/m or N m/rad, and the frequency that the loop then shakes at."""
 
     stiffness: float
     frequency_hz: float
@@ -41,7 +41,15 @@ class SampledLoop:
     """The open loop over one period: s[k+1] = matrix s[k] + column u[k], y[k] = row s[k].
 
     The state holds the plant, the commands that are still on their way, the signals that come back
-    delayed, and y[k-1] (read by `previous`).
+    delayed, and y[k-1].
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (n, n)
+    column, row : ndarray, shape (n,)
+    previous : ndarray, shape (n,)
+        Reads y[k-1].
+    period_s : float
     """
 
     matrix: Array
@@ -74,7 +82,15 @@ def sampled_loop(plant: Plant, period_s: float, substeps: int = FINE) -> Sampled
     """The linear part of a plant with its delays over one period.
 
     Dry friction and other nonlinear forces are left out. A delayed spring is a chain of its past
-    signals, `substeps` a period, joined by straight lines.
+    signals, joined by straight lines.
+
+    Parameters
+    ----------
+    plant : Plant
+    period_s : float
+        Sampling period, s.
+    substeps : int
+        Signals a period in such a chain.
     """
     if plant.delayed:
         drift, old, new = _period_with_chains(plant, period_s, substeps)
@@ -143,7 +159,18 @@ def spectral_radius(
 ) -> float:
     """Largest modulus of the closed loop's eigenvalues, at the beginning of the recording.
 
-    With a `cutoff_hz` the velocity of the damping term is low-passed; see `run_wall`.
+    Parameters
+    ----------
+    bench : Setup
+    stiffness, damping : float
+        Of the wall.
+    cutoff_hz : float, optional
+        Of the low-pass on the velocity of the damping term; see `run_wall`.
+
+    Returns
+    -------
+    float
+        Below 1 where the loop is stable.
     """
     loop = sampled_loop(bench.plant(), bench.period_s)
     a = smoothing_of(cutoff_hz, bench.period_s)
@@ -185,10 +212,12 @@ def critical_limit(bench: Setup, damping: float = 0.0) -> TrueLimit:
 
 
 def _radii(loop: SampledLoop, stiffness: Array, damping: float, smoothing: float = 0.0) -> Array:
+    """Largest modulus of the eigenvalues for each of K stiffnesses, shape (K,)."""
     return np.abs(np.linalg.eigvals(loop.closed(stiffness, damping, smoothing))).max(axis=1)
 
 
 def _limit(bench: Setup, plant: Plant, damping: float) -> TrueLimit:
+    """The limit of a plant that does not change: scanned from below, then bisected."""
     fine = sampled_loop(plant, bench.period_s)
     coarse = fine
     if plant.delayed and min(spring.delay_s for spring in plant.delayed) >= bench.period_s:

@@ -49,7 +49,14 @@ class SmoothLaw(Law):
 
 @dataclass(frozen=True)
 class PowerSpring(SmoothLaw):
-    """-coefficient q^power, an odd power: a cubic spring hardens, or softens if negative."""
+    """-coefficient q^power, an odd power: a cubic spring hardens, or softens if negative.
+
+    Attributes
+    ----------
+    coefficient : float
+        Force over position to that power.
+    power : int
+    """
 
     coefficient: float
     power: int = 3
@@ -64,7 +71,16 @@ class Gap(SmoothLaw):
     """What a gap of +-`gap` takes away from a linear spring and damper.
 
     Added to the link -(stiffness q + damping v), the sum is a spring that begins at the edges of
-    the gap. `free_damping` is the part of the damping that is absent inside it.
+    the gap.
+
+    Attributes
+    ----------
+    stiffness : float
+        Of the link, force over position.
+    gap : float
+        Half of its width, a position.
+    free_damping : float
+        The part of the link's damping that is absent inside the gap, force over velocity.
     """
 
     stiffness: float
@@ -80,7 +96,17 @@ class Gap(SmoothLaw):
 
 @dataclass(frozen=True)
 class Ripple(SmoothLaw):
-    """A force that repeats with the position (cogging): amplitude sin(2 pi q/pitch + phase)."""
+    """A force that repeats with the position (cogging): amplitude sin(2 pi q/pitch + phase).
+
+    Attributes
+    ----------
+    amplitude : float
+        A force.
+    pitch : float
+        The position after which it repeats.
+    phase : float
+        Radians.
+    """
 
     amplitude: float
     pitch: float
@@ -93,7 +119,7 @@ class Ripple(SmoothLaw):
 
 @dataclass(frozen=True)
 class Drag(SmoothLaw):
-    """-coefficient v |v|, the resistance of a turbulent fluid."""
+    """-coefficient v |v|, the resistance of a turbulent fluid; force over velocity squared."""
 
     coefficient: float
 
@@ -106,6 +132,15 @@ class Drag(SmoothLaw):
 class Dahl(SmoothLaw):
     """Dahl's friction F' = -sigma (v + |v| F/level), exact for a step in one direction.
 
+    Attributes
+    ----------
+    level : float
+        The force that it ends in.
+    sigma : float
+        The stiffness that it begins with, force over position.
+
+    References
+    ----------
     P. R. Dahl, "A solid friction model", Aerospace Corporation TOR-0158 (1968).
     """
 
@@ -124,6 +159,13 @@ class DryFriction(Law):
 
     Sliding, the force is -sign(v) (level + (static - level) exp(-(v/stribeck_velocity)^2)); at
     rest it is whatever keeps the rest, up to `static`.
+
+    Attributes
+    ----------
+    level, static : float
+        Forces, in fast motion and at rest.
+    stribeck_velocity : float
+        How fast the one goes over into the other.
     """
 
     level: float
@@ -132,7 +174,7 @@ class DryFriction(Law):
     dry: ClassVar[bool] = True
 
     def bound(self, v: float) -> float:
-        """Size of the sliding force at the velocity v."""
+        """Size of the sliding force at the velocity v, zero or more."""
         return sliding(v, self.constants)
 
 

@@ -33,6 +33,8 @@ class Plant:
         The same for delayed springs: where they push, and the signal that comes back delayed.
     places : dict of str to tuple of int
         Where the position and the velocity of each mass are in the state.
+    delay_s : float
+        Loop delay in front of the actuator, s.
     """
 
     dynamics: Array
@@ -51,6 +53,7 @@ class Plant:
 
     @property
     def states(self) -> int:
+        """n, the number of states."""
         return len(self.dynamics)
 
 
@@ -59,6 +62,11 @@ def assemble(structure: Structure) -> Plant:
 
     The state is: positions, velocities, force of each relaxation, actuator stages, position
     filters, low-passed signals of the delayed springs.
+
+    Raises
+    ------
+    InputError
+        Where something acts on a mass that the structure does not have.
     """
     return _Assembly(structure).plant()
 
@@ -134,11 +142,13 @@ class _Assembly:
         return np.array(columns).reshape(-1, self.n).T
 
     def _take(self, states: int) -> int:
+        """Room for more states; the index of the first."""
         first = self.next_free
         self.next_free += states
         return first
 
     def _add_relaxation(self, element: Relaxation) -> None:
+        """F' = stiffness v - F / time constant, and F between both nodes."""
         _, v = self._motion(element.a, element.b)
         state = self._take(1)
         self.a[state] += element.stiffness * v

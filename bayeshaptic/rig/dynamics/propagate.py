@@ -16,7 +16,13 @@ class StateLayout:
     """Where the inputs stand behind the states in the augmented state of the propagator.
 
     Every input is a state of its own: the command and the nonlinear forces keep their values during
-    a step, the hand's force and the delayed springs' forces run along straight lines.
+    a step, the hand's force and the delayed springs' forces run along straight lines.  Properties
+    are indices into that state.
+
+    Attributes
+    ----------
+    states, laws, delayed : int
+        How many states, nonlinear forces and delayed springs the plant has.
     """
 
     states: int
@@ -49,15 +55,28 @@ class StateLayout:
 
     @property
     def size(self) -> int:
+        """Length of the augmented state."""
         return self.first_slope + self.delayed
 
 
 def layout(plant: Plant) -> StateLayout:
+    """Where a plant's inputs stand in its augmented state."""
     return StateLayout(plant.states, len(plant.laws), len(plant.delayed))
 
 
 def generator(plant: Plant) -> Array:
-    """The matrix whose exponential advances states and inputs together, shape (size, size)."""
+    """The matrix whose exponential advances states and inputs together.
+
+    Parameters
+    ----------
+    plant : Plant
+
+    Returns
+    -------
+    ndarray, shape (size, size)
+        Times a step's length its exponential is that step (C. F. Van Loan, "Computing integrals
+        involving the matrix exponential", IEEE Transactions on Automatic Control 23, 1978).
+    """
     at, n = layout(plant), plant.states
     matrix = np.zeros((at.size, at.size))
     matrix[:n, :n] = plant.dynamics
@@ -72,7 +91,7 @@ def generator(plant: Plant) -> Array:
 
 
 def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
-    """The delay as whole periods and a rest, 0 <= rest < period_s."""
+    """A delay as whole periods and a rest, s, 0 <= rest < period_s; rounding apart."""
     periods = delay_s / period_s
     whole = math.floor(periods + 1e-9)
     rest = (periods - whole) * period_s
@@ -81,7 +100,15 @@ def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of the period in which the command is constant, cut into equal steps."""
+    """A part of the period in which the command is constant, cut into equal steps.
+
+    Attributes
+    ----------
+    length_s : float
+    steps : int
+    new : bool
+        Whether the new command acts in it, or still the one before.
+    """
 
     length_s: float
     steps: int
@@ -89,6 +116,7 @@ class Stretch:
 
     @property
     def step_s(self) -> float:
+        """Length of a step, s."""
         return self.length_s / self.steps
 
 
@@ -111,7 +139,16 @@ def stretches(delay_s: float, period_s: float, substeps: int) -> tuple[Stretch, 
 class PeriodMap:
     """x[k+1] = phi x[k] + old u[k-d-1] + new u[k-d] + hand_start h[k] + hand_end h[k+1].
 
-    d is the whole part of the delay; h is the hand's force, a straight line between samples.
+    Attributes
+    ----------
+    phi : ndarray, shape (n, n)
+    old, new : ndarray, shape (n,)
+        What the command before and the new one do, of which the latter acts when the rest of the
+        delay has passed.
+    hand_start, hand_end : ndarray, shape (n,)
+        What the hand's force h does, a straight line between samples.
+    delay_periods : int
+        d, the whole part of the delay.
     """
 
     phi: Array
@@ -123,7 +160,10 @@ class PeriodMap:
 
 
 def period_map(plant: Plant, period_s: float) -> PeriodMap:
-    """One period of the plant's linear part without delayed springs, by matrix exponentials."""
+    """One sampling period of a plant's linear part, by matrix exponentials.
+
+    Nonlinear forces and delayed springs are left out.
+    """
     at, n, matrix = layout(plant), plant.states, generator(plant)
     whole, rest = split_delay(plant.delay_s, period_s)
     first = scipy.linalg.expm(matrix * rest)
@@ -141,7 +181,20 @@ def period_map(plant: Plant, period_s: float) -> PeriodMap:
 
 
 def shifted(command: Array, periods: int, before: Array) -> Array:
-    """The command `periods` samples later, with what came `before` it (zeros where unknown)."""
+    """A command that arrives later.
+
+    Parameters
+    ----------
+    command : ndarray, shape (N,)
+    periods : int
+        By how many samples.
+    before : ndarray, shape (M,)
+        What was commanded before; zeros where that does not reach back far enough.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+    """
     history = np.concatenate([np.zeros(max(periods - len(before), 0)), before, command])
     start = len(history) - len(command) - periods
     return history[start : start + len(command)]

@@ -75,7 +75,23 @@ class Memory(NamedTuple):
 
 
 def tables(plant: Plant, period_s: float, substeps: int, halvings: int) -> Tables:
-    """What `stepper_kernel.run` needs to know of a plant."""
+    """What `stepper_kernel.run` needs to know of a plant.
+
+    Parameters
+    ----------
+    plant : Plant
+    period_s : float
+        Sampling period, s.
+    substeps : int
+        Steps a period, at least.
+    halvings : int
+        How often a step may be halved.
+
+    Raises
+    ------
+    InputError
+        For a delayed spring whose delay is shorter than a step.
+    """
     parts = stretches(plant.delay_s, period_s, substeps)
     found = [[_step(plant, part.step_s / 2**h) for h in range(halvings + 1)] for part in parts]
     matrix, constant, ramp, grip = (
@@ -123,6 +139,7 @@ def _step(plant: Plant, length_s: float) -> tuple[Array, Array, Array, Array]:
 
 
 def _place(motion: Array) -> list[int]:
+    """A row of `Tables.place`: where position and velocity of a law are in the state."""
     found = []
     for row in motion:
         minus = np.flatnonzero(row < 0)
@@ -135,10 +152,22 @@ def delay_lookup(
 ) -> list[tuple[int, float]]:
     """For the end of each step: where its time less the delay lies between the step boundaries.
 
+    Parameters
+    ----------
+    parts : tuple of Stretch
+        The period.
+    period_s, delay_s : float
+        Sampling period and delay of the spring, s.
+
     Returns
     -------
     list of tuple
         (how many boundaries before the step's beginning, weight of the boundary after that one).
+
+    Raises
+    ------
+    InputError
+        For a delay that is shorter than a step.
     """
     steps = [part.step_s for part in parts for _ in range(part.steps)]
     if delay_s < max(steps):

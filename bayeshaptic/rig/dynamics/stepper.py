@@ -18,6 +18,7 @@ HALVINGS = 6
 
 
 def _run_compiled(*arguments: Any) -> None:
+    """`stepper_kernel.run`, imported when it is first needed."""
     from numba import NumbaExperimentalFeatureWarning
 
     from bayeshaptic.rig.dynamics.stepper_kernel import run
@@ -132,6 +133,7 @@ class Stepper:
         return states
 
     def _make_room(self, steps: int) -> None:
+        """Room for the signals of the delayed springs over so many steps more."""
         history = self.memory.history
         if len(history) and self.memory.filled[0] + steps > history.shape[1]:
             room = np.zeros((len(history), history.shape[1] + steps))

@@ -40,7 +40,10 @@ class Relaxation:
 
 @dataclass(frozen=True)
 class DelayedSpring:
-    """A force -(stiffness + damping s) e^(-s delay) / (1 + s time_constant) x between two nodes."""
+    """A force -(stiffness + damping s) e^(-s delay) / (1 + s time_constant) x between two nodes.
+
+    x is the position of `a` relative to `b`; times in s.
+    """
 
     a: str
     b: str
@@ -72,6 +75,12 @@ class Structure:
     ----------
     masses : dict of str to float
         kg or kg m^2, in the order of the state.
+    motor : str
+        The mass that the motor pushes and the encoder reads.
+    hand : str or None
+        The mass of the hand; None where nobody holds the device.
+    links, relaxations, delayed, laws : list
+        What joins the nodes.
     lags_s : list of float
         Time constants of the first-order stages between command and force.
     filters : list of tuple
@@ -93,23 +102,24 @@ class Structure:
     filters: list[tuple[float, float | None]] = field(default_factory=list)
 
     def mass(self, node: str) -> float:
-        """The mass at a node."""
+        """The mass at a node, kg or kg m^2; an `InputError` where the bench has no such mass."""
         self.check(node)
         return self.masses[node]
 
     def check(self, node: str) -> None:
-        """Refuse a node that the bench does not have."""
+        """Refuse, by an `InputError`, a mass that the bench does not have."""
         if node not in self.masses:
             raise InputError(f"the bench has no mass '{node}'; it has {', '.join(self.masses)}")
 
     def link(self, a: str, b: str) -> Link:
-        """The link between two nodes."""
+        """The link from node `a` to node `b`; an `InputError` where there is none."""
         for link in self.links:
             if (link.a, link.b) == (a, b):
                 return link
         raise InputError(f"the bench has no connection between '{a}' and '{b}'")
 
     def replace_link(self, old: Link, new: Link) -> None:
+        """Put another link in the place of one."""
         self.links[self.links.index(old)] = new
 
 
@@ -155,7 +165,13 @@ def chain(kind: str, values: Mapping[str, float], delay_s: float) -> Structure:
 
 
 def check_parameters(kind: str, values: Mapping[str, float]) -> None:
-    """Refuse an unknown mechanism, and parameters that are missing or not its own."""
+    """Refuse parameters that make no mechanism.
+
+    Raises
+    ------
+    InputError
+        For an unknown mechanism, and parameters that are missing or not its own.
+    """
     if kind not in PARAMETERS:
         raise InputError(f"unknown mechanism '{kind}'; choose from {', '.join(PARAMETERS)}")
     missing = [name for name in PARAMETERS[kind] if name not in values]

@@ -60,6 +60,7 @@ class Log:
     position: Array
 
     def rows(self, index: Array) -> Log:
+        """Some of the rows, by their indices."""
         return Log(self.time_s[index], self.force[index], self.position[index])
 
 
@@ -114,19 +115,28 @@ class Effect:
         """Add to the structure: masses, links, laws, lags, filters, delay."""
 
     def command(self, force: Array, progress: Array, time_s: Array) -> Array:
-        """What the actuator gets of the commands."""
+        """What the actuator gets of the commands.
+
+        Parameters
+        ----------
+        force : ndarray, shape (N,)
+            Commands, N or N m.
+        progress : ndarray, shape (N,)
+            Part of the recording that is over, 0 to 1.
+        time_s : ndarray, shape (N,)
+        """
         return force
 
     def sense(self, samples: Readings, rng: np.random.Generator) -> Readings:
-        """What the encoder gets to see, before it is rounded to counts."""
+        """What the encoder gets to see, before it is rounded to counts; `rng` is its own."""
         return samples
 
     def resolution(self, resolution: float) -> float:
-        """The encoder's count."""
+        """The encoder's count, m or rad, where it is `resolution` without the effect."""
         return resolution
 
     def log(self, log: Log, rng: np.random.Generator) -> Log:
-        """What is written down."""
+        """What is written down; `rng` is its own."""
         return log
 
 
