@@ -10,8 +10,8 @@ from linear_bench import PHANTOM_HELD, Device
 
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.forces.at_rest import at_rest
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -66,7 +66,7 @@ def test_friction_that_holds_a_held_device_is_not_taken_for_less() -> None:
     etfe = estimate_by_direct_method(replace(case.recording, reference=None))
     fit = least_squares(build_model("grasped", "phantom", delay_s=case.bench.delay_s), etfe)
     assert etfe.unbroken is not None
-    bench = ForceBench(State(etfe, fit), etfe.unbroken)
+    tryout = Tryout(State(etfe, fit), etfe.unbroken)
     strength = case.friction * case.bench.force_rms
-    start = bench.point((Acting(CoulombFriction(MOTOR), 0.6 * strength),), fit.theta)
-    assert fit_force(bench, start).strength == pytest.approx(strength, rel=0.05)
+    start = tryout.point((Acting(CoulombFriction(MOTOR), 0.6 * strength),), fit.theta)
+    assert fit_force(tryout, start).strength == pytest.approx(strength, rel=0.05)

@@ -10,7 +10,7 @@ import pytest
 from bayeshaptic.diagnosis.residuals import causal, residual
 from bayeshaptic.diagnosis.residuals.causal import causal_tests
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -49,8 +49,8 @@ def rubbing(case: Case) -> tuple[Fit, Etfe, Floats]:
     fit, etfe = right(case)
     assert etfe.unbroken is not None
     friction = (Acting(CoulombFriction(MOTOR), case.friction * case.bench.force_rms),)
-    bench = ForceBench(State(etfe, fit), etfe.unbroken)
-    point = bench.point(friction, fit.theta, rounds=3)
+    tryout = Tryout(State(etfe, fit), etfe.unbroken)
+    point = tryout.point(friction, fit.theta, rounds=3)
     assert point.motion is not None
     return summarise(fit.model, point.windows, point.theta), point.etfe, point.motion
 

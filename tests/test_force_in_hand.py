@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -30,11 +30,11 @@ def test_friction_in_a_hand_is_found_in_a_loop() -> None:
     )
     fit = least_squares(build_model("grasped", "lhifam", delay_s=case.bench.delay_s), etfe)
     assert etfe.unbroken is not None
-    bench = ForceBench(State(etfe, fit), etfe.unbroken)
+    tryout = Tryout(State(etfe, fit), etfe.unbroken)
     strength = case.friction * case.bench.force_rms
     truth = {**case.bench.values, "delay_s": case.bench.delay_s}
     theta = np.array([truth[name] for name in fit.model.names])
-    start = bench.point((Acting(CoulombFriction(MOTOR), 0.6 * strength),), fit.theta)
-    found = fit_force(bench, start)
-    assert found.gain_fit > bench.as_it_is((Acting(found.effect, strength),), theta).gain_fit
+    start = tryout.point((Acting(CoulombFriction(MOTOR), 0.6 * strength),), fit.theta)
+    found = fit_force(tryout, start)
+    assert found.gain_fit > tryout.as_it_is((Acting(found.effect, strength),), theta).gain_fit
     assert found.strength == pytest.approx(strength, rel=0.1)

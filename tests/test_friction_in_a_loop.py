@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -28,7 +28,7 @@ def test_the_mean_of_the_command_acts_as_the_rest_of_it_does(seed: int) -> None:
     etfe = estimate_by_direct_method(replace(case.recording, reference=None))
     fit = least_squares(build_model("free", "lhifam", delay_s=case.bench.delay_s), etfe)
     assert etfe.unbroken is not None
-    simulation = ForceBench(State(etfe, fit), etfe.unbroken).simulation
+    simulation = Tryout(State(etfe, fit), etfe.unbroken).simulation
     truth = {**case.bench.values, "delay_s": case.bench.delay_s}
     theta = np.array([truth[name] for name in fit.model.names])
     friction = (Acting(CoulombFriction(MOTOR), case.friction * case.bench.force_rms),)

@@ -7,8 +7,8 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
 from bayeshaptic.diagnosis.trials.forces.hints import STANDS_OUT, hints
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
@@ -34,14 +34,14 @@ def test_first_order_is_what_a_little_of_the_force_does(name: str, device: str) 
     recording = recording_from_arrays(**made.signals, encoder_resolution=rig.encoder_resolution)
     etfe = bh.estimate_etfe(recording)
     fit = bh.least_squares(bh.free(device=device), etfe)
-    bench = ForceBench(State(etfe, fit), recording)
+    tryout = Tryout(State(etfe, fit), recording)
     effect = EFFECTS[name]
-    (hint,) = hints(bench, [effect])
-    motion = bench.simulation.motions(fit.theta, (effect.place,))[effect.place]
+    (hint,) = hints(tryout, [effect])
+    motion = tryout.simulation.motions(fit.theta, (effect.place,))[effect.place]
     little = 0.01 * float(effect.first_strengths(fit.model, fit.theta, motion)[0])
     # At the optimum the likelihood's slope is that with the linear parameters as they are.
-    with_it = bench.as_it_is((Acting(effect, little),), fit.theta)
-    without = bench.as_it_is((), fit.theta)
+    with_it = tryout.as_it_is((Acting(effect, little),), fit.theta)
+    without = tryout.as_it_is((), fit.theta)
     gain = sum(
         sign * float(np.sum(Likelihood(fit.model, one.windows).pointwise(fit.theta[None])))
         for one, sign in ((with_it, 1.0), (without, -1.0))

@@ -10,9 +10,9 @@ import pytest
 from plain_stepping import step_through
 
 from bayeshaptic.diagnosis.state import State, fit_part
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
 from bayeshaptic.diagnosis.trials.forces.besides import Nothing
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.effects.nonlinear.internal_force import (
     CONNECTION,
@@ -85,9 +85,9 @@ OURS = {"hardening_connection": "hardening_spring"}
 BENCHS = {"rising_friction": "stribeck_friction"}  # with less at rest than in motion
 
 
-def driven(bench: ForceBench, force: Acting, theta: Any) -> Any:
+def driven(tryout: Tryout, force: Acting, theta: Any) -> Any:
     """What it does to the motor's position."""
-    made = bench.simulation
+    made = tryout.simulation
     return made.driven((force,), theta, made.added((force,), theta))
 
 
@@ -164,8 +164,8 @@ def test_added_motion_is_that_of_the_bench(
     effect = effect_class(OURS.get(name, name))(place, shape)
     # It begins at rest, and no constant force acts: there is no drift to look for.
     monkeypatch.setattr(Simulation, "_besides", lambda *_: Nothing())
-    bench = ForceBench(State(etfe, fit), with_force)
-    found = driven(bench, Acting(effect, strength), own.values)
+    tryout = Tryout(State(etfe, fit), with_force)
+    found = driven(tryout, Acting(effect, strength), own.values)
     # Moves in 50 ms: a mean and a slope do not matter.
     found, added = (
         signal[50:] - signal[:-50] for signal in (found, with_force.position - without.position)
@@ -184,15 +184,15 @@ def test_masses_that_rattle_in_a_gap_keep_to_the_measured_motion() -> None:
     recording = recorded(played)
     etfe = estimate_etfe(recording)
     fit = least_squares(build_model("grasped", "lhifam"), etfe)
-    bench = ForceBench(State(etfe, fit), recording)
+    tryout = Tryout(State(etfe, fit), recording)
     law = effect_class("backlash")(CONNECTION, {"damping_in_gap": 1.0})
     gap = Acting(law, played.effects[0].gap)  # type: ignore[attr-defined]
     truth = np.array([played.values[name] for name in fit.model.names])
     for _ in range(4):  # the slow motion of the hand is that beside what the gap did last
-        found = bench.as_it_is((gap,), truth)
+        found = tryout.as_it_is((gap,), truth)
     heavier = np.where(np.array(fit.model.names) == "m1", 1 + 1e-3, 1.0) * truth
     refitted = fit_part(fit.model, found.windows, truth)
-    gains = [bench.as_it_is((gap,), theta).gain_fit for theta in (heavier, refitted)]
+    gains = [tryout.as_it_is((gap,), theta).gain_fit for theta in (heavier, refitted)]
     assert min(gains) > 0.95 * found.gain_fit > 0, (found.gain_fit, gains)
 
 
@@ -201,14 +201,14 @@ def test_a_force_with_which_the_mass_runs_away_explains_nothing() -> None:
     recording = recorded(LHIFAM)
     etfe = estimate_etfe(recording)
     fit = least_squares(build_model("free", "lhifam"), etfe)
-    bench = ForceBench(State(etfe, fit), recording)
+    tryout = Tryout(State(etfe, fit), recording)
     friction = Acting(effect_class("coulomb_friction")(MOTOR, {}), 0.6)
-    before = driven(bench, friction, fit.theta)
+    before = driven(tryout, friction, fit.theta)
     softening = -1e3 * float(fit.theta[0]) * 1e4 / np.mean(recording.position**2)
     spring = Acting(effect_class("hardening_spring")(MOTOR, {}), softening)
-    found = bench.point((spring,), fit.theta)
+    found = tryout.point((spring,), fit.theta)
     assert found.gain_fit == found.gain_choose == -np.inf
-    after = driven(bench, friction, fit.theta)
+    after = driven(tryout, friction, fit.theta)
     assert np.array_equal(before, after)
 
 

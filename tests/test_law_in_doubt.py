@@ -10,9 +10,9 @@ import pytest
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
 from bayeshaptic.diagnosis.trials.forces.in_doubt import in_doubt
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -35,12 +35,12 @@ def state_of(bench: Bench) -> State:
     return State(etfe, least_squares(build_model("free", "lhifam"), etfe))
 
 
-def beside(bench: ForceBench, point: Point, factor: float) -> Point:
+def beside(tryout: Tryout, point: Point, factor: float) -> Point:
     """The linear parameters fitted beside so much of the force, in the motion that it makes."""
     forces = (Acting(point.effect, factor * point.strength),)
-    found = bench.point(forces, point.theta, expected=point.motion)
+    found = tryout.point(forces, point.theta, expected=point.motion)
     for _ in range(20):
-        further = bench.point(forces, found.theta, expected=found.motion)
+        further = tryout.point(forces, found.theta, expected=found.motion)
         if np.allclose(further.theta, found.theta, rtol=1e-4):
             break
         found = further
@@ -61,14 +61,14 @@ def test_a_law_moves_the_limit_as_far_as_more_of_the_force_does(
     device = replace(LHIFAM, values={**LHIFAM.values, **damping})
     state = state_of(device.with_effect("coulomb_friction", force=friction))
     assert state.etfe.recording is not None
-    bench = ForceBench(state, state.etfe.recording)
-    start = bench.point((Acting(CoulombFriction(MOTOR), friction),), state.fit.theta)
-    point = fit_force(bench, start)
+    tryout = Tryout(state, state.etfe.recording)
+    start = tryout.point((Acting(CoulombFriction(MOTOR), friction),), state.fit.theta)
+    point = fit_force(tryout, start)
     moved = [
-        abs(log_limit(beside(bench, point, factor)) - log_limit(point))
+        abs(log_limit(beside(tryout, point, factor)) - log_limit(point))
         for factor in (1 - thresholds.LAW_SD, 1 + thresholds.LAW_SD)
     ]
-    assert min(moved) / 1.5 < in_doubt(bench, point)[1] < 1.5 * max(moved)
+    assert min(moved) / 1.5 < in_doubt(tryout, point)[1] < 1.5 * max(moved)
 
 
 def log_limit(point: Point) -> float:

@@ -9,9 +9,9 @@ import pytest
 from scipy.signal import butter, csd, sosfiltfilt, welch
 
 from bayeshaptic.diagnosis.state import State, log_likelihoods
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, answered
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout, answered
 from bayeshaptic.effects.nonlinear.actuator import ActuatorSaturation
 from bayeshaptic.effects.nonlinear.drag import Drag
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction, StribeckFriction
@@ -40,14 +40,14 @@ def recorded(held: bool, seconds: float = 20.0) -> tuple[Bench, Recording]:
 
 
 @pytest.fixture(scope="module")
-def held() -> tuple[Bench, ForceBench, Floats]:
+def held() -> tuple[Bench, Tryout, Floats]:
     """A held device with friction and a drag, tried on, and its true parameters."""
     bench, recording = recorded(held=True)
     model = build_model("grasped", delay_s=bench.delay_s, period_s=recording.period_s)
     etfe = estimate_etfe(recording)
     fit = least_squares(model, etfe)
     theta = np.array([max(bench.values[name], 1e-6) for name in fit.model.names])
-    return bench, ForceBench(State(etfe, fit), recording), theta
+    return bench, Tryout(State(etfe, fit), recording), theta
 
 
 def acting(bench: Bench) -> tuple[Acting, Acting]:
@@ -101,7 +101,7 @@ def test_nothing_is_louder_without_a_hand_or_forces_on_it(held) -> None:  # type
     free, recording = recorded(held=False, seconds=5.0)
     model = build_model("free", delay_s=free.delay_s, period_s=recording.period_s)
     etfe = estimate_etfe(recording)
-    other = ForceBench(State(etfe, least_squares(model, etfe)), recording)
+    other = Tryout(State(etfe, least_squares(model, etfe)), recording)
     assert other.as_it_is(acting(free), other.state.fit.theta).windows.louder is None
 
 

@@ -18,10 +18,10 @@ from bayeshaptic.diagnosis.trials import beside
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.forces import called_for as tried, search, slopes
 from bayeshaptic.diagnosis.trials.forces.along import Along
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.search import _damped, _scan
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
 from bayeshaptic.diagnosis.trials.forces.slopes import Form, Reach, linearised, nudges_of, spread
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.diagnosis.trials.other_laws import found_anew, reconsidered
@@ -131,16 +131,18 @@ def test_what_goes_with_a_friction_is_where_the_rest_fits_best() -> None:
     best = max(trials, key=lambda trial: trial.score)
     recording = state.etfe.unbroken
     assert recording is not None
-    bench = ForceBench(state, recording)
+    tryout = Tryout(state, recording)
     strength = best.accepted.estimates["friction_force"].mean
-    found = bench.point((Acting(CoulombFriction(MOTOR), strength),), best.state.fit.theta, rounds=3)
-    covariance, along = spread(bench, found)
-    here, low, high = search_box(bench.model)
+    found = tryout.point(
+        (Acting(CoulombFriction(MOTOR), strength),), best.state.fit.theta, rounds=3
+    )
+    covariance, along = spread(tryout, found)
+    here, low, high = search_box(tryout.model)
     phi, sd = here.coordinate(found.theta[None]), np.sqrt(covariance[0, 0])
 
     def gain(log: float, moved: bool) -> float:
         theta = here.natural(np.clip(phi + log * moved * along.T, low, high))[0]
-        return bench.as_it_is((Acting(found.effect, strength * np.exp(log)),), theta).gain_fit
+        return tryout.as_it_is((Acting(found.effect, strength * np.exp(log)),), theta).gain_fit
 
     def fall(moved: bool) -> float:
         """From four standard deviations to eight, either way."""
@@ -157,7 +159,7 @@ def test_what_a_force_is_worth_does_not_depend_on_what_was_simulated_before() ->
     held = Bench.from_device("lhifam", held=True).with_effect("coulomb_friction", force=0.5)
     state = state_of(held, "grasped")
     assert state.etfe.unbroken is not None
-    bench, friction = ForceBench(state, state.etfe.unbroken), (Acting(CoulombFriction(MOTOR), 0.5),)
+    bench, friction = Tryout(state, state.etfe.unbroken), (Acting(CoulombFriction(MOTOR), 0.5),)
     found = bench.as_it_is(friction, state.fit.theta)
     assert found.motion is not None
     for part in (0.5, 1.5):
@@ -231,7 +233,7 @@ def test_what_a_step_along_a_ridge_leaves_is_foreseen() -> None:
     """Drag up by half, and the damper that it makes up for down as far: the product counts."""
     state, _ = rubbed(0.0)
     assert state.etfe.unbroken is not None
-    bench, damper = ForceBench(state, state.etfe.unbroken), state.model.names.index("b1")
+    bench, damper = Tryout(state, state.etfe.unbroken), state.model.names.index("b1")
     kind = next(kind for kind in effects("nonlinear") if kind.name == "drag")
     velocity = bench.simulation.motions(state.fit.theta, (MOTOR,))[MOTOR].velocity
     looks_like = np.mean(np.abs(velocity) ** 3) / np.mean(velocity**2)
@@ -291,7 +293,7 @@ def test_slopes_over_the_linear_parameters_are_taken_again_only_where_something_
 ) -> None:
     state, (trial,) = rubbed(0.5)
     assert state.etfe.recording and trial.accepted.change and trial.accepted.change.acting
-    bench, theta = ForceBench(state, state.etfe.recording), trial.state.fit.theta
+    bench, theta = Tryout(state, state.etfe.recording), trial.state.fit.theta
     begun = bench.as_it_is((trial.accepted.change.acting,), theta)
     form, nudges, near = Form.of(begun), nudges_of(bench), np.ones(1)
     simulated: list[int] = []
@@ -342,9 +344,9 @@ def test_only_what_stands_out_to_first_order_is_scanned(monkeypatch: pytest.Monk
     scanned: list[tuple[str, Any]] = []
     own = search._scan
 
-    def scan(bench: ForceBench, before: Any, effect: Any, *rest: Any, **more: Any) -> list[Point]:
+    def scan(tryout: Tryout, before: Any, effect: Any, *rest: Any, **more: Any) -> list[Point]:
         scanned.append((effect.name, getattr(effect, "place", None)))
-        return own(bench, before, effect, *rest, **more)
+        return own(tryout, before, effect, *rest, **more)
 
     monkeypatch.setattr(search, "_scan", scan)
     found = nonlinear_trials(state, {"sign(v)", "|v| v", "v^3", "u^3"}, Meter())
@@ -517,7 +519,7 @@ def test_a_law_that_takes_all_damping_and_a_motion_that_runs_away_spoil_no_other
     state, _ = rubbed(0.5)
     recording, without = state.etfe.unbroken, state.fit.theta
     assert recording is not None
-    bench, friction = ForceBench(state, recording), Acting(CoulombFriction(MOTOR), 0.5)
+    bench, friction = Tryout(state, recording), Acting(CoulombFriction(MOTOR), 0.5)
     assert bench.point((friction,), without).gain_fit > 100
     ground = np.isin(state.model.names, ("b1", "b2"))
     damped = _damped(bench, np.where(ground, 0.0, without))
@@ -631,7 +633,7 @@ def test_where_no_response_is_a_number_no_force_is_worth_anything() -> None:
     """A damper at zero behind a spring far too stiff: the report ended in a traceback."""
     state = state_of(LHIFAM)
     assert state.etfe.recording is not None
-    bench = ForceBench(state, state.etfe.recording)
+    tryout = Tryout(state, state.etfe.recording)
     theta = state.fit.theta * np.nan
-    point = bench.as_it_is((Acting(CoulombFriction(MOTOR), 0.1),), theta)
+    point = tryout.as_it_is((Acting(CoulombFriction(MOTOR), 0.1),), theta)
     assert point.gain_fit == point.gain_choose == -np.inf

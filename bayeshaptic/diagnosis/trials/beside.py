@@ -13,9 +13,9 @@ from __future__ import annotations
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
 from bayeshaptic.diagnosis.trials.forces.called_for import is_there
 from bayeshaptic.diagnosis.trials.forces.hints import hints
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.laws import BESIDE
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
@@ -40,8 +40,8 @@ def beside_tests(state: State) -> tuple[Test, ...]:
     recording = state.etfe.unbroken
     if recording is None or state.etfe.through_reference:
         return ()
-    bench = ForceBench(state, recording)
-    motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    tryout = Tryout(state, recording)
+    motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     looked_for = [
         effect
         for kind in effects("nonlinear")
@@ -49,7 +49,7 @@ def beside_tests(state: State) -> tuple[Test, ...]:
         for effect in kind.candidates(state.model, motion)
     ]
     tests: dict[str, Test] = {}
-    for hint in hints(bench, looked_for):
+    for hint in hints(tryout, looked_for):
         over = _OVER[hint.effect.over[0], hint.effect.place]
         text = f"{hint.effect.title} beside it stands {hint.score:.1f} standard deviations out"
         test = Test(over + BESIDE, "nonlinear", hint.score, thresholds.two_sided(), None, text)

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Sequence
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.state import State, Trial
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.called_for import called_for
 from bayeshaptic.diagnosis.trials.forces.search import (
     Variants,
@@ -22,6 +21,7 @@ from bayeshaptic.diagnosis.trials.forces.search import (
     worth_following,
 )
 from bayeshaptic.diagnosis.trials.forces.trial import force_trial
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.diagnosis.trials.other_laws import in_the_place_of_one
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
@@ -47,8 +47,8 @@ def nonlinear_trials(
     recording = state.etfe.unbroken
     if recording is None:
         return []
-    bench = ForceBench(state, recording)
-    motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    tryout = Tryout(state, recording)
+    motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     firsts, others = called_for(state, variables(raised), motion)
 
     def looked_for(
@@ -58,26 +58,26 @@ def nonlinear_trials(
         points, inner = [], []
         for law in laws:
             point = known.get(law[0].strength[0])
-            if bench.before and point is None and not isinstance(law[0], CommandEffect):
+            if tryout.before and point is None and not isinstance(law[0], CommandEffect):
                 inner.append(law)
             elif (there := _beside(law, point)) and meter.affords(law[0].title):
-                points.append(search(bench, there, motion, meter, point))
-        found = fitted(bench, points, meter, before)
-        return found + beside_others(bench, inner, meter) if inner else found
+                points.append(search(tryout, there, motion, meter, point))
+        found = fitted(tryout, points, meter, before)
+        return found + beside_others(tryout, inner, meter) if inner else found
 
     # Of a mass that a controller holds against its friction first order says nothing: strengths
     # that gained 195 in log likelihood had a score of zero.
     in_loop = state.etfe.direct or state.etfe.through_reference
-    found = looked_for(firsts if in_loop else to_scan(bench, firsts, {}, meter), {})
+    found = looked_for(firsts if in_loop else to_scan(tryout, firsts, {}, meter), {})
     known = {point.effect.strength[0]: point for point in found}
     for point in [one for one in known.values() if worth_following(one, known.values())]:
         laws = [_beside(law, point) for law in others if law[0].contains(point.effect)]
-        found += containing(bench, point, laws, meter)
+        found += containing(tryout, point, laws, meter)
     rest = [law for law in others if not any(law[0].contains(p.effect) for p in known.values())]
     # Where a limit is gradual says nothing of where it would be hard.
     alike = {name: p for name, p in known.items() if not isinstance(p.effect, CommandEffect)}
-    found = looked_for(to_scan(bench, rest, alike, meter), alike, found)
-    trials = [force_trial(bench, point) for point in found]
+    found = looked_for(to_scan(tryout, rest, alike, meter), alike, found)
+    trials = [force_trial(tryout, point) for point in found]
     return trials if in_loop else trials + in_the_place_of_one(trials, meter)
 
 
@@ -97,12 +97,12 @@ def trial_of(
     """
     if state.etfe.unbroken is None or not meter.affords(kind.title):
         return None
-    bench = ForceBench(state, state.etfe.unbroken)
-    motion = bench.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
-    best = search(bench, list(kind.candidates(state.model, motion)), motion, meter)
+    tryout = Tryout(state, state.etfe.unbroken)
+    motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
+    best = search(tryout, list(kind.candidates(state.model, motion)), motion, meter)
     if not thresholds.convincing(best.gain_fit, best.gain_choose, 1):
         return None
-    trials = [force_trial(bench, point) for point in fitted(bench, [best], meter)]
+    trials = [force_trial(tryout, point) for point in fitted(tryout, [best], meter)]
     return next((trial for trial in trials if trial.convincing), None)
 
 

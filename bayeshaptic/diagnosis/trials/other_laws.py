@@ -9,11 +9,11 @@ import numpy as np
 
 from bayeshaptic.diagnosis import acceptance
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
 from bayeshaptic.diagnosis.trials.forces.called_for import called_for
 from bayeshaptic.diagnosis.trials.forces.hints import departures
 from bayeshaptic.diagnosis.trials.forces.search import beside_others, fitted, search
 from bayeshaptic.diagnosis.trials.forces.trial import force_trial
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.diagnosis.trials.taken_off import put_back
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, NonlinearEffect
@@ -41,15 +41,15 @@ def in_the_place_of_one(trials: Sequence[Trial], meter: Meter) -> list[Trial]:
         recording = simple.state.etfe.unbroken
         if not (larger and simple.state.model.held) or recording is None:
             continue
-        bench = ForceBench(simple.state, recording)
+        tryout = Tryout(simple.state, recording)
         theta = simple.state.fit.theta
-        motion = bench.simulation.motions(theta, (MOTOR, LOAD, CONNECTION))
-        here = bench.as_it_is(bench.before, theta, bench.known_motion)
-        least = _AS_FAR * max((h.score for h in departures(bench, here, larger)), default=np.inf)
+        motion = tryout.simulation.motions(theta, (MOTOR, LOAD, CONNECTION))
+        here = tryout.as_it_is(tryout.before, theta, tryout.known_motion)
+        least = _AS_FAR * max((h.score for h in departures(tryout, here, larger)), default=np.inf)
         others, _ = called_for(simple.state, {v for law in larger for v in law.over}, motion)
         inner = [law for law in others if not isinstance(law[0], CommandEffect)]
-        for point in beside_others(bench, inner, meter, least):
-            trial = force_trial(bench, point)
+        for point in beside_others(tryout, inner, meter, least):
+            trial = force_trial(tryout, point)
             found.append(
                 replace(
                     trial,
@@ -87,18 +87,18 @@ def found_anew(state: State, meter: Meter) -> State:
     etfe = put_back(state.etfe, last.change, rest)
     bare = State(etfe, least_squares(state.model, etfe, start=state.fit.theta), tuple(rest))
     assert etfe.recording
-    bench = ForceBench(bare, etfe.recording)
+    tryout = Tryout(bare, etfe.recording)
     if not meter.affords(last.title):
         # As it is; what it leaves open beside an effect that is gone says nothing any more.
-        here = bench.point((*bench.before, last.change.acting), state.fit.theta)
-        return force_trial(bench, here).state if bench.stays(here) else state
-    motion = bench.simulation.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
+        here = tryout.point((*tryout.before, last.change.acting), state.fit.theta)
+        return force_trial(tryout, here).state if tryout.stays(here) else state
+    motion = tryout.simulation.motions(bare.fit.theta, (MOTOR, LOAD, CONNECTION))
     present = last.change.acting.effect
-    own = search(bench, list(present.candidates(bare.model, motion)), motion, meter)
+    own = search(tryout, list(present.candidates(bare.model, motion)), motion, meter)
     laws, _ = called_for(bare, set(present.over), motion)
     others = [law for law in laws if law[0].name != present.name]
-    found = [*fitted(bench, [own], meter), *beside_others(bench, others, meter)]
-    trials = [force_trial(bench, point) for point in found]
+    found = [*fitted(tryout, [own], meter), *beside_others(tryout, others, meter)]
+    trials = [force_trial(tryout, point) for point in found]
     return max(trials, key=lambda trial: trial.score).state if trials else state
 
 
@@ -112,17 +112,17 @@ def _instead_of(one: Accepted, state: State, meter: Meter) -> list[Trial]:
     fit = summarise(state.model, windows, polish(state.model, windows, state.fit.theta))
     without = State(etfe, fit, rest)
     assert etfe.recording
-    bench = ForceBench(without, etfe.recording)
-    motion = bench.simulation.motions(fit.theta, (MOTOR, LOAD, CONNECTION))
+    tryout = Tryout(without, etfe.recording)
+    motion = tryout.simulation.motions(fit.theta, (MOTOR, LOAD, CONNECTION))
     laws = [
         [e for e in law if (e.name, e.place) != (present.name, present.place)]
         for law in called_for(without, set(present.over), motion)[0]
     ]
-    here = bench.point((*bench.before, one.change.acting), state.fit.theta)
-    if not bench.stays(here):
+    here = tryout.point((*tryout.before, one.change.acting), state.fit.theta)
+    if not tryout.stays(here):
         return []
-    others = beside_others(bench, [law for law in laws if law], meter)
-    return [force_trial(bench, point) for point in (here, *others)]
+    others = beside_others(tryout, [law for law in laws if law], meter)
+    return [force_trial(tryout, point) for point in (here, *others)]
 
 
 def _likeliest(state: State, found: list[Trial]) -> State:

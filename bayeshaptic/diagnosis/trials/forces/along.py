@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench
+from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.types import Complexes, Floats
@@ -46,7 +46,7 @@ class Along:
 
 
 def slopes_along(
-    bench: ForceBench,
+    tryout: Tryout,
     forces: tuple[Acting, ...],
     theta: Floats,
     added: Floats,
@@ -56,7 +56,7 @@ def slopes_along(
 
     Parameters
     ----------
-    bench : ForceBench
+    tryout : Tryout
     forces : tuple of Acting
     theta : ndarray, shape (P,)
     added : ndarray, shape (F, N)
@@ -64,18 +64,18 @@ def slopes_along(
     distances : ndarray, shape (P,)
         How far each parameter goes.
     """
-    here, _, _ = search_box(bench.model)
+    here, _, _ = search_box(tryout.model)
     phi = here.coordinate(theta[None])[0]
     moving = [not isinstance(one.effect, CommandEffect) for one in forces]
     if not any(moving):
-        return np.zeros((len(phi), 0, len(bench.frequency_hz)), complex)
+        return np.zeros((len(phi), 0, len(tryout.frequency_hz)), complex)
 
     def near(vector: Floats) -> Floats:
-        return bench.simulation.added_near(forces, vector, added)[moving]
+        return tryout.simulation.added_near(forces, vector, added)[moving]
 
     found, own = [], near(theta)
     for vector, distance in zip(here.natural(phi + np.diag(distances)), distances, strict=True):
         moves = (near(vector) - own) / distance
         usable = np.isfinite(moves[:, :1])  # not where it runs away
-        found.append([bench.at_lines(move) for move in np.where(usable, moves, 0.0)])
+        found.append([tryout.at_lines(move) for move in np.where(usable, moves, 0.0)])
     return np.array(found)

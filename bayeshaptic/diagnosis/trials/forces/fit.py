@@ -12,8 +12,8 @@ import numpy as np
 
 from bayeshaptic.diagnosis.state import FIT, fit_part
 from bayeshaptic.diagnosis.trials.forces.along import Along
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.slopes import NUDGE, Form, Reach, linearised, nudges_of
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.fit import search_box
@@ -42,7 +42,7 @@ class _Step:
         return float(np.abs(self.logs).max())
 
 
-def fit_force(bench: ForceBench, found: Point) -> Point:
+def fit_force(tryout: Tryout, found: Point) -> Point:
     """The best forces of the laws near `found`, or `found` where nothing is better.
 
     Where friction holds a motor in a hand, also by way of those that leave the hand the smoothest
@@ -50,7 +50,7 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
 
     Parameters
     ----------
-    bench : ForceBench
+    tryout : Tryout
     found : Point
         The best of a coarse scan.
 
@@ -58,29 +58,29 @@ def fit_force(bench: ForceBench, found: Point) -> Point:
     -------
     Point
     """
-    best = _fit(bench, found)
+    best = _fit(tryout, found)
     sticks = any(one.effect.sticks and one.effect.place == MOTOR for one in best.forces)
-    if not (sticks and best.gain_fit > 0 and bench.resting):
+    if not (sticks and best.gain_fit > 0 and tryout.resting):
         return best
-    again = _fit(bench, _fit(bench.resting, best))
+    again = _fit(tryout, _fit(tryout.resting, best))
     return max(best, again, key=lambda point: point.gain_fit)
 
 
-def _fit(bench: ForceBench, found: Point) -> Point:
+def _fit(tryout: Tryout, found: Point) -> Point:
     """The best by Gauss and Newton's steps from `found`."""
-    form, found = Form.of(found), _near(bench, found, found.forces, found.theta)
+    form, found = Form.of(found), _near(tryout, found, found.forces, found.theta)
     first, before, best = form.logs(found), found, found
-    reach, furthest = Reach(nudges_of(bench), np.ones(len(first))), 1.0
+    reach, furthest = Reach(nudges_of(tryout), np.ones(len(first))), 1.0
     rounds = 20 if len(first) == 1 else 60  # ridges of several numbers are long
     along: Along | None = None
     for _ in range(rounds):
-        step, along = _joint_step(bench, form, best, form.logs(best) - first, reach, along)
+        step, along = _joint_step(tryout, form, best, form.logs(best) - first, reach, along)
         if not np.isfinite([*step.theta, *step.logs]).all():  # slopes of a motion that runs away
             break
-        factor, point = _advanced(bench, form, best, step)
+        factor, point = _advanced(tryout, form, best, step)
         gained = point.gain_fit - best.gain_fit
         if gained > 0:
-            before, best = best, _onward(bench, form, before, point)
+            before, best = best, _onward(tryout, form, before, point)
         if gained >= max(_NO_GAIN, _SHARE * best.gain_fit):
             # Slopes over no more than what is still to go, each by itself.
             near = np.clip(factor * np.abs(step.logs) / NUDGE, _NEAREST, furthest)
@@ -94,21 +94,21 @@ def _fit(bench: ForceBench, found: Point) -> Point:
     return best
 
 
-def _advanced(bench: ForceBench, form: Form, best: Point, step: _Step) -> tuple[float, Point]:
+def _advanced(tryout: Tryout, form: Form, best: Point, step: _Step) -> tuple[float, Point]:
     """The best point found along `step` from `best`, and how many steps away it is."""
-    here, low, high = search_box(bench.model)
+    here, low, high = search_box(tryout.model)
     start, end = here.coordinate(np.stack([best.theta, step.theta]))
     logs = form.logs(best)
 
     def along(factor: float) -> Point:
         phi = np.clip(start + factor * (end - start), low, high)
-        return _near(bench, best, form.at(logs + factor * step.logs), here.natural(phi[None])[0])
+        return _near(tryout, best, form.at(logs + factor * step.logs), here.natural(phi[None])[0])
 
     factor, point = 1.0, along(1.0)
     if point.gain_fit < best.gain_fit:
         for factor in (_BACK, _BACK**2):
             forces = form.at(logs + factor * step.logs)
-            polished = _polished(bench, _near(bench, best, forces, best.theta))
+            polished = _polished(tryout, _near(tryout, best, forces, best.theta))
             point = max(along(factor), polished, key=lambda point: point.gain_fit)
             if point.gain_fit > best.gain_fit:
                 break
@@ -120,11 +120,11 @@ def _advanced(bench: ForceBench, form: Form, best: Point, step: _Step) -> tuple[
         if not further.gain_fit - point.gain_fit >= _NO_GAIN:  # nor where both run away
             break
         factor, point = _ON * factor, further
-    polished = _polished(bench, point)
+    polished = _polished(tryout, point)
     return factor, max(point, polished, key=lambda point: point.gain_fit)
 
 
-def _polished(bench: ForceBench, point: Point) -> Point:
+def _polished(tryout: Tryout, point: Point) -> Point:
     """With the linear parameters fitted anew, and the motion that they make.
 
     Beside the motion before that fit a point may seem worth more than it is: steps then lead to and
@@ -132,37 +132,37 @@ def _polished(bench: ForceBench, point: Point) -> Point:
     """
     if not np.isfinite(point.gain_fit):
         return point
-    theta = fit_part(bench.model, point.windows, point.theta)
-    return _near(bench, point, point.forces, theta)
+    theta = fit_part(tryout.model, point.windows, point.theta)
+    return _near(tryout, point, point.forces, theta)
 
 
-def _near(bench: ForceBench, known: Point, forces: tuple[Acting, ...], theta: Floats) -> Point:
+def _near(tryout: Tryout, known: Point, forces: tuple[Acting, ...], theta: Floats) -> Point:
     """Forces and linear parameters as they are, beside the motion expected from a point near by.
 
     By their strengths, with their history as it was.
     """
     if not known.changes:  # it runs away
-        return bench.as_it_is(forces, theta)
+        return tryout.as_it_is(forces, theta)
     factors = [new.strength / old.strength for new, old in zip(forces, known.forces, strict=True)]
     motions = (change.motion for change in known.changes)
     expected = sum(factor * motion for factor, motion in zip(factors, motions, strict=True))
-    return bench.as_it_is(forces, theta, np.asarray(expected))
+    return tryout.as_it_is(forces, theta, np.asarray(expected))
 
 
-def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
+def _onward(tryout: Tryout, form: Form, before: Point, best: Point) -> Point:
     """The best on the line from the point of two steps ago through `best`, beyond it.
 
     Friction and damping make up for each other along a bent ridge, which steps of rough slopes
     cross to and fro (R. Hooke and T. A. Jeeves, Journal of the ACM 8, 1961: pattern moves).
     """
-    here, low, high = search_box(bench.model)
+    here, low, high = search_box(tryout.model)
     start, end = here.coordinate(np.stack([before.theta, best.theta]))
     logs, moved = form.logs(best), form.logs(best) - form.logs(before)
     factor = 1.0
     while factor * np.abs(moved).max() < _MOST:
         phi = np.clip(end + factor * (end - start), low, high)
         forces = form.at(logs + factor * moved)
-        further = _near(bench, best, forces, here.natural(phi[None])[0])
+        further = _near(tryout, best, forces, here.natural(phi[None])[0])
         if further.gain_fit < best.gain_fit + _NO_GAIN:
             break
         factor, best = _ON * factor, further
@@ -170,7 +170,7 @@ def _onward(bench: ForceBench, form: Form, before: Point, best: Point) -> Point:
 
 
 def _joint_step(
-    bench: ForceBench,
+    tryout: Tryout,
     form: Form,
     best: Point,
     moved: Floats,
@@ -178,10 +178,10 @@ def _joint_step(
     along: Along | None,
 ) -> tuple[_Step, Along]:
     """To the linear parameters, strength and shape that fit best together."""
-    residuals, start, along = linearised(bench, form, best, moved, reach, FIT, along=along)
-    here, low, high = search_box(bench.model)
+    residuals, start, along = linearised(tryout, form, best, moved, reach, FIT, along=along)
+    here, low, high = search_box(tryout.model)
     low = np.concatenate([low, np.full(len(moved), -_MOST)])
     high = np.concatenate([high, np.minimum(form.highest - form.logs(best), _MOST)])
     phi, _ = minimise(residuals, start, low, high, 20, 1e-4)
-    size = bench.model.size
+    size = tryout.model.size
     return _Step(np.asarray(here.natural(phi[:, :size])[0]), phi[0, size:]), along

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.slopes import slopes_of_all
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
 
 # Standard deviations, from which on a hint is followed: worth 9/4 on the windows to fit, where 10
@@ -37,29 +37,29 @@ class Hint:
     score: float
 
 
-def hints(bench: ForceBench, effects: Sequence[NonlinearEffect]) -> list[Hint]:
-    """What each further force would be worth beside those of the bench's state.
+def hints(tryout: Tryout, effects: Sequence[NonlinearEffect]) -> list[Hint]:
+    """What each further force would be worth beside those of the tryout's state.
 
     Everything that is fitted moves along, so that a score is standard normal where there is no such
     force (C. R. Rao, Proc. Camb.  Phil. Soc. 44, 1948).  Forces that run away are left out.
 
     Parameters
     ----------
-    bench : ForceBench
+    tryout : Tryout
     effects : sequence of NonlinearEffect
         Not of actuators.
     """
-    theta = bench.state.fit.theta
-    usual = bench.simulation.motions(theta, tuple({effect.place for effect in effects}))
+    theta = tryout.state.fit.theta
+    usual = tryout.simulation.motions(theta, tuple({effect.place for effect in effects}))
     tried = []
     for effect in effects:
-        faint = _FAINT * float(effect.first_strengths(bench.model, theta, usual[effect.place])[0])
-        tried.append((effect, faint, (*bench.before, Acting(effect, faint))))
-    return _scored(bench, bench.as_it_is(bench.before, theta, bench.known_motion), tried)
+        faint = _FAINT * float(effect.first_strengths(tryout.model, theta, usual[effect.place])[0])
+        tried.append((effect, faint, (*tryout.before, Acting(effect, faint))))
+    return _scored(tryout, tryout.as_it_is(tryout.before, theta, tryout.known_motion), tried)
 
 
 def departures(
-    bench: ForceBench, known: Point, effects: Sequence[NonlinearEffect], index: int = -1
+    tryout: Tryout, known: Point, effects: Sequence[NonlinearEffect], index: int = -1
 ) -> list[Hint]:
     """What laws that contain that of a known force would be in its place, to first order.
 
@@ -67,7 +67,7 @@ def departures(
 
     Parameters
     ----------
-    bench : ForceBench
+    tryout : Tryout
     known : Point
         Of the simple law, fitted.
     effects : sequence of NonlinearEffect
@@ -80,16 +80,16 @@ def departures(
         forces = list(known.forces)
         forces[index] = Acting(effect.departing(_FAINT), forces[index].strength)
         tried.append((effect, _FAINT, tuple(forces)))
-    return _scored(bench, known, tried)
+    return _scored(tryout, known, tried)
 
 
 def _scored(
-    bench: ForceBench,
+    tryout: Tryout,
     found: Point,
     tried: Sequence[tuple[NonlinearEffect, float, tuple[Acting, ...]]],
 ) -> list[Hint]:
     """Hints around a point: of each effect, a little of it, and the forces with that little."""
-    theta, simulation = found.theta, bench.simulation
+    theta, simulation = found.theta, tryout.simulation
     added = simulation.added(found.forces, theta, found.motion)
     own = simulation.added_near(found.forces, theta, added).sum(axis=0)
     if not np.isfinite(own).all():
@@ -108,7 +108,7 @@ def _scored(
             moved.append(((with_it - own) / _FAINT, effect.grounded and bool(found.forces)))
     if not usable:
         return []
-    residual, linear, forces, _ = slopes_of_all(bench, found, moved)
+    residual, linear, forces, _ = slopes_of_all(tryout, found, moved)
     known, further = np.split(forces, [forces.shape[1] - len(moved)], axis=1)
     base = np.linalg.qr(np.concatenate([linear, known], axis=1))[0]
     further = further - base @ (base.T @ further)

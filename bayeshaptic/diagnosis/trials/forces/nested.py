@@ -8,21 +8,21 @@ The fit of both then has a long way back along a ridge, and other forces seem to
 from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
 from bayeshaptic.diagnosis.trials.forces.hints import PARTS, STANDS_OUT, departures
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.laws import simplest
 from bayeshaptic.effects.nonlinear.protocol import Acting
 
 _STRENGTHS = 1.0, 1.5, 2.2, 3.3  # of the simple law over the larger one's, which adds to that
 
 
-def fit_nested(bench: ForceBench, start: Point) -> Point:
+def fit_nested(tryout: Tryout, start: Point) -> Point:
     """The best forces near `start`, the earlier ones by no larger laws than they need.
 
     Parameters
     ----------
-    bench : ForceBench
+    tryout : Tryout
     start : Point
         Of the forces before, and one more.
 
@@ -33,36 +33,36 @@ def fit_nested(bench: ForceBench, start: Point) -> Point:
     """
     index = next((i for i, one in enumerate(start.forces[:-1]) if simplest(one.effect)), None)
     if index is None:
-        return fit_force(bench, start)
+        return fit_force(tryout, start)
     larger = start.forces[index].effect
-    plain = fit_force(bench, _with_the_simplest(bench, start, index))
-    hints = [] if plain.motion is None else departures(bench, plain, [larger], index)
+    plain = fit_force(tryout, _with_the_simplest(tryout, start, index))
+    hints = [] if plain.motion is None else departures(tryout, plain, [larger], index)
     if not hints:  # it runs away
-        return fit_force(bench, start)
+        return fit_force(tryout, start)
     if hints[0].score < STANDS_OUT:
         return plain
     strength, way = plain.forces[index].strength, hints[0].strength
     laws = [larger.departing(min(part * way, 1.0)) for part in PARTS]
     full = fit_force(
-        bench, _likeliest(bench, plain, index, [Acting(law, strength) for law in laws])
+        tryout, _likeliest(tryout, plain, index, [Acting(law, strength) for law in laws])
     )
     worth = thresholds.A_PARAMETER * len(larger.tuned)
     return full if full.gain_choose - plain.gain_choose > worth else plain
 
 
-def _with_the_simplest(bench: ForceBench, start: Point, index: int) -> Point:
+def _with_the_simplest(tryout: Tryout, start: Point, index: int) -> Point:
     """With a simple law in the place of the larger one, of the strength that fits best."""
     own = start.forces[index]
     law = simplest(own.effect)
     assert law
     forces = [Acting(law, factor * own.strength) for factor in _STRENGTHS]
-    return _likeliest(bench, start, index, forces)
+    return _likeliest(tryout, start, index, forces)
 
 
-def _likeliest(bench: ForceBench, known: Point, index: int, instead: list[Acting]) -> Point:
+def _likeliest(tryout: Tryout, known: Point, index: int, instead: list[Acting]) -> Point:
     """The point whose force number `index` is replaced by whichever of `instead` fits best."""
     before, after = known.forces[:index], known.forces[index + 1 :]
     points = [
-        bench.point((*before, one, *after), known.theta, expected=known.motion) for one in instead
+        tryout.point((*before, one, *after), known.theta, expected=known.motion) for one in instead
     ]
     return max(points, key=lambda point: point.gain_fit)

@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
 from bayeshaptic.diagnosis.trials.forces.hints import PARTS, STANDS_OUT, Hint, departures, hints
 from bayeshaptic.diagnosis.trials.forces.nested import fit_nested
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion, NonlinearEffect
 from bayeshaptic.models.structures import GROUND_DAMPERS
@@ -32,7 +32,7 @@ def worth_following(point: Point, found: Iterable[Point]) -> bool:
 
 
 def fitted(
-    bench: ForceBench, points: list[Point], meter: Meter, before: Sequence[Point] = ()
+    tryout: Tryout, points: list[Point], meter: Meter, before: Sequence[Point] = ()
 ) -> list[Point]:
     """The points fitted, the most promising first; the hopeless as they are, the faint left out."""
     found = list(before)
@@ -42,25 +42,25 @@ def fitted(
             continue
         worth = worth_following(point, found)
         follow = worth and meter.affords(f"{point.effect.title}, its fit")
-        found.append(fit_force(bench, point) if follow else point)
+        found.append(fit_force(tryout, point) if follow else point)
     # The linear parameters were fitted once more after the motion was simulated.
-    return [one for one in found if bench.stays(one)]
+    return [one for one in found if tryout.stays(one)]
 
 
 def to_scan(
-    bench: ForceBench, laws: Sequence[Variants], known: Mapping[str, Point], meter: Meter
+    tryout: Tryout, laws: Sequence[Variants], known: Mapping[str, Point], meter: Meter
 ) -> list[Variants]:
     """Laws of known forces, and of others what stands out to first order, within reach of its best.
 
     What acts on the command stays as it is, and so does what runs away: no score is known of these.
     Beside forces that a state has nothing is left out: first order is all that is asked there.
     """
-    if bench.before:
+    if tryout.before:
         return list(laws)
     own = [law for law in laws if law[0].strength[0] in known]
     new = [law for law in laws if law[0].strength[0] not in known and meter.affords(law[0].title)]
     scored = [effect for law in new for effect in law if not isinstance(effect, CommandEffect)]
-    scores = {id(hint.effect): hint.score for hint in hints(bench, scored)} if scored else {}
+    scores = {id(hint.effect): hint.score for hint in hints(tryout, scored)} if scored else {}
 
     def standing_out(law: Variants) -> Variants:
         least = max(STANDS_OUT, _IN_REACH * max(scores.get(id(e), 0.0) for e in law))
@@ -70,7 +70,7 @@ def to_scan(
 
 
 def search(
-    bench: ForceBench,
+    tryout: Tryout,
     variants: Variants,
     motion: dict[Place, Motion],
     meter: Meter,
@@ -78,25 +78,25 @@ def search(
 ) -> Point:
     """The best variant on a coarse scan of strengths, or beside that of a known force."""
     meter.trying(variants[0].title)
-    theta = bench.state.fit.theta
+    theta = tryout.state.fit.theta
     points: list[Point] = []
     for effect in variants:
         if known:
             before, near = known.forces[:-1], _NEAR * known.strength
-            scan = partial(_scan, bench, before, effect, near, expected=known.motion)
+            scan = partial(_scan, tryout, before, effect, near, expected=known.motion)
             beside = scan(known.theta)
             if not any(np.isfinite(point.gain_fit) for point in beside):
-                beside = scan(_damped(bench, known.theta))
+                beside = scan(_damped(tryout, known.theta))
             points += beside
             continue
-        firsts = effect.first_strengths(bench.model, theta, motion[effect.place])
+        firsts = effect.first_strengths(tryout.model, theta, motion[effect.place])
         for strengths in (firsts, -firsts) if effect.signed else (firsts,):
-            points += _scan(bench, bench.before, effect, strengths, theta, bench.known_motion, 8)
+            points += _scan(tryout, tryout.before, effect, strengths, theta, tryout.known_motion, 8)
     return max(points, key=lambda point: point.gain_fit)
 
 
 def beside_others(
-    bench: ForceBench,
+    tryout: Tryout,
     laws: Sequence[Variants],
     meter: Meter,
     least: float = 0.0,
@@ -108,21 +108,21 @@ def beside_others(
     A scan would be lost there in how roughly a motion that sticks goes with the linear parameters:
     where a force was worth 263 in log likelihood, the best of five strengths had -9.
     """
-    theta = bench.state.fit.theta
+    theta = tryout.state.fit.theta
 
     def start(hint: Hint, part: float) -> Point:
         force = Acting(hint.effect, part * hint.strength)
-        return bench.point((*bench.before, force), theta, expected=bench.known_motion)
+        return tryout.point((*tryout.before, force), theta, expected=tryout.known_motion)
 
     every = [
-        h for h in hints(bench, [effect for law in laws for effect in law]) if h.score >= least
+        h for h in hints(tryout, [effect for law in laws for effect in law]) if h.score >= least
     ]
-    nothing = bench.point(bench.before, theta, expected=bench.known_motion) if every else None
-    return _followed(bench, every, start, nothing, laws, fit_nested, meter)
+    nothing = tryout.point(tryout.before, theta, expected=tryout.known_motion) if every else None
+    return _followed(tryout, every, start, nothing, laws, fit_nested, meter)
 
 
 def containing(
-    bench: ForceBench,
+    tryout: Tryout,
     known: Point,
     laws: Sequence[Variants],
     meter: Meter,
@@ -139,19 +139,21 @@ def containing(
 
     def start(hint: Hint, part: float) -> Point:
         law = hint.effect.departing(min(part * hint.strength, 1.0))
-        return bench.point((*before, Acting(law, own.strength)), known.theta, expected=known.motion)
+        return tryout.point(
+            (*before, Acting(law, own.strength)), known.theta, expected=known.motion
+        )
 
-    every = departures(bench, known, [effect for law in laws for effect in law])
-    return _followed(bench, every, start, known, laws, fit_force, meter)
+    every = departures(tryout, known, [effect for law in laws for effect in law])
+    return _followed(tryout, every, start, known, laws, fit_force, meter)
 
 
 def _followed(
-    bench: ForceBench,
+    tryout: Tryout,
     every: Sequence[Hint],
     start: Callable[[Hint, float], Point],
     nothing: Point | None,
     laws: Sequence[Variants],
-    fit: Callable[[ForceBench, Point], Point],
+    fit: Callable[[Tryout, Point], Point],
     meter: Meter,
 ) -> list[Point]:
     """The best hint of each law fitted, where it stands out, from the best part of what it says.
@@ -170,22 +172,22 @@ def _followed(
         point = max((start(best, part) for part in PARTS), key=lambda point: point.gain_fit)
         least = -np.inf if nothing is None or best.score > _CLEARLY else nothing.gain_fit
         if point.gain_fit > least and meter.affords(best.effect.title):
-            found.append(fit(bench, point))
-    return [one for one in found if bench.stays(one)]
+            found.append(fit(tryout, point))
+    return [one for one in found if tryout.stays(one)]
 
 
-def _damped(bench: ForceBench, theta: Floats) -> Floats:
+def _damped(tryout: Tryout, theta: Floats) -> Floats:
     """Linear parameters beside a force that may have taken all damping: any other runs away there.
 
     A fifth of what the ground dampers are without a force.
     """
-    share, without = 0.2, bench.state.fit.theta
-    ground = np.isin(bench.model.names, GROUND_DAMPERS)
+    share, without = 0.2, tryout.state.fit.theta
+    ground = np.isin(tryout.model.names, GROUND_DAMPERS)
     return np.where(ground, np.maximum(theta, share * without), theta)
 
 
 def _scan(
-    bench: ForceBench,
+    tryout: Tryout,
     before: tuple[Acting, ...],
     effect: NonlinearEffect,
     strengths: Floats,
@@ -203,7 +205,7 @@ def _scan(
     stronger = 3.0 if abs(strengths[-1]) > abs(strengths[0]) else 1 / 3.0
 
     def point(strength: float, start: Floats, near: Floats | None) -> Point:
-        return bench.point((*before, Acting(effect, strength)), start, expected=near)
+        return tryout.point((*before, Acting(effect, strength)), start, expected=near)
 
     points: list[Point] = []
     too_strong = 10.0  # drop of the log likelihood at which a scan stops

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.state import Change, share, weights
 from bayeshaptic.diagnosis.trials.forces.along import Along, slopes_along
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point, answered
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout, answered
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
@@ -71,12 +71,12 @@ class Form:
         return tuple(found)
 
 
-def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
+def spread(tryout: Tryout, found: Point) -> tuple[Floats, Floats]:
     """How well fitted forces are known, and what goes with them.
 
     Parameters
     ----------
-    bench : ForceBench
+    tryout : Tryout
     found : Point
 
     Returns
@@ -87,7 +87,7 @@ def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
         Change of the linear parameters' coordinates (`search_box`) with each logarithm, all else
         fitted anew: friction that is a little more leaves a damper that is far less.
     """
-    _, linear, forces, free = slopes_of_all(bench, found)
+    _, linear, forces, free = slopes_of_all(tryout, found)
     along = np.zeros((len(free), forces.shape[1]))
     # Slopes over what nobody knows to a factor of e are rounding: that goes with no force.
     linear = np.concatenate([linear, np.eye(linear.shape[1])])
@@ -98,7 +98,7 @@ def spread(bench: ForceBench, found: Point) -> tuple[Floats, Floats]:
 
 
 def slopes_of_all(
-    bench: ForceBench, found: Point, further: Sequence[Further] = ()
+    tryout: Tryout, found: Point, further: Sequence[Further] = ()
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """Residuals of all windows at fitted forces, and their slopes.
 
@@ -107,22 +107,22 @@ def slopes_of_all(
     """
     form = Form.of(found)
     none = 0 * form.logs(found)
-    reach = Reach(nudges_of(bench), _SMOOTH + none)
-    residuals, start, _ = linearised(bench, form, found, none, reach, _ALL, further)
-    here, size = residuals(start), bench.model.size
+    reach = Reach(nudges_of(tryout), _SMOOTH + none)
+    residuals, start, _ = linearised(tryout, form, found, none, reach, _ALL, further)
+    here, size = residuals(start), tryout.model.size
     slopes = jacobian(residuals, start, here)[0]
-    _, low, high = search_box(bench.model)
+    _, low, high = search_box(tryout.model)
     free = (start[0, :size] > low) & (start[0, :size] < high)
     return here[0], slopes[:, :size][:, free], slopes[:, size:], free
 
 
-def nudges_of(bench: ForceBench) -> Floats:
+def nudges_of(tryout: Tryout) -> Floats:
     """How far each linear parameter goes for the slopes of the motion: some standard deviations.
 
     Less would see how a sticking mass jumps, not where it goes; more would leave a resonance.
     """
-    fit = bench.state.fit
-    here, _, _ = search_box(bench.model)
+    fit = tryout.state.fit
+    here, _, _ = search_box(tryout.model)
     relative = fit.sd / np.where(here.log, np.maximum(fit.theta, 1e-300), here.scale)
     return np.clip(np.nan_to_num(_SDS * relative, nan=np.inf), _LEAST, _FARTHEST)
 
@@ -145,7 +145,7 @@ class Reach:
 
 
 def linearised(
-    bench: ForceBench,
+    tryout: Tryout,
     form: Form,
     found: Point,
     moved: Floats,
@@ -161,7 +161,7 @@ def linearised(
 
     Parameters
     ----------
-    bench : ForceBench
+    tryout : Tryout
     form : Form
     found : Point
         Where the slopes are taken.
@@ -183,7 +183,7 @@ def linearised(
     along : Along
         The slopes over the linear parameters that were used.
     """
-    simulation = bench.simulation
+    simulation = tryout.simulation
     logs, theta, near = form.logs(found), found.theta, reach.near
     forces = form.at(logs)
     added = simulation.added(forces, theta, found.motion)
@@ -198,31 +198,31 @@ def linearised(
 
     sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
     slopes = [slope(unit, side) for side, unit in zip(sides, np.eye(len(logs)), strict=True)]
-    here, _, _ = search_box(bench.model)
+    here, _, _ = search_box(tryout.model)
     phi = here.coordinate(theta[None])[0]
     strengths = ~form.shape
     at, nearest = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
     if along is None or not along.holds(at, nearest):
         moving = [not isinstance(one.effect, CommandEffect) for one in forces]
-        each = slopes_along(bench, forces, theta, added, nearest * reach.linear)
+        each = slopes_along(tryout, forces, theta, added, nearest * reach.linear)
         along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
-    changes = bench.changes(forces, added)
+    changes = tryout.changes(forces, added)
     columns = [
-        *(bench.at_lines(slope) for slope in slopes),
+        *(tryout.at_lines(slope) for slope in slopes),
         *along.slopes.reshape(-1, along.slopes.shape[-1]),
-        *(bench.at_lines(motion) for motion, _ in further),
+        *(tryout.at_lines(motion) for motion, _ in further),
     ]
     by_strengths = np.tile(form.grounded[along.strengths], len(along.slopes))
     grounded = np.array([*form.grounded, *by_strengths, *(own for _, own in further)], bool)
-    columns = _with_a_hand(bench, changes, theta, columns, grounded)
-    windows, weight = _weighed_windows(bench, changes, theta, columns, parts)
+    columns = _with_a_hand(tryout, changes, theta, columns, grounded)
+    windows, weight = _weighed_windows(tryout, changes, theta, columns, parts)
     start = np.concatenate([phi, np.zeros(len(logs) + len(further))])[None]
-    return _residuals(bench.model, windows, weight, form.shape, moved, start, along), start, along
+    return _residuals(tryout.model, windows, weight, form.shape, moved, start, along), start, along
 
 
 def _with_a_hand(
-    bench: ForceBench,
+    tryout: Tryout,
     changes: tuple[Change, ...],
     theta: Floats,
     slopes: list[Complexes],
@@ -233,30 +233,30 @@ def _with_a_hand(
     The more they take off, the further it alone would have moved the device: see `Windows.louder`.
     As it was measured that is a slope like those of the motion.
     """
-    if not (bench.held and grounded.any()):
+    if not (tryout.held and grounded.any()):
         return slopes
-    spectra: Any = bench.without(changes, theta).spectra
+    spectra: Any = tryout.without(changes, theta).spectra
     left = (
         spectra.position
-        - bench.model.response(theta, bench.frequency_hz, measured=True) * spectra.force
+        - tryout.model.response(theta, tryout.frequency_hz, measured=True) * spectra.force
     )
     found = np.array(slopes)
-    found[grounded] += left * bench.answer(theta).growth(answered(changes), found[grounded])
+    found[grounded] += left * tryout.answer(theta).growth(answered(changes), found[grounded])
     return list(found)
 
 
 def _weighed_windows(
-    bench: ForceBench,
+    tryout: Tryout,
     changes: tuple[Change, ...],
     theta: Floats,
     columns: list[Complexes],
     parts: tuple[int, ...],
 ) -> tuple[Windows, Floats]:
     """Windows without what forces changed, with slopes as inputs; and roots of their weights."""
-    etfe = bench.without(changes, theta)
-    windows = bench.windows(etfe, theta, columns)
+    etfe = tryout.without(changes, theta)
+    windows = tryout.windows(etfe, theta, columns)
     # The many slopes leave too little of a window to read its noise from.
-    left, scattered = weights(bench.model, bench.windows(etfe, theta), theta)
+    left, scattered = weights(tryout.model, tryout.windows(etfe, theta), theta)
     nodes, rows = windows.frequency_hz.shape[1], windows.target.shape[1]
     # Rows beyond the nodes' are what of the scatter the slopes can take.
     each = np.where(np.arange(rows) < nodes, left[:, None], scattered[:, None])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bayeshaptic.diagnosis.state import Accepted, Estimate, State, Trial, describe_gain
-from bayeshaptic.diagnosis.trials.forces.bench import ForceBench, Point
 from bayeshaptic.diagnosis.trials.forces.in_doubt import in_doubt
+from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, NonlinearEffect
 from bayeshaptic.inference.fit import Fit, summarise
@@ -17,27 +17,27 @@ from bayeshaptic.recordings.response.estimators.random_excitation import points 
 from bayeshaptic.recordings.response.etfe import Etfe
 
 
-def force_trial(bench: ForceBench, point: Point) -> Trial:
+def force_trial(tryout: Tryout, point: Point) -> Trial:
     """The trial of the point's last force, with those before it as they are beside it."""
-    theta = polish(bench.model, point.windows, point.theta)
-    fit = summarise(bench.model, point.windows, theta)
-    accepted = _accepted(bench, point)
+    theta = polish(tryout.model, point.windows, point.theta)
+    fit = summarise(tryout.model, point.windows, theta)
+    accepted = _accepted(tryout, point)
     state = State(_with_points(point.etfe, fit), fit, accepted)
     # Those before it may have got simpler beside it, or not.
     size = 1 + sum(len(force.effect.shape) for force in point.forces)
     return Trial(accepted[-1], state, point.gain_fit, point.gain_choose, size)
 
 
-def _accepted(bench: ForceBench, point: Point) -> tuple[Accepted, ...]:
+def _accepted(tryout: Tryout, point: Point) -> tuple[Accepted, ...]:
     """What is accepted with a point: forces before it are what they are beside the new one."""
-    (*earlier, own), (*sds, own_sd), limit_log_sd = point.changes, *in_doubt(bench, point)
+    (*earlier, own), (*sds, own_sd), limit_log_sd = point.changes, *in_doubt(tryout, point)
     effect = point.effect
     new = Accepted(
         effect.name,
         effect.title + _where(effect),
         effect.family,
         describe_gain(point.gain_choose),
-        _estimates(bench.model, point.forces[-1], own_sd),
+        _estimates(tryout.model, point.forces[-1], own_sd),
         ties=effect.ties,
         told_apart_by=effect.told_apart_by,
         limit_log_sd=limit_log_sd,
@@ -45,7 +45,7 @@ def _accepted(bench: ForceBench, point: Point) -> tuple[Accepted, ...]:
     )
     there = iter(zip(earlier, sds, strict=True))
     found = []
-    for one in bench.state.accepted:
+    for one in tryout.state.accepted:
         if one.change and one.change.acting:
             change, sd = next(there)
             assert change.acting
@@ -54,7 +54,7 @@ def _accepted(bench: ForceBench, point: Point) -> tuple[Accepted, ...]:
                 one,
                 name=law.name,
                 title=law.title + _where(law),
-                estimates=_estimates(bench.model, change.acting, sd),
+                estimates=_estimates(tryout.model, change.acting, sd),
                 change=change,
                 # What the earlier force leaves open is counted in the new one's; what another law
                 # of it would change is not.

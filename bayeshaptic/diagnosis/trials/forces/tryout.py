@@ -73,7 +73,7 @@ class Point:
         return _motion(self.changes) if self.changes else None
 
 
-class ForceBench:
+class Tryout:
     """Takes off what forces do, and fits what they leave.
 
     Parameters
@@ -149,7 +149,7 @@ class ForceBench:
         return self._valued(forces, theta, self._simulated(forces, theta, expected))
 
     @cached_property
-    def resting(self) -> ForceBench | None:
+    def resting(self) -> Tryout | None:
         """With friction at rest told from how smoothly a hand moves; None where nothing rests."""
         simulation = self.simulation.resting
         if simulation is None:
