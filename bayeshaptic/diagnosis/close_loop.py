@@ -26,10 +26,10 @@ from bayeshaptic.diagnosis.feedback.explain import (
 from bayeshaptic.diagnosis.feedback.mode_above_band import mode_above_band
 from bayeshaptic.diagnosis.hidden.hidden import with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
+from bayeshaptic.diagnosis.one_mass import analyse_one_mass, traced_of_one_mass
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.excess import noise_besides
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
-from bayeshaptic.diagnosis.under_feedback import analyse_in_loop, in_the_loop
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
 from bayeshaptic.diagnosis.widening.rest import with_rest
@@ -135,10 +135,10 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
 
 def _in_loop(found: Opened, force: ForceExplained, options: Options) -> Closed | None:
     """The closed loop by following the motion of one mass; None where it cannot be followed."""
-    analysis = analyse_in_loop(found, options.within(0.3, 0.95))
+    analysis = analyse_one_mass(found, options.within(0.3, 0.95))
     if analysis is None:
         return None
-    traced = in_the_loop(trace_force(analysis.etfe, analysis.fit, force), analysis)
+    traced = traced_of_one_mass(trace_force(analysis.etfe, analysis.fit, force), analysis)
     error = limit_alone(analysis)
     return Closed(analysis, analysis, traced, error, error, force)
 

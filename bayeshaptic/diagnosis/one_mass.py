@@ -58,7 +58,7 @@ _TONES = (
 )
 
 
-def analyse_in_loop(begun: Opened, options: Options) -> Analysis | None:
+def analyse_one_mass(begun: Opened, options: Options) -> Analysis | None:
     """The analysis by the motion of one mass, which feedback does not bias.
 
     It is for recordings in closed loop, and for those in open loop that say too little for a
@@ -146,7 +146,7 @@ def _open_loop(recording: Recording) -> tuple[Notice, ...]:
     return (Notice("note", TOO_LITTLE, text),)
 
 
-def in_the_loop(traced: Traced, analysis: Analysis) -> Traced:
+def traced_of_one_mass(traced: Traced, analysis: Analysis) -> Traced:
     """The record of the loop: what was found in the force, with numbers, and a verdict.
 
     "explained" and "consistent" mean here that each half of the recording predicts the other; a
