@@ -13,14 +13,13 @@ from bayeshaptic.diagnosis.base.opened import Clock
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
-from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown
+from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown, asked_of_sampler
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.around_fit import draws_around
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.sampler import sample_around
-from bayeshaptic.inference.stopping import EveryParameter
 from bayeshaptic.models import Model
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.feedback import is_certain
@@ -107,15 +106,9 @@ def finish(
     most = _MOST_EVALUATIONS if rational else _MOST_WITH_LINKS
     watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
     with clock.stage("sampling"):
-        posterior = sample_around(
-            _with_noise(fit, scale),
-            etfe,
-            watch if options.ess is None else EveryParameter(fit.model, options.ess),
-            options.seed,
-            options.within(0.1, 0.8).report,
-            options.checkpoints,
-            _MISFIT_EVALUATIONS if scale > 1 else most,
-        )
+        most = _MISFIT_EVALUATIONS if scale > 1 else most
+        asked = asked_of_sampler(watch, options.within(0.1, 0.8), most)
+        posterior = sample_around(_with_noise(fit, scale), etfe, asked)
     with clock.stage("critical stiffness"):
         options.report(0.8, "critical stiffness")
         limit = watch.limit_of(posterior)

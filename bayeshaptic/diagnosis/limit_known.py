@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
 from bayeshaptic.inference.posterior import prior_dominated
-from bayeshaptic.inference.stopping import Verdict
+from bayeshaptic.inference.sampling.settings import MOST_EVALUATIONS, SamplerSettings
+from bayeshaptic.inference.stopping import EveryParameter, Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.rank_statistics import split_rhat
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
@@ -121,6 +123,24 @@ class LimitKnown:
         asked = f"{PRECISION:.0%}, {RHAT_LIMIT} and {EFFECTIVE:.0f}"
         done = bool(known and risky >= 1)
         return Verdict(found, bool(known), done, min(share, risky), facts, asked)
+
+
+def asked_of_sampler(
+    watch: LimitKnown, options: Options, most_evaluations: int = MOST_EVALUATIONS
+) -> SamplerSettings:
+    """What an analysis asks of its sampler: that the limit is known, if nobody asks for more.
+
+    Parameters
+    ----------
+    watch : LimitKnown
+    options : Options
+        Where `ess` is given, that many effective draws of every parameter are asked for instead.
+    most_evaluations : int
+    """
+    rule = watch if options.ess is None else EveryParameter(watch.model, options.ess)
+    return SamplerSettings(
+        rule, options.seed, options.report, options.checkpoints, most_evaluations
+    )
 
 
 def _width(limit: CriticalStiffness) -> float:

@@ -17,7 +17,7 @@ from bayeshaptic.diagnosis.feedback.in_loop import (
 from bayeshaptic.diagnosis.feedback.lacking import Lacking
 from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
-from bayeshaptic.diagnosis.limit_known import LimitKnown
+from bayeshaptic.diagnosis.limit_known import LimitKnown, asked_of_sampler
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.samples.sinusoids import in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
@@ -27,7 +27,6 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample_around
-from bayeshaptic.inference.stopping import EveryParameter
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
@@ -112,14 +111,7 @@ def analyse_one_mass(begun: Opened, options: Options) -> Analysis | None:
 def _sampled(fit: Fit, etfe: Etfe, options: Options) -> tuple[Posterior, CriticalStiffness]:
     """The posterior of a motion that was fitted, and its limit."""
     watch = LimitKnown(fit.model)
-    posterior = sample_around(
-        fit,
-        etfe,
-        watch if options.ess is None else EveryParameter(fit.model, options.ess),
-        options.seed,
-        options.report,
-        options.checkpoints,
-    )
+    posterior = sample_around(fit, etfe, asked_of_sampler(watch, options))
     # What the response says is no part of this likelihood.
     posterior = replace(posterior, windows=None, etfe=None)
     return posterior, watch.limit_of(posterior)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from bayeshaptic.inference.sampling.near_zero import (
 )
 from bayeshaptic.inference.sampling.peaks import warmed_up_about_peaks
 from bayeshaptic.inference.sampling.run import Run, run_until_done
+from bayeshaptic.inference.sampling.settings import MOST_EVALUATIONS, SamplerSettings
 from bayeshaptic.inference.saved.checkpoint import Checkpoint, Stored, key_of
 from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
@@ -38,7 +38,6 @@ from bayeshaptic.types import Floats, LogDensity, Progress
 from bayeshaptic.version import __version__
 
 DEFAULT_ESS = 2000
-MOST_EVALUATIONS = 1_500_000
 _WARM_UP = 1 / 3  # of the evaluations: a warm-up of 14 parameters took all that a misfit may cost
 # Log density of the best fit over that of the best draw, beside one a parameter, from which on the
 # chains have not found it: they agree with each other in a valley that is none. It was -1.2 to 0.4
@@ -127,19 +126,12 @@ def sample(
     elif start.etfe is not etfe or start.model != informed(model, etfe):
         start = least_squares(model, etfe, start=start.theta)
     rule = rule or EveryParameter(start.model, ess)
-    return sample_around(start, etfe, rule, seed, progress, checkpoints, most_evaluations)
+    settings = SamplerSettings(rule, seed, progress, checkpoints, most_evaluations)
+    return sample_around(start, etfe, settings)
 
 
 @single_threaded
-def sample_around(
-    fit: Fit,
-    etfe: Etfe,
-    rule: Rule,
-    seed: int,
-    progress: Progress | bool | None,
-    checkpoints: str | Path | None,
-    most_evaluations: int = MOST_EVALUATIONS,
-) -> Posterior:
+def sample_around(fit: Fit, etfe: Etfe, settings: SamplerSettings) -> Posterior:
     """Draw from the posterior of the likelihood and the priors that `fit` has, as they are.
 
     `sample` is the door to it: it makes the fit, or makes it anew where it is of something else.
@@ -149,22 +141,42 @@ def sample_around(
     fit : Fit
     etfe : Etfe
         What the posterior is said to be of.
-    rule : callable
-        What is asked for; it may look at more than the parameters, the limit say.
-    seed, progress, checkpoints, most_evaluations
-        As of `sample`.
+    settings : SamplerSettings
     """
     began = time.perf_counter()
-    report = told(progress) or silent
+    report = told(settings.progress) or silent
     report(0.02, "finding the peak")
     fit = resolved(_converged(fit))
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     density = Density(fit.likelihood, here)
-    origin = start_of(here, fit)
     counted = _Counted(density)
-    redraw = redrawing(here, fit)
-    about = (seed, most_evaluations, getattr(rule, "key", None))
-    checkpoint = _checkpoint(checkpoints, density, origin, about)
+    run, verdict = _run(fit, density, counted, settings, report)
+    best = density(inside(here, fit))[0]
+    lost = best - run.values.max() > LOST + len(fit.theta)
+    return Posterior(
+        fit.model,
+        here.natural(run.chains),
+        _log_likelihoods(density, run.chains, run.values),
+        verdict.diagnostics,
+        verdict.known and not lost,
+        _LOST if lost else _message(verdict, counted.count),
+        time.perf_counter() - began,
+        settings.seed,
+        fit.windows,
+        etfe,
+    )
+
+
+def _run(
+    fit: Fit, density: Density, counted: _Counted, settings: SamplerSettings, report: Progress
+) -> tuple[Run, Verdict]:
+    """Chains until the rule is content or evaluations run out, from a checkpoint if there is one.
+
+    `counted` is the same density, by which evaluations are counted.
+    """
+    here = density.coordinates
+    origin, redraw = start_of(here, fit), redrawing(here, fit)
+    checkpoint = _checkpoint(settings, density, origin)
 
     def restore(arrays: Stored) -> Run:
         run = Run.from_arrays(arrays, counted, redraw)
@@ -177,32 +189,19 @@ def sample_around(
 
     run = checkpoint.read(restore)
     if run is None:
-        warm, refit = np.random.SeedSequence(seed).spawn(2)
+        warm, refit = np.random.SeedSequence(settings.seed).spawn(2)
         report(0.1, "warming up")
-        steps = _WARM_UP * most_evaluations / (ENSEMBLES * WALKERS)
+        steps = _WARM_UP * settings.most_evaluations / (ENSEMBLES * WALKERS)
         ensembles = warmed_up_about_peaks(counted, density, origin, fit, warm, redraw, steps)
         run = Run(ensembles, np.random.default_rng(refit))
     verdict = run_until_done(
         run,
-        lambda phi: rule(here.natural(phi)),
-        lambda: most_evaluations - counted.count,
+        lambda phi: settings.rule(here.natural(phi)),
+        lambda: settings.most_evaluations - counted.count,
         report,
         keep,
     )
-    best = density(inside(here, fit))[0]
-    lost = best - run.values.max() > LOST + len(origin)
-    return Posterior(
-        fit.model,
-        here.natural(run.chains),
-        _log_likelihoods(density, run.chains, run.values),
-        verdict.diagnostics,
-        verdict.known and not lost,
-        _LOST if lost else _message(verdict, counted.count),
-        time.perf_counter() - began,
-        seed,
-        fit.windows,
-        etfe,
-    )
+    return run, verdict
 
 
 def _converged(fit: Fit) -> Fit:
@@ -219,16 +218,16 @@ def _converged(fit: Fit) -> Fit:
     return fit.at(here.natural(phi)[0])
 
 
-def _checkpoint(
-    folder: str | Path | None, density: Density, start: Floats, about: tuple[Any, ...]
-) -> Checkpoint:
+def _checkpoint(settings: SamplerSettings, density: Density, start: Floats) -> Checkpoint:
     """Where a sampler keeps its state, by what it is asked for and the density around its start."""
-    if folder is None or None in about:
+    folder = settings.checkpoints
+    asked = (settings.seed, settings.most_evaluations, getattr(settings.rule, "key", None))
+    if folder is None or None in asked:
         return Checkpoint(None, "")
     probe = 0.01  # sampling coordinates, between points whose densities tell computations apart
     places = start + np.concatenate([np.zeros((1, len(start))), probe * np.eye(len(start))])
     theta = density.coordinates.natural(places)
-    about = (__version__, np.__version__, density.likelihood.model.names, *about)
+    about = (__version__, np.__version__, density.likelihood.model.names, *asked)
     return Checkpoint(Path(folder), key_of(*about, theta, density(places)))
 
 
