@@ -93,7 +93,22 @@ class Weighed:
 
 
 def weigh(suspect: Suspect, known: Around, rng: np.random.Generator) -> Weighed:
-    """The posterior of one effect."""
+    """The posterior of one effect.
+
+    Sizes are drawn by the density where the parameters have given way to each, and draws of the
+    posterior, moved along, are weighed by the real one (importance sampling).
+
+    Parameters
+    ----------
+    suspect : Suspect
+    known : Around
+        The posterior without the effect.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Weighed
+    """
     sizes = sizes_of(suspect, known)
     moved, changes = _followed(suspect, known, sizes.own)
     said = np.log(sizes.weight)

@@ -16,7 +16,7 @@ from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likeli
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.population import Population
 from bayeshaptic.inference.population.reweighting import ALONE, Reweighted, redescribed, reweight
-from bayeshaptic.inference.population.sampler import sample_level
+from bayeshaptic.inference.population.sampler import LevelChains, sample_level
 from bayeshaptic.inference.population.settling import settled
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import HalfNormal, MaybeZero, Model
@@ -28,6 +28,9 @@ from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
 DRAWS = 36_000  # with them 20 lie below the stiffness of 0.1 % risk, in the hands of each user
+_FIRST_STEPS = 200  # of chains by which recordings are described
+_SOME = 2000  # draws of those that are looked at
+_DESCRIPTIONS = 2  # rounds of describing recordings better, at most
 
 
 @at_the_door
@@ -85,21 +88,15 @@ def infer_population(
     tune, again, run, first, last, rest = np.random.SeedSequence(seed).spawn(6)
     rng = np.random.default_rng(rest)
     report(0.0, "population: first look")
-    hierarchy = settled(hierarchy, posteriors, here, hierarchy.guess()[0])
-    first_steps = 200
-    chains = sample_level(hierarchy, tune, steps=first_steps)
-    some = 2000
-    hierarchy = settled(hierarchy, posteriors, here, np.median(chains.thinned(some, rng), axis=0))
-    chains = sample_level(hierarchy, again, chains, steps=first_steps)
+    hierarchy, chains = _settled_twice(hierarchy, posteriors, here, (tune, again), rng)
     report(0.3, "population: describing recordings")
-    descriptions = 2  # rounds of describing recordings better, at most
-    for own_seed in first.spawn(descriptions):
-        phi = chains.thinned(some, rng)
+    for own_seed in first.spawn(_DESCRIPTIONS):
+        phi = chains.thinned(_SOME, rng)
         better = redescribed(hierarchy, posteriors, users, phi, here, spike, own_seed)
         if better is hierarchy:
             break
         hierarchy = better
-        chains = sample_level(hierarchy, again, chains, steps=first_steps)
+        chains = sample_level(hierarchy, again, chains, steps=_FIRST_STEPS)
     report(0.5, "population: sampling")
     chains = sample_level(hierarchy, run, chains)
     report(0.8, "population: users")
@@ -109,22 +106,41 @@ def infer_population(
     draws = replace(draws, recordings=draws.recordings[:0])  # many, and no longer needed
     root = draws.level.correlation_root
     return Population(
-        tuple(name for name in model.names if name in HAND),
-        draws.beta[:, : len(hierarchy.hand)],
-        draws.level.hand_sd,
-        root @ root.transpose(0, 2, 1),
-        names,
-        spots,
-        model,
-        own,
-        (*chains.notices, *_notices(own, names)),
-        time.perf_counter() - began,
-        chains.resting(),
-        walkers,
-        here,
-        hierarchy,
-        draws,
+        parameters=tuple(name for name in model.names if name in HAND),
+        log_mean=draws.beta[:, : len(hierarchy.hand)],
+        log_sd=draws.level.hand_sd,
+        correlation=root @ root.transpose(0, 2, 1),
+        users=names,
+        places=spots,
+        model=model,
+        recordings=own,
+        notices=(*chains.notices, *_notices(own, names)),
+        seconds=time.perf_counter() - began,
+        chains=chains.resting(),
+        walkers=walkers,
+        _here=here,
+        _hierarchy=hierarchy,
+        _below=draws,
     )
+
+
+def _settled_twice(
+    hierarchy: Hierarchy,
+    posteriors: Sequence[Posterior],
+    here: Coordinates,
+    seeds: tuple[np.random.SeedSequence, np.random.SeedSequence],
+    rng: np.random.Generator,
+) -> tuple[Hierarchy, LevelChains]:
+    """Descriptions where all recordings say that parameters are, and short chains by these.
+
+    The first round goes by the scatter of the recordings' own estimates, the second by the chains
+    of the first.
+    """
+    hierarchy = settled(hierarchy, posteriors, here, hierarchy.guess()[0])
+    chains = sample_level(hierarchy, seeds[0], steps=_FIRST_STEPS)
+    middle = np.median(chains.thinned(_SOME, rng), axis=0)
+    hierarchy = settled(hierarchy, posteriors, here, middle)
+    return hierarchy, sample_level(hierarchy, seeds[1], chains, steps=_FIRST_STEPS)
 
 
 def study_coordinates(model: Model, posteriors: Sequence[Posterior] = ()) -> Coordinates:
