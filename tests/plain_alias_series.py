@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from bayeshaptic.models.response.alias_tables import HIGH, ORDER, REACH, bernoulli_table
-from bayeshaptic.numerics.polynomial import Polynomial
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial
 from bayeshaptic.types import Bools, Complexes, Floats
 
 

@@ -9,8 +9,8 @@ from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.motion import phi
 from bayeshaptic.models.response.poles import poles_and_residues
-from bayeshaptic.numerics.partial_fractions import moved_apart, residues
-from bayeshaptic.numerics.polynomial import Polynomial, evaluate, multiply, roots
+from bayeshaptic.numerics.polynomials.partial_fractions import moved_apart, residues
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate, multiply, roots
 from bayeshaptic.types import Bools, Complexes, Floats
 
 

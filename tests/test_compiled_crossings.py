@@ -9,8 +9,8 @@ import pytest
 from plain_response import from_poles
 
 from bayeshaptic.models.build import build_model
-from bayeshaptic.numerics.polynomial import evaluate, multiply, roots
-from bayeshaptic.numerics.polynomial_roots import find_roots
+from bayeshaptic.numerics.polynomials.polynomial import evaluate, multiply, roots
+from bayeshaptic.numerics.polynomials.roots import find_roots
 from bayeshaptic.stability.crossings import _compiled_search, find_crossings, plain_search
 from bayeshaptic.stability.responses.response import PoleResponse, pole_response
 from bayeshaptic.types import Complexes, Floats, Ints

@@ -12,7 +12,7 @@ from bayeshaptic.models import LinearSystem, build_model
 from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.remainder import aliases
-from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.stability import find_crossings
 from bayeshaptic.stability.crossings import search
 from bayeshaptic.stability.responses.evaluated import EvaluatedResponse

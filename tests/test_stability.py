@@ -11,6 +11,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.models import Model, build_model, draw
 from bayeshaptic.models.response.mechanism import Link, Mechanism
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.effective_draws import effective_draws
 from bayeshaptic.rig import Bench, critical_limit
 from bayeshaptic.stability import (
     confirms,
@@ -24,7 +25,6 @@ from bayeshaptic.stability import (
 )
 from bayeshaptic.stability.binding import MODE, NEVER, RIGID, group_crossings
 from bayeshaptic.stability.crossings import search
-from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.responses.evaluated import EvaluatedResponse
 from bayeshaptic.stability.responses.response import PoleResponse, pole_response
 

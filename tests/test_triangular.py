@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.recordings.response.triangular import back_substituted
+from bayeshaptic.numerics.triangular import back_substituted
 
 
 def test_it_solves_what_least_squares_solve() -> None:

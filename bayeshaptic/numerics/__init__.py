@@ -1,1 +1,1 @@
-"""Arithmetic that knows nothing of haptics: least squares, mixtures, roots, polynomials."""
+"""Arithmetic that knows nothing of haptics: least squares, mixtures, chains, polynomials."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.types import Floats, Ints
 
 RIGID, AGAINST_HAND, MODE, NYQUIST, NEVER, NONE = range(6)

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
+from bayeshaptic.numerics.effective_draws import effective_draws
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.draws import MOST_DRAWS
-from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.tail import low_quantile, quantiles
 from bayeshaptic.types import Floats, Ints
 

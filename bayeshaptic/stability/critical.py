@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models.model import Model
+from bayeshaptic.numerics.effective_draws import effective_draws
 from bayeshaptic.quantities import estimate, percent, quantity, rounded_down
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import BindingCrossing, group_crossings
 from bayeshaptic.stability.crossings import rational
 from bayeshaptic.stability.draws import opened, vectors_of
 from bayeshaptic.stability.each_draw import limits_of
-from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.stability.spectral_radius import confirms
 from bayeshaptic.stability.tail import LowQuantile, low_quantile, quantiles
 from bayeshaptic.threads import single_threaded

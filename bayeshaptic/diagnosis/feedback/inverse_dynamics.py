@@ -34,8 +34,8 @@ from bayeshaptic.diagnosis.feedback.smooth_motion import (
     smooth_motion,
 )
 from bayeshaptic.diagnosis.feedback.terms import Term, terms_of
-from bayeshaptic.diagnosis.residuals.low_pass import low_pass
 from bayeshaptic.errors import InputError
+from bayeshaptic.numerics.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Bools, Floats
 

@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass, field
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from bayeshaptic.diagnosis.residuals.low_pass import low_pass
+from bayeshaptic.numerics.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Bools, Floats

@@ -19,7 +19,7 @@ from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.models.response.mechanism import Pair
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.numerics.spending import spend
 from bayeshaptic.types import Complexes, Floats
 

@@ -28,7 +28,7 @@ from bayeshaptic.effects.nonlinear.shapes import (
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
-from bayeshaptic.numerics.polynomial import evaluate
+from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.low_pass import low_pass, slow_share
 from bayeshaptic.diagnosis.residuals.unforced import coasting_motions, parts
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import LinearSystem
 from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.numerics.low_pass import low_pass, slow_share
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats

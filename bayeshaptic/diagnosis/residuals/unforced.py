@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.linalg import lstsq
 
-from bayeshaptic.diagnosis.residuals.low_pass import low_pass
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats

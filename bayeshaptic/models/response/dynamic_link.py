@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.numerics.polynomial import Polynomial
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial
 from bayeshaptic.types import Complexes, Floats
 
 Index = slice | NDArray[np.bool_] | NDArray[np.int_]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bayeshaptic.models.response.dynamic_link import Index
-from bayeshaptic.numerics.polynomial import Polynomial, multiply
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, multiply
 
 
 @dataclass(frozen=True)

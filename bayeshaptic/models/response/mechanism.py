@@ -17,7 +17,7 @@ from bayeshaptic.models.response.spanning import (
     spanning_trees,
     with_edge,
 )
-from bayeshaptic.numerics.polynomial import Polynomial, add
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, add
 from bayeshaptic.types import Floats
 
 Pair = tuple[int, int | None]

@@ -6,7 +6,7 @@ import numpy as np
 
 from bayeshaptic.models.response.filters import filtered
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.partial_fractions import moved_apart, residues
+from bayeshaptic.numerics.polynomials.partial_fractions import moved_apart, residues
 from bayeshaptic.types import Complexes, Floats
 
 

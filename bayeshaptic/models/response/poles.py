@@ -8,8 +8,8 @@ from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.filters import Filters, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.transfer import transfer
-from bayeshaptic.numerics.partial_fractions import moved_apart, residues
-from bayeshaptic.numerics.polynomial import Polynomial, roots
+from bayeshaptic.numerics.polynomials.partial_fractions import moved_apart, residues
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, roots
 from bayeshaptic.types import Complexes, Floats
 
 
@@ -31,7 +31,7 @@ def poles_of(
 
     By the denominator's roots, each relative to itself; eigenvalues where these do not settle.
     """
-    from bayeshaptic.numerics.polynomial_roots import find_roots
+    from bayeshaptic.numerics.polynomials.roots import find_roots
 
     own = np.empty((bottom.shape[1], len(bottom) - 1), complex)
     settled = np.empty(len(own), bool)

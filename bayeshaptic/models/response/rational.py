@@ -20,7 +20,7 @@ from bayeshaptic.models.response.kernels.arrays import RationalArrays
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_of
 from bayeshaptic.models.response.transfer import transfer, transfer_with_link
-from bayeshaptic.numerics.polynomial import Polynomial, roots
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, roots
 from bayeshaptic.types import Complexes, Floats, Ints
 
 _MOST_KEPT = 100_000  # frequencies whose tables are kept: those of all lines of an hour are 70 MB

@@ -31,7 +31,7 @@ from bayeshaptic.models.response.filters import Filter
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.rational import fastest_of
 from bayeshaptic.models.response.transfer import compliances
-from bayeshaptic.numerics.polynomial import Polynomial, evaluate
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Bools, Complexes, Floats, Ints
 
 _ALIASES = 8  # on either side

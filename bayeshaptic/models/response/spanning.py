@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from bayeshaptic.numerics.polynomial import Polynomial, add, multiply
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, add, multiply
 
 GROUND = -1
 Edge = tuple[int, int]

@@ -12,7 +12,7 @@ from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_and_residues
 from bayeshaptic.models.response.rational import RationalArrays, rational_form, sampled_response
 from bayeshaptic.models.response.remainder import Remainder, remainder_of, sampled_remainder
-from bayeshaptic.numerics.polynomial import Polynomial, evaluate
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Complexes, Floats
 
 

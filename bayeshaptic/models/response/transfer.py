@@ -26,7 +26,7 @@ from bayeshaptic.models.response.spanning import (
     spanning_trees,
     with_edge,
 )
-from bayeshaptic.numerics.polynomial import Polynomial, add, multiply
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, add, multiply
 from bayeshaptic.types import Floats, Ints
 
 ADD, MULTIPLY = 0, 1

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.numerics.triangular import back_substituted
 from bayeshaptic.recordings.response.local_polynomial import NODES
-from bayeshaptic.recordings.response.triangular import back_substituted
 from bayeshaptic.recordings.response.windows import Windows
 
 _REACH = 2  # neighbours on each side: nodes for five coefficients, three times over

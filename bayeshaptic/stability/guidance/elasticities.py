@@ -21,7 +21,7 @@ from bayeshaptic.models.parameter import Parameter
 from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.stability.binding import BindingCrossing, binding_kinds, group_crossings
 from bayeshaptic.stability.crossings import find_crossings, response_of
-from bayeshaptic.stability.walls.source import loops_of
+from bayeshaptic.stability.walls.loops import loops_of
 from bayeshaptic.types import Floats
 
 DRAWS = 160

@@ -12,7 +12,7 @@ from bayeshaptic.stability.guidance.elasticities import Elasticities, elasticiti
 from bayeshaptic.stability.guidance.shares import VarianceShares, variance_shares
 from bayeshaptic.stability.guidance.sweep import DRAWS, Sweep, sweep
 from bayeshaptic.stability.rules import ground_damping
-from bayeshaptic.stability.walls.source import loops_of
+from bayeshaptic.stability.walls.loops import loops_of
 
 _STIFFNESSES = ("kc", "ks")  # cable pretension; the link that the hand holds
 _DAMPERS = ("b1", "b")  # where damping can be added

@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.stability.crossings import find_crossings
-from bayeshaptic.stability.walls.source import loops_of
+from bayeshaptic.stability.walls.loops import loops_of
 from bayeshaptic.types import Floats
 
 DRAWS = 3000

@@ -15,7 +15,7 @@ from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import TITLES, binding_kinds
 from bayeshaptic.stability.crossings import find_crossings
 from bayeshaptic.stability.guidance.elasticities import with_delay
-from bayeshaptic.stability.walls.source import loops_of
+from bayeshaptic.stability.walls.loops import loops_of
 from bayeshaptic.types import Floats
 
 DRAWS = 80

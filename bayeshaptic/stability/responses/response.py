@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from bayeshaptic.models.response.filters import filtered
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.models.response.transfer import transfer, transfer_with_link
-from bayeshaptic.numerics.partial_fractions import moved_apart, residues
-from bayeshaptic.numerics.polynomial import Polynomial
+from bayeshaptic.numerics.polynomials.partial_fractions import moved_apart, residues
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial
 from bayeshaptic.types import Complexes, Floats, Ints
 
 
@@ -173,7 +173,7 @@ def _poles(system: LinearSystem, denominator: Polynomial) -> Complexes:
 
     Eigenvalues where these do not settle; with a link nan.
     """
-    from bayeshaptic.numerics.polynomial_roots import find_roots
+    from bayeshaptic.numerics.polynomials.roots import find_roots
 
     factors = [denominator, *(f.denominator for f in system.filters)]
     degrees = [len(factor) - 1 for factor in factors]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
 from bayeshaptic.models.response.system import LinearSystem
-from bayeshaptic.numerics.polynomial import roots
+from bayeshaptic.numerics.polynomials.polynomial import roots
 from bayeshaptic.stability.crossings import response_of
 from bayeshaptic.stability.responses.evaluated import EvaluableSystem
 from bayeshaptic.stability.responses.grid import search_grid

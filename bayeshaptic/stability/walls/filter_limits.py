@@ -12,8 +12,8 @@ from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Damping
 from bayeshaptic.stability.walls.fitted_tail import effective_of, fitted_boundary
 from bayeshaptic.stability.walls.joint import JointRegion, Lowest, lowest
+from bayeshaptic.stability.walls.loops import loops_of
 from bayeshaptic.stability.walls.region import INSIDE
-from bayeshaptic.stability.walls.source import loops_of
 from bayeshaptic.stability.walls.tail import Tail, lower_tail
 from bayeshaptic.stability.walls.width import Boundary, ZWidth, width_of
 from bayeshaptic.types import Floats

@@ -24,7 +24,7 @@ from bayeshaptic.stability.walls.curve import (
     kb_curve,
 )
 from bayeshaptic.stability.walls.damping import Backward, Damping
-from bayeshaptic.stability.walls.source import loops_of
+from bayeshaptic.stability.walls.loops import loops_of
 from bayeshaptic.stability.walls.width import Boundary, ZWidth, width_of
 from bayeshaptic.types import Floats
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.low_pass import slow_share
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.low_pass import slow_share
 from bayeshaptic.types import Complexes, Floats
 
 # Lines are read up to so many edges of what is slow, where hardly anything counts as slow any more,

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from bayeshaptic.diagnosis.residuals.low_pass import ORDER
 from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.low_pass import ORDER
 from bayeshaptic.recordings.checks.sufficiency import standstill
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.runs import runs

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.linalg import lstsq
 from scipy.fft import next_fast_len
 
-from bayeshaptic.diagnosis.residuals.low_pass import low_pass, slow_share
 from bayeshaptic.diagnosis.residuals.unforced import parts
 from bayeshaptic.diagnosis.trials.forces.at_rest import AtRest
 from bayeshaptic.models.response.system import LinearSystem
+from bayeshaptic.numerics.low_pass import low_pass, slow_share
 from bayeshaptic.types import Floats
 
 # Root mean square of what is off, as a share of all that is left, and how many simulations at most.

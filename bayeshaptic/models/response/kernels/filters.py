@@ -63,7 +63,7 @@ def _over(a: complex, b: complex) -> complex:
 
 @kernel(inline=True)
 def _move_apart(q: Complexes, least: float, out: Complexes) -> None:
-    """As `numerics.partial_fractions.moved_apart`."""
+    """As `numerics.polynomials.partial_fractions.moved_apart`."""
     for i in range(len(q)):
         size = abs(q[i])
         before, others = 0, 0

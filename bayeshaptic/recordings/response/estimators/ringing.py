@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.numerics.triangular import back_substituted
 from bayeshaptic.recordings.response.local_polynomial import NODES, project_out
 from bayeshaptic.recordings.response.regressors import Block, regressors
 from bayeshaptic.recordings.response.spectra import RandomSpectra
-from bayeshaptic.recordings.response.triangular import back_substituted
 from bayeshaptic.recordings.response.window_reference import unit_mass
 
 # Log likelihood that a pole must take off a window, and of that what only a pole of the response

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.numerics.polynomial import Polynomial, evaluate
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Complexes, Floats
 
 

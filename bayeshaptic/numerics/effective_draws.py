@@ -1,4 +1,8 @@
-"""How many independent draws a set of chains is worth."""
+"""How many independent draws a set of chains is worth.
+
+Here a chain counts as it is.  In `rank_statistics.py`, which judges whether chains have converged,
+it is split in halves and its draws are ranked first.
+"""
 
 from __future__ import annotations
 

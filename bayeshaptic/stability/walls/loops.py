@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
+from bayeshaptic.numerics.effective_draws import effective_draws
 from bayeshaptic.stability.draws import opened, vectors_given
-from bayeshaptic.stability.effective_draws import effective_draws
 from bayeshaptic.types import Floats
 
 

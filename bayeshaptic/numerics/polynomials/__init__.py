@@ -1,0 +1,1 @@
+"""Polynomials with a batch of coefficients: arithmetic, roots, partial fractions."""
