@@ -6,6 +6,7 @@ that of its `Trials`; what is accepted is in `bayeshaptic.diagnosis.acceptance`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -208,6 +209,21 @@ class Loop:
             lambda trial: acceptance.excess(remaining(trial)),
             lambda trial: worth(trial.state.fit),
         )
+        self._note(trials, chosen)
+        self._rejected = tuple(t for t in near if t is not chosen and _may_be(t))
+        if chosen is None:
+            return False
+        found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
+        better = self._kind.reconsidered(found, self.meter)
+        lighter = self._kind.without_needless(better, self.meter)
+        if lighter is not found:
+            found, tests = lighter, self._remaining(lighter)
+        self._note_taken_out(found)
+        self._accept(found, tests)
+        return True
+
+    def _note(self, trials: Sequence[Trial], chosen: Trial | None) -> None:
+        """Write down what was tried in this round, the best first, and what of it is accepted."""
         together = _came_with(chosen, self.state) if chosen else set()
         self._candidates += [
             Candidate(
@@ -219,20 +235,13 @@ class Loop:
             )
             for t in sorted(trials, key=lambda trial: -trial.score)
         ]
-        self._rejected = tuple(t for t in near if t is not chosen and _may_be(t))
-        if chosen is None:
-            return False
-        found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
-        better = self._kind.reconsidered(found, self.meter)
-        lighter = self._kind.without_needless(better, self.meter)
-        if lighter is not found:
-            found, tests = lighter, self._remaining(lighter)
-        there = {effect.name for effect in found.accepted}
+
+    def _note_taken_out(self, kept: State) -> None:
+        """Write down which of what was accepted is no longer there."""
+        there = {effect.name for effect in kept.accepted}
         self._candidates = [
             replace(c, taken_out=c.accepted and c.name not in there) for c in self._candidates
         ]
-        self._accept(found, tests)
-        return True
 
     def _look_beside(self) -> tuple[Test, ...]:
         """Look for a force in what tests of the residual take for linear; what is seen is left.

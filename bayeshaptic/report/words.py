@@ -21,6 +21,7 @@ from bayeshaptic.report.numbers.trust import doubtful_parameters
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
+    from bayeshaptic.inference.fit import Fit
 
 _DELAY = "delay_s"
 _ALONG = (
@@ -43,13 +44,8 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
             "the device."
         )
     fit = analysis.fit
-    order = np.argsort(fit.frequency_hz)
-    bands = third_octaves(fit.frequency_hz[order], fit.residual[order])
-    outside = bands.rms > bands.high
-    worst = int(np.argmax(bands.rms))
-    hertz = quantity(float(bands.frequency_hz[worst]), "Hz")
-    place = f"{pure(bands.rms[worst], 2)} times the noise around {hertz}"
     chi = f"reduced chi-square {quantity(fit.reduced_chi_square, '')}, where 1 is pure noise"
+    above, octaves, place = _octaves_above(fit)
     if misfit_is_clear(analysis):
         then = (
             "What was tried stands above; the limit is widened for what is left."
@@ -59,7 +55,7 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
         )
         return (
             f"The model does not explain this recording: the residual is {misfit_factor(analysis)} "
-            f"times the noise ({chi}). It stands out in {outside.sum()} of {len(outside)} third "
+            f"times the noise ({chi}). It stands out in {above} of {octaves} third "
             f"octaves and is worst at {place}. {then}"
         )
     if closed is not None and closed.verdict == UNEXPLAINED:
@@ -67,11 +63,11 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
             f"Over frequency the residual is no larger than the noise ({chi}). But it is not "
             "noise: what was found in it stands under What the model lacked."
         )
-    if outside.any():
-        by_chance = float(bdtrc(float(outside.sum() - 1), len(outside), 1 - EXPECTED[1]))
+    if above:
+        by_chance = float(bdtrc(float(above - 1), octaves, 1 - EXPECTED[1]))
         return (
-            f"Overall the residual is no larger than the noise ({chi}), but {outside.sum()} of "
-            f"{len(outside)} third octaves {'lies' if outside.sum() == 1 else 'lie'} above what "
+            f"Overall the residual is no larger than the noise ({chi}), but {above} of "
+            f"{octaves} third octaves {'lies' if above == 1 else 'lie'} above what "
             f"99.5 % of pure noise stays below; the highest is {place}. By chance that happens in "
             f"{percent(by_chance)} of recordings."
         )
@@ -81,9 +77,22 @@ def misfit(analysis: Analysis, closed: Closed | None = None) -> str:
             "noise: a test of it over time found more, as the warning above says."
         )
     return (
-        f"The residual is what pure noise would leave ({chi}): all {len(outside)} third octaves "
+        f"The residual is what pure noise would leave ({chi}): all {octaves} third octaves "
         "lie below the level that 99.5 % of pure noise stays below."
     )
+
+
+def _octaves_above(fit: Fit) -> tuple[int, int, str]:
+    """How many third octaves of the residual lie above noise, of how many; the highest, in words.
+
+    "Above noise" is above what 99.5 % of pure noise stays below.
+    """
+    order = np.argsort(fit.frequency_hz)
+    bands = third_octaves(fit.frequency_hz[order], fit.residual[order])
+    worst = int(np.argmax(bands.rms))
+    hertz = quantity(float(bands.frequency_hz[worst]), "Hz")
+    place = f"{pure(bands.rms[worst], 2)} times the noise around {hertz}"
+    return int(np.sum(bands.rms > bands.high)), len(bands.rms), place
 
 
 def convergence(analysis: Analysis) -> str:
