@@ -48,10 +48,7 @@ class LowQuantile:
 def low_quantile(
     samples: Floats, risk: float, effective: Callable[[float], float], enough: float = 0.0
 ) -> LowQuantile | None:
-    """The quantile at `risk` of what `samples`, shape (n,), are draws of.
-
-    None where they do not say it, or do not say that of twice the risk: the lowest draws may be
-    many, and independent, where those above them are few.
+    """The quantile at a small risk, from draws or from a tail fitted to the lowest of them.
 
     Parameters
     ----------
@@ -63,6 +60,12 @@ def low_quantile(
         below it as well.
     enough : float
         An error that is small enough for any use, however narrow the interval is.
+
+    Returns
+    -------
+    LowQuantile or None
+        None where the draws do not say it, or do not say that of twice the risk: the lowest draws
+        may be many, and independent, where those above them are few.
     """
     if 2 * risk <= LARGEST and low_quantile(samples, 2 * risk, effective, enough) is None:
         return None

@@ -14,7 +14,13 @@ from bayeshaptic.rig.effects.effect import Effect, MotionScales, register
 @register
 @dataclass(frozen=True)
 class ActuatorSaturation(Effect):
-    """The actuator gives no more than +-`limit`."""
+    """The actuator gives no more than +-`limit`.
+
+    Attributes
+    ----------
+    limit : float
+        N or N m.
+    """
 
     name: ClassVar[str] = "actuator_saturation"
     above_zero: ClassVar[tuple[str, ...]] = ("limit",)
@@ -31,7 +37,12 @@ class ActuatorSaturation(Effect):
 @register
 @dataclass(frozen=True)
 class GainDrift(Effect):
-    """The actuator's gain goes from 1 to `ratio` during the recording, as it warms up."""
+    """The actuator's gain goes from 1 to `ratio` during the recording, as it warms up.
+
+    Attributes
+    ----------
+    ratio : float
+    """
 
     name: ClassVar[str] = "gain_drift"
     ratio: float = 0.85

@@ -80,7 +80,15 @@ class BaseCompliance(Effect):
 @register
 @dataclass(frozen=True)
 class CentringStiffness(Effect):
-    """A spring from a mass to the frame, such as a cable or gravity in a pendulum."""
+    """A spring from a mass to the frame, such as a cable or gravity in a pendulum.
+
+    Attributes
+    ----------
+    stiffness : float
+        N/m or N m/rad.
+    on : str
+        The mass that it acts on, by its name.
+    """
 
     name: ClassVar[str] = "centring_stiffness"
     stiffness: float = 20.0
@@ -103,6 +111,14 @@ class StructuralDamping(Effect):
     The spring kc (1 + j loss_factor) as Maxwell elements, `elements` of them over `decades` around
     the frequency at which m1 and m2 swing against each other; there the stiffness stays kc, and
     elsewhere it is what causality demands (it grows with log frequency).
+
+    Attributes
+    ----------
+    loss_factor : float
+        Imaginary over real part of the spring at that frequency.
+    decades : float
+        Of the elements' time constants, evenly spread.
+    elements : int
     """
 
     name: ClassVar[str] = "structural_damping"
@@ -133,7 +149,12 @@ class StructuralDamping(Effect):
 @register
 @dataclass(frozen=True)
 class ExtraDelay(Effect):
-    """More delay in the loop than the bench declares."""
+    """More delay in the loop than the bench declares.
+
+    Attributes
+    ----------
+    delay_s : float
+    """
 
     name: ClassVar[str] = "extra_delay"
     at_least_zero: ClassVar[tuple[str, ...]] = ("delay_s",)
@@ -150,7 +171,13 @@ class ExtraDelay(Effect):
 @register
 @dataclass(frozen=True)
 class ActuatorLag(Effect):
-    """The force follows the delayed command by 1/(1 + s time_constant_s)^order."""
+    """The force follows the delayed command by 1/(1 + s time_constant_s)^order.
+
+    Attributes
+    ----------
+    time_constant_s : float
+    order : int
+    """
 
     name: ClassVar[str] = "actuator_lag"
     above_zero: ClassVar[tuple[str, ...]] = ("time_constant_s", "order")
@@ -164,7 +191,15 @@ class ActuatorLag(Effect):
 @register
 @dataclass(frozen=True)
 class PositionFilter(Effect):
-    """An analogue low-pass in front of the encoder: order 1, or order 2 with a damping ratio."""
+    """An analogue low-pass in front of the encoder: order 1, or order 2 with a damping ratio.
+
+    Attributes
+    ----------
+    cutoff_hz : float
+    order : {1, 2}
+    damping_ratio : float
+        Of order 2.
+    """
 
     name: ClassVar[str] = "position_filter"
     above_zero: ClassVar[tuple[str, ...]] = ("cutoff_hz", "damping_ratio")

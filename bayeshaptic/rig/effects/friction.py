@@ -15,7 +15,15 @@ SHARE = 0.15  # of the rms force: the friction of a usual case
 @register
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """A constant force against the motion; at rest whatever holds, up to `force`."""
+    """A constant force against the motion; at rest whatever holds, up to `force`.
+
+    Attributes
+    ----------
+    force : float
+        N or N m.
+    on : str
+        The mass that it acts on, by its name.
+    """
 
     name: ClassVar[str] = "coulomb_friction"
     at_least_zero: ClassVar[tuple[str, ...]] = ("force",)
@@ -37,7 +45,17 @@ class CoulombFriction(Effect):
 class StribeckFriction(Effect):
     """Dry friction that falls from `static` to `force` as the velocity passes `velocity`.
 
-    force + (static - force) exp(-(v/velocity)^2)
+    force + (static - force) exp(-(v/velocity)^2); R. Stribeck, "Die wesentlichen Eigenschaften der
+    Gleit- und Rollenlager", VDI-Zeitschrift 46 (1902).
+
+    Attributes
+    ----------
+    force, static : float
+        N or N m, in fast motion and at rest.
+    velocity : float
+        m/s or rad/s.
+    on : str
+        The mass that it acts on, by its name.
     """
 
     name: ClassVar[str] = "stribeck_friction"
@@ -62,7 +80,17 @@ class StribeckFriction(Effect):
 @register
 @dataclass(frozen=True)
 class DahlFriction(Effect):
-    """Friction that begins as a spring: F' = -stiffness (v + |v| F/force)."""
+    """Friction that begins as a spring: F' = -stiffness (v + |v| F/force).
+
+    Attributes
+    ----------
+    force : float
+        N or N m, that it ends in.
+    stiffness : float
+        N/m or N m/rad, that it begins with.
+    on : str
+        The mass that it acts on, by its name.
+    """
 
     name: ClassVar[str] = "dahl_friction"
     above_zero: ClassVar[tuple[str, ...]] = ("force", "stiffness")

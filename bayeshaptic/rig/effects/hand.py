@@ -17,6 +17,13 @@ class Reflex(Effect):
     """The hand answers its own motion late, through a nerve and a muscle.
 
     The force -(stiffness + damping s) e^(-s delay_s)/(1 + s time_constant_s) x on the hand's mass.
+
+    Attributes
+    ----------
+    stiffness, damping : float
+        N/m and N s/m, or N m/rad and N m s/rad.
+    delay_s, time_constant_s : float
+        Of the nerve, and of the muscle.
     """
 
     name: ClassVar[str] = "reflex"

@@ -17,7 +17,15 @@ CUBE = 15.0**0.5
 @register
 @dataclass(frozen=True)
 class HardeningSpring(Effect):
-    """A cubic spring from a mass to the frame, -stiffness x^3; negative softens."""
+    """A cubic spring from a mass to the frame, -stiffness x^3; negative softens.
+
+    Attributes
+    ----------
+    stiffness : float
+        N/m^3 or N m/rad^3.
+    on : str
+        The mass that it acts on, by its name.
+    """
 
     name: ClassVar[str] = "hardening_spring"
     stiffness: float = 5e6
@@ -35,7 +43,13 @@ class HardeningSpring(Effect):
 @register
 @dataclass(frozen=True)
 class HardeningConnection(Effect):
-    """A cubic spring beside the connection m1-m2, -stiffness d^3; negative softens."""
+    """A cubic spring beside the connection m1-m2, -stiffness d^3; negative softens.
+
+    Attributes
+    ----------
+    stiffness : float
+        N/m^3 or N m/rad^3.
+    """
 
     name: ClassVar[str] = "hardening_connection"
     stiffness: float = 1e12
@@ -80,7 +94,17 @@ class Backlash(Effect):
 @register
 @dataclass(frozen=True)
 class ForceRipple(Effect):
-    """A force on the motor that repeats with the position: amplitude sin(2 pi x/pitch + phase)."""
+    """A force on the motor that repeats with the position: amplitude sin(2 pi x/pitch + phase).
+
+    Attributes
+    ----------
+    amplitude : float
+        N or N m.
+    pitch : float
+        m or rad.
+    phase : float
+        Radians.
+    """
 
     name: ClassVar[str] = "force_ripple"
     above_zero: ClassVar[tuple[str, ...]] = ("pitch",)
@@ -100,7 +124,15 @@ class ForceRipple(Effect):
 @register
 @dataclass(frozen=True)
 class Gravity(Effect):
-    """A weight on a turning part: -torque sin(x - hangs_at) on the motor, x in radians."""
+    """A weight on a turning part: -torque sin(x - hangs_at) on the motor, x in radians.
+
+    Attributes
+    ----------
+    torque : float
+        N m.
+    hangs_at : float
+        Radians, where the weight hangs straight down.
+    """
 
     name: ClassVar[str] = "gravity"
     at_least_zero: ClassVar[tuple[str, ...]] = ("torque",)
@@ -119,7 +151,13 @@ class Gravity(Effect):
 @register
 @dataclass(frozen=True)
 class ConstantForce(Effect):
-    """A force on the motor that never changes: a spring far away, a weight on a straight axis."""
+    """A force on the motor that never changes: a spring far away, a weight on a straight axis.
+
+    Attributes
+    ----------
+    force : float
+        N or N m.
+    """
 
     name: ClassVar[str] = "constant_force"
     force: float = 0.2
@@ -137,7 +175,15 @@ class ConstantForce(Effect):
 @register
 @dataclass(frozen=True)
 class Drag(Effect):
-    """A resistance -coefficient v |v| on a mass."""
+    """A resistance -coefficient v |v| on a mass.
+
+    Attributes
+    ----------
+    coefficient : float
+        N s^2/m^2 or N m s^2/rad^2.
+    on : str
+        The mass that it acts on, by its name.
+    """
 
     name: ClassVar[str] = "drag"
     at_least_zero: ClassVar[tuple[str, ...]] = ("coefficient",)

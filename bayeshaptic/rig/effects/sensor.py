@@ -15,7 +15,13 @@ from bayeshaptic.rig.effects.effect import Effect, Log, MotionScales, Readings, 
 @register
 @dataclass(frozen=True)
 class Quantisation(Effect):
-    """A coarser encoder than declared: counts of `count`."""
+    """A coarser encoder than declared: counts of `count`.
+
+    Attributes
+    ----------
+    count : float
+        m or rad.
+    """
 
     name: ClassVar[str] = "quantisation"
     above_zero: ClassVar[tuple[str, ...]] = ("count",)
@@ -32,7 +38,17 @@ class Quantisation(Effect):
 @register
 @dataclass(frozen=True)
 class MainsTone(Effect):
-    """Mains hum on the position that is read, or on the force that acts."""
+    """Mains hum on the position that is read, or on the force that acts.
+
+    Attributes
+    ----------
+    amplitude : float
+        m or rad; N or N m on the force.
+    frequency_hz : float
+    phase : float
+        Radians.
+    on : {"position", "force"}
+    """
 
     name: ClassVar[str] = "mains_tone"
     above_zero: ClassVar[tuple[str, ...]] = ("frequency_hz",)
@@ -62,7 +78,13 @@ class MainsTone(Effect):
 @register
 @dataclass(frozen=True)
 class PositionClipping(Effect):
-    """The position cannot be read beyond +-`limit`."""
+    """The position cannot be read beyond +-`limit`.
+
+    Attributes
+    ----------
+    limit : float
+        m or rad.
+    """
 
     name: ClassVar[str] = "position_clipping"
     above_zero: ClassVar[tuple[str, ...]] = ("limit",)
@@ -106,7 +128,15 @@ class SampleJitter(Effect):
 @register
 @dataclass(frozen=True)
 class HeldSamples(Effect):
-    """Now and then the logger repeats the position before, up to `longest` times in a row."""
+    """Now and then the logger repeats the position before, up to `longest` times in a row.
+
+    Attributes
+    ----------
+    probability : float
+        That a sample begins such a stretch.
+    longest : int
+        Samples.
+    """
 
     name: ClassVar[str] = "held_samples"
     above_zero: ClassVar[tuple[str, ...]] = ("longest",)
@@ -127,7 +157,13 @@ class HeldSamples(Effect):
 @register
 @dataclass(frozen=True)
 class DroppedSamples(Effect):
-    """Now and then a row is missing: the time stamps jump."""
+    """Now and then a row is missing: the time stamps jump.
+
+    Attributes
+    ----------
+    probability : float
+        Of each row.
+    """
 
     name: ClassVar[str] = "dropped_samples"
     at_least_zero: ClassVar[tuple[str, ...]] = ("probability",)

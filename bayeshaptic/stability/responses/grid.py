@@ -15,16 +15,27 @@ _TANGENTS = np.tan(np.deg2rad(np.array([-88.0, -80, -60, -30, -8, 8, 30, 60, 80,
 
 
 def in_chunks(batch: int) -> Iterator[slice]:
-    """Rows of a batch, some at a time: the arrays of one chunk stay in the cache."""
+    """Rows of a batch of `batch` loops, some at a time: the arrays of a chunk stay in the cache."""
     chunk = 64
     return (slice(start, min(start + chunk, batch)) for start in range(0, batch, chunk))
 
 
 def search_grid(response: Response, rows: slice) -> Floats:
-    """Sorted angles theta in (0, pi) for the given rows, shape (B, L).
+    """Where to look at a response, loop by loop.
 
     A logarithmic grid from well below the slowest pole, points at equal steps of phase around each
     pole (w_p + |Re p| tan(angle)), and a linear grid fine enough for the phase of the delay.
+
+    Parameters
+    ----------
+    response : Response
+    rows : slice
+        B of its loops.
+
+    Returns
+    -------
+    ndarray, shape (B, L)
+        Angles theta in (0, pi), ascending.
     """
     features = response.features[rows]
     delay = response.delay[rows]

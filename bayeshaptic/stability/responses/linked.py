@@ -93,7 +93,17 @@ class LinkedResponse:
 
 
 def linked_response(system: LinearSystem, period_s: float, exact: bool = True) -> LinkedResponse:
-    """The response of a system with dynamic links: exact, or the continuous approximation."""
+    """The response of a batch of loops with dynamic links.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        With dynamic links.
+    period_s : float
+        Sampling period, s.
+    exact : bool
+        False: the continuous approximation P(s) e^{-s (td + T/2)}.
+    """
     rational = pole_response(system.rational_part, period_s, exact)
     remainder = system.remainder
     series = aliases(remainder, np.pi, system.delay_s, period_s)

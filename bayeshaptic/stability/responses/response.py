@@ -49,10 +49,26 @@ class Response(Protocol):
     def log_points(self) -> int: ...
 
     def at(self, rows: Ints, theta: Floats) -> Complexes:
-        """Values of rows (M,) at angles (M, k), shape (M, k)."""
+        """Values of some loops, each at its own angles.
+
+        Parameters
+        ----------
+        rows : ndarray of int, shape (M,)
+            Which loops of the batch; one may come more than once.
+        theta : ndarray, shape (M, k)
+            Angles in (0, pi].
+
+        Returns
+        -------
+        ndarray of complex, shape (M, k)
+            Position over force.
+        """
 
     def at_ends(self) -> tuple[Floats, Floats]:
-        """Real limits at theta -> 0 (infinite: integrator) and at pi (nan: none)."""
+        """Real limits of each loop at both ends, shape (B,) each.
+
+        At theta -> 0, infinite for an integrator; and at theta = pi, nan where there is none.
+        """
 
     def stable_at_rest(self) -> NDArray[np.bool_]:
         """Whether the loop is stable for K -> 0+, shape (B,)."""
@@ -127,9 +143,17 @@ class PoleResponse:
 
 
 def pole_response(system: LinearSystem, period_s: float, exact: bool = True) -> PoleResponse:
-    """The response of `system` from its poles: exact, or the continuous approximation.
+    """The response of a batch of loops from their poles.
 
     A link that is a ratio of polynomials has poles, too; where they do not settle they are nan.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    period_s : float
+        Sampling period, s.
+    exact : bool
+        False: the continuous approximation P(s) e^{-s (td + T/2)}.
     """
     poles, parts, integrators = _simple_poles(system, period_s)
     p, r = poles * period_s, parts * period_s
