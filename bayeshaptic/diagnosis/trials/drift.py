@@ -22,7 +22,7 @@ from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings.checks.sufficiency import SHORTEST_S
+from bayeshaptic.recordings.checks.sufficiency import shortest_s
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.stability.critical import critical_stiffness
@@ -66,7 +66,7 @@ def drift_trials(state: State, meter: Meter) -> list[Trial]:
     `meter` says whether one more is affordable.
     """
     recording = state.etfe.recording
-    if recording is None or recording.duration_s < PARTS * SHORTEST_S:
+    if recording is None or recording.duration_s < PARTS * shortest_s(recording.period_s):
         return []
     edges = np.linspace(0, recording.samples, PARTS + 1).astype(int)
     try:

@@ -23,9 +23,10 @@ from bayeshaptic.types import Bools, Floats
 
 # The coherence of two unrelated signals, averaged over twelve segments, stays below 0.2.
 LEAST_COHERENCE = 0.3
-# Shortest recording of a force that does not repeat: a dozen lines below 5 Hz, where a device's
-# rigid-body crossing lies.
-SHORTEST_S = 2.5
+# Shortest recording of a force that does not repeat, in a loop of a millisecond and slower: a dozen
+# lines below 5 Hz, where a device's rigid-body crossing lies.  Without it, of 73 recordings of 1 to
+# 2.5 s that another simulation made and that had a stiffness, four had one above their limit.
+_SHORTEST_S, _USUAL_PERIOD_S = 2.5, 1e-3
 # Twenty windows of 24 lines in the 40 % of the lines that a usual excitation covers.
 FEWEST_SAMPLES = 1000
 # A force that changes less often than this is a few steps.
@@ -111,12 +112,22 @@ def refuse_where_told(recording: Recording | None, notices: Iterable[Notice]) ->
         raise InputError(f"{where}: {told.reason}; {told.cure}")
 
 
+def shortest_s(period_s: float) -> float:
+    """How long a recording of a force that does not repeat must be.
+
+    A rigid body crosses where its damper leads by as much as the delay lags, w^2 = b / (m delay):
+    with a delay of so many periods the crossing goes with the root of the sampling rate.
+    """
+    return float(_SHORTEST_S * min(np.sqrt(period_s / _USUAL_PERIOD_S), 1.0))
+
+
 def _short(recording: Recording) -> TooLittle | None:
-    seconds = recording.duration_s
-    if seconds >= SHORTEST_S or find_repetition(recording.force) is not None:
+    seconds, least = recording.duration_s, shortest_s(recording.period_s)
+    if seconds >= least or find_repetition(recording.force) is not None:
         return None
     reason = (
-        f"{seconds:.3g} s, and at least {SHORTEST_S:g} s are needed of a force that does not repeat"
+        f"{seconds:.3g} s, and at least {least:.2g} s are needed of a force that does not repeat, "
+        f"at {1 / recording.period_s:.4g} Hz"
     )
     return TooLittle(reason, _USUAL)
 
@@ -161,7 +172,7 @@ def _no_force(recording: Recording) -> TooLittle | None:
     if np.mean(idle) <= MOST_IDLE:
         return None
     first, stop = longest(~idle)
-    if stop - first < max(FEWEST_SAMPLES, SHORTEST_S / recording.period_s):
+    if stop - first < max(FEWEST_SAMPLES, shortest_s(recording.period_s) / recording.period_s):
         cure = "excite the device all the time, and record again"
     else:
         cure = f"read the longest part with force alone, --rows {first + 1}:{stop}, or record again"

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.diagnosis.trials.drift import PARTS
-from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.checks.against_device import says_the_mass
-from bayeshaptic.recordings.checks.sufficiency import SHORTEST_S, told_too_little
+from bayeshaptic.recordings.checks.check import USUAL_SECONDS
+from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
@@ -135,9 +134,8 @@ def _after_fit(result: Result, command: str, new: str) -> Step:
     if changes(result.closed):
         grip = ", hold it alike all the time" if analysis.model.held else ""
         return Step(
-            f"Let the device warm up{grip}, and record at least "
-            f"{pure(PARTS * SHORTEST_S)} s of a force that does not repeat: in that a change "
-            "can be followed. Then:",
+            f"Let the device warm up{grip}, and record some {USUAL_SECONDS} s of a force that does "
+            "not repeat: in parts of that a change can be followed. Then:",
             new,
         )
     if is_unexplained(result):
