@@ -36,6 +36,7 @@ from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.stability.mixed import mixed
@@ -244,6 +245,31 @@ def test_a_lag_that_no_test_sees_is_allowed_for(lagging: tuple[Bench, Closed]) -
     assert analysis.limit.quantile(0.05) < truth < analysis.limit.quantile(0.95)
     assert analysis.limit.safe(0.01) < truth
     assert analysis.hidden is not None and analysis.hidden.nothing < 0.5
+
+
+def test_a_lag_is_allowed_for_where_the_noise_was_widened(lagging: tuple[Bench, Closed]) -> None:
+    """What a misfit leaves may be what hides: of all limits these must not be the declared ones."""
+    bench, closed = lagging
+    louder = replace(closed.analysis, hidden=None, limit=closed.analysis.declared, noise_scale=1.4)
+    found = with_average(replace(closed, analysis=louder), HiddenPrior(), Options()).analysis
+    assert found.hidden is not None
+    assert found.limit.quantile(0.05) < bench.true_critical_stiffness()
+
+
+def test_what_is_likelier_than_not_is_said_beside_that_nothing_was_found(
+    lagging: tuple[Bench, Closed],
+) -> None:
+    _, closed = lagging
+    hidden = closed.analysis.hidden
+    assert hidden is not None
+    known = "The model as declared explains the recording to within its noise."
+    for share, said in ((0.4, known), (0.9, f"{known[:-1]}; actuator lag is likely all the same.")):
+        effects = tuple(
+            replace(one, probability=share if one.name == "actuator_lag" else 0.1)
+            for one in hidden.effects
+        )
+        analysis = replace(closed.analysis, hidden=replace(hidden, effects=effects))
+        assert in_short(replace(closed, analysis=analysis)) == said
 
 
 def test_a_report_survives_its_average(

@@ -33,8 +33,6 @@ NO_WITNESS = "feedback biases it"
 # Evaluations of the likelihood that one posterior may take.
 _MOST_EVALUATIONS = 600_000
 _MOST_WITH_LINKS = 200_000  # where dynamic links make each take ten times as long
-# Where the model misfits, its posterior is a stopgap and may have any shape: no long search.
-_MISFIT_EVALUATIONS = 100_000
 
 
 @single_threaded
@@ -101,12 +99,11 @@ def finish(
     """
     clock = Clock(dict(begun.seconds))
     scale = noise_scale(fit)
-    # A misfit's tail means nothing, and a limit for comparison needs none.
     rational = fit.model.system(fit.theta).has_rational_form
     most = _MOST_EVALUATIONS if rational else _MOST_WITH_LINKS
-    watch = LimitKnown(fit.model, SMALL_RISKS if scale == 1.0 and small_risks else ())
+    # A misfit's tail means nothing, and a limit for comparison needs none.
+    watch = LimitKnown(fit.model, SMALL_RISKS if small_risks and not fit.misfits else ())
     with clock.stage("sampling"):
-        most = _MISFIT_EVALUATIONS if scale > 1 else most
         asked = asked_of_sampler(watch, options.within(0.1, 0.8), most)
         posterior = sample_around(_with_noise(fit, scale), etfe, asked)
     with clock.stage("critical stiffness"):
@@ -127,7 +124,7 @@ def finish(
         posterior=posterior,
         limit=limit,
         etfe_limit=etfe_limit,
-        notices=notices + limit.notices + _misfit_notice(fit.reduced_chi_square, scale),
+        notices=notices + limit.notices + _misfit_notice(fit, scale),
         seconds=clock.seconds,
         noise_scale=scale,
         lever_m=begun.lever_m,
@@ -181,16 +178,22 @@ def _residual_notice(begun: Begun) -> tuple[Notice, ...]:
     return (Notice("warning", "residual", text),)
 
 
-def _misfit_notice(chi_square: float, scale: float) -> tuple[Notice, ...]:
+def _misfit_notice(fit: Fit, scale: float) -> tuple[Notice, ...]:
     if scale == 1.0:
         return ()
-    length = scale / chi_square
+    length = scale / fit.reduced_chi_square
     alike = f", and {length:.2g} windows count as one, because their residuals are alike"
+    taken = f"The posterior takes that much noise{alike if length > 1.05 else ''}"
+    left = (
+        f"The residual is {pure(fit.reduced_chi_square**0.5, 2)} times the noise (reduced "
+        f"chi-square {pure(fit.reduced_chi_square)})"
+    )
+    if not fit.misfits:
+        text = f"{left}, which so few lines may have by chance. {taken}."
+        return (Notice("note", "misfit", text),)
     text = (
-        f"The residual is {pure(chi_square**0.5, 2)} times the noise (reduced chi-square "
-        f"{pure(chi_square)}): the model lacks something that this device has. The posterior takes "
-        f"that much noise{alike if length > 1.05 else ''}, so that its intervals are not narrower "
-        "than the misfit allows, but the misfit is not noise: the critical stiffness may be wrong "
-        "by more than its interval."
+        f"{left}: the model lacks something that this device has. {taken}, so that its intervals "
+        "are not narrower than the misfit allows, but the misfit is not noise: the critical "
+        "stiffness may be wrong by more than its interval."
     )
     return (Notice("warning", "misfit", text),)

@@ -185,7 +185,7 @@ def with_average(closed: Closed, prior: HiddenPrior, options: Options) -> Closed
     analysis, traced = closed.analysis, closed.traced
     if closed.force is not None or traced.verdict == UNEXPLAINED:
         return closed
-    if not analysis.posterior.converged or analysis.noise_scale > 1:
+    if not analysis.posterior.converged:
         return closed
     began = time.perf_counter()
     try:

@@ -78,8 +78,8 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
     said.append(_scatter(etfe))
     if analysis.noise_scale != 1.0:
         said.append(
-            f"Because the model misfits, the posterior takes {pure(analysis.noise_scale)} times "
-            "that variance."
+            "Because what the fit leaves is more than that, the posterior takes "
+            f"{pure(analysis.noise_scale)} times that variance."
         )
     return (
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "

@@ -33,6 +33,14 @@ def in_short(analysis: Analysis) -> str:
     )
 
 
+def likely(analysis: Analysis) -> HiddenEffect | None:
+    """What is there more likely than not, though no test sees it: the likeliest of those."""
+    found = () if analysis.hidden is None else analysis.hidden.effects
+    even = 0.5
+    likeliest = max(found, key=lambda effect: effect.probability, default=None)
+    return likeliest if likeliest is not None and likeliest.probability > even else None
+
+
 def interval_of(limit: CriticalStiffness) -> str:
     """Median and 90 % interval."""
     low, middle, high = limit.quantile([0.05, 0.5, 0.95])
