@@ -19,6 +19,7 @@ from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.in_closed_loop import in_closed_loop
+from bayeshaptic.report.numbers.beyond_band import beyond_band
 from bayeshaptic.report.numbers.held_still import held_still
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
@@ -78,7 +79,8 @@ def _of_the_loop(closed: Closed) -> list[str]:
             f"{_MOSTLY:.0f} times as high, so that what is left of the damping is less than an "
             "error of a tenth in that force"
         )
-    found += [why for why in (held_still(closed), stand_ins(closed)) if why]
+    reasons = (held_still(closed), stand_ins(closed), beyond_band(closed))
+    found += [why for why in reasons if why]
     if GAIN.test in _left(closed):
         found.append(
             "the gain of the actuator ripples along the way, which was not taken off, and where it "
