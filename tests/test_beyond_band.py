@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from fake_analysis import fake_closed
 
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.beyond_band import beyond_band
+from bayeshaptic.report.page.next_step import next_steps
+from bayeshaptic.stability.binding import BindingCrossing
 
 
 def at(times: float, verdict: str) -> Closed:
     """A closed loop whose limit lies at so many times the band's upper end."""
     closed = fake_closed(verdict, "linear")
     analysis = closed.analysis
-    frequency = np.full(len(analysis.limit.samples), times * analysis.etfe.band_hz[1])
-    frequency[0] = np.nan  # a draw without a limit
-    analysis.limit = replace(analysis.limit, frequency_hz=frequency)
+    there = BindingCrossing("vibration mode", times * analysis.etfe.band_hz[1], 0.9)
+    below = BindingCrossing("rigid body", 10.0, 0.1)
+    analysis.limit = replace(analysis.limit, crossings=(there, below))
     return closed
 
 
@@ -34,4 +35,5 @@ def test_a_limit_beyond_the_band_is_refused_where_something_is_unexplained(
     why = beyond_band(closed)
     assert (why is not None) == refused
     if why is not None:
-        assert "nan" not in why and headline(closed).status == "untrusted"
+        assert headline(closed).status == "untrusted"
+        assert "the band that was measured" in next_steps(headline(closed), closed)[0].text

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
 from bayeshaptic.quantities import interval, quantity
 
@@ -24,13 +22,18 @@ def beyond_band(closed: Closed) -> str | None:
     analysis = closed.analysis
     if closed.verdict != UNEXPLAINED or analysis.in_loop is not None:
         return None
-    (low, high), frequency = analysis.etfe.band_hz, analysis.limit.frequency_hz
-    frequency = frequency[frequency > 0]  # of the draws that have a limit
+    low, high = analysis.etfe.band_hz
+    outside = [
+        (one.probability, one.frequency_hz)
+        for one in analysis.limit.crossings
+        if one.frequency_hz is not None and not low <= one.frequency_hz <= high
+    ]
     mostly = 0.5
-    if not len(frequency) or np.mean((frequency < low) | (frequency > high)) <= mostly:
+    if sum(probability for probability, _ in outside) <= mostly:
         return None
+    where = quantity(max(outside)[1], "Hz")
     return (
-        f"something is left that nothing explains, and the limit, at "
-        f"{quantity(float(np.median(frequency)), 'Hz')}, lies outside the band that was measured "
-        f"({interval(low, high, 'Hz')}), where nothing tells how far that may take it"
+        f"something is left that nothing explains, and the limit, at {where}, lies outside the "
+        f"band that was measured ({interval(low, high, 'Hz')}), where nothing tells how far that "
+        "may take it"
     )

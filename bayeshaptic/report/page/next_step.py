@@ -13,6 +13,7 @@ from bayeshaptic.recordings.checks.check import USUAL_SECONDS
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.report.numbers.beyond_band import beyond_band
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.objections import changes, is_open, is_the_rest
@@ -136,6 +137,12 @@ def _after_fit(result: Result, command: str, new: str) -> Step:
         return Step(
             f"Let the device warm up{grip}, and record some {USUAL_SECONDS} s of a force that does "
             "not repeat: in parts of that a change can be followed. Then:",
+            new,
+        )
+    if beyond_band(result.closed) is not None:
+        return Step(
+            "Let the force move the device at the limit's frequency, too, so that the band that "
+            "was measured holds the limit. Then:",
             new,
         )
     if is_unexplained(result):
