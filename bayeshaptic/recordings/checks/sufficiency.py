@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
@@ -126,8 +127,8 @@ def _short(recording: Recording) -> TooLittle | None:
     if seconds >= least or find_repetition(recording.force) is not None:
         return None
     reason = (
-        f"{seconds:.3g} s, and at least {least:.2g} s are needed of a force that does not repeat, "
-        f"at {1 / recording.period_s:.4g} Hz"
+        f"{seconds:.3g} s, and at least {least:.3g} s are needed of a force that does not repeat, "
+        f"at {quantity(1 / recording.period_s, 'Hz')}"
     )
     return TooLittle(reason, _USUAL)
 
