@@ -7,22 +7,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 from test_time_domain import GAINS, TRUTH, declared, in_loop, stepped
 
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.feedback.in_loop import follow_in_loop
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
 from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
+from bayeshaptic.diagnosis.feedback.unlike_one_mass import unlike_one_mass
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, Hum
 from bayeshaptic.inference.time_domain.scores import scores
+from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import force_words
-from bayeshaptic.rig import Bench
+from bayeshaptic.rig import Bench, run_loop
 
 _REACH = 4.5  # standard deviations: 1 in 500 with eight degrees of freedom
 FOLLOWER = Follower(*Feedback(*GAINS).law(1e-3))
@@ -191,6 +194,48 @@ def test_what_speaks_against_a_limit_stands_where_half_is_not_enough(
     against, short = found.doubts
     assert "the damping is another at other frequencies" in against
     assert short == "half of the recording is not enough"
+
+
+def slow() -> tuple[Recording, Follower]:
+    """Ten seconds of one mass that follows noise up to 1.5 Hz, read in counts of 20 um."""
+    spring, damper = 100.0, 15.0
+    low = butter(2, 1.5, fs=1e3, output="sos")
+    wanted = sosfilt(low, np.random.default_rng(1).normal(size=10_000))
+    wanted *= 0.02 / wanted.std()
+    last = [0.0]
+
+    def controller(k: int, position: float) -> float:
+        rate, last[0] = (position - last[0]) / 1e-3, position
+        return float(spring * (wanted[k] - position) - damper * rate)
+
+    values = {"m": TRUTH["m"], "b": TRUTH["b"]}
+    bench = Bench("rigid", values, delay_s=TRUTH["delay_s"], encoder_resolution=2e-5)
+    done = run_loop(bench, controller, 10.0)
+    recording = recording_from_arrays(done.force, done.position, period_s=1e-3)
+    return recording, Follower(*Feedback(spring, damper).law(1e-3))
+
+
+def test_counts_are_not_taken_for_damping_that_fades() -> None:
+    """Along the measured motion, smoothed, the fastest had t = 14: the part of it that is no mass
+    and no damping was what counts add, which is what a fit leaves."""
+    recording, follower = slow()
+    motion = fit_motion(recording, follower)
+    forces = [force for _, force in unlike_one_mass(recording, motion.velocity(recording))]
+    seen = [score for score in scores(motion, recording, forces) if score is not None]
+    assert len(seen) > 4
+    assert all(abs(score.t) < _REACH for score in seen)
+
+
+def test_what_is_unlike_one_mass_is_so_in_any_unit_of_time() -> None:
+    """A device that is as quick as its clock: the same samples, of another period."""
+    recording = in_loop(2.0, 0.0, 2e-6)
+    quick = replace(recording, period_s=1e-4)
+    velocity = np.gradient(recording.position, 1e-3)
+    usual, quicker = (
+        unlike_one_mass(one, times * velocity) for one, times in ((recording, 1), (quick, 10))
+    )
+    for (_, one), (_, other) in zip(usual, quicker, strict=True):
+        assert other / other.std() == pytest.approx(one / one.std(), abs=1e-9)
 
 
 def humming(bench: Bench, **tone: Any) -> Recording:

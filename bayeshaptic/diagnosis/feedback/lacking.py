@@ -16,7 +16,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.feedback.candidate_laws import CandidateLaw, candidate_laws
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
-from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion, smooth_pieces
+from bayeshaptic.diagnosis.feedback.smooth_motion import smooth_pieces
 from bayeshaptic.diagnosis.feedback.tones_in_motion import with_tones
 from bayeshaptic.diagnosis.feedback.unlike_one_mass import unlike_one_mass
 from bayeshaptic.effects.nonlinear.drag import Drag
@@ -102,7 +102,7 @@ def with_laws(
             break
         motion, name, seen[name] = min(better, key=lambda one: one[0].error_rms)
         further = []
-    return motion, _found(motion, seen), _speaks_against(motion, recording, path)
+    return motion, _found(motion, seen), _speaks_against(motion, recording)
 
 
 def _with_drag(
@@ -183,9 +183,9 @@ def _best_of_each(
     return list(found.values())
 
 
-def _speaks_against(motion: MotionFit, recording: Recording, path: SmoothMotion) -> tuple[str, ...]:
+def _speaks_against(motion: MotionFit, recording: Recording) -> tuple[str, ...]:
     """Forces that are seen and that no limit of one mass goes with."""
-    asked = list(unlike_one_mass(recording, path))
+    asked = list(unlike_one_mass(recording, motion.velocity(recording)))
     scored = scores(motion, recording, [force for _, force in asked])
     seen = [
         (score.left, f"{why} (t = {abs(score.t):.3g})")

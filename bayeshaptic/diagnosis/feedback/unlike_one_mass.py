@@ -9,21 +9,32 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bayeshaptic.diagnosis.feedback.smooth_motion import SmoothMotion
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
-_FADING_S = (3e-3, 1e-2, 3e-2, 0.1)  # times within which damping fades
+# Times within which damping fades, over that of the motion: fading much faster it is a mass and a
+# damping, and much slower a spring.
+_FADING = (0.1, 0.3, 1.0, 3.0)
+_TINY = np.finfo(float).tiny
 
 
-def unlike_one_mass(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
-    """Each force, shape (N,), after why a limit of one mass does not go with it."""
-    yield from _fading(recording, path)
-    yield from _changing(recording, path)
+def unlike_one_mass(recording: Recording, velocity: Floats) -> Iterator[tuple[str, Floats]]:
+    """Each force, shape (N,), after why a limit of one mass does not go with it.
+
+    Parameters
+    ----------
+    recording : Recording
+    velocity : ndarray, shape (N,)
+        Of a motion without what the encoder adds.  Damping that fades fast is a mass and a damping
+        but for a small part of it: of a measured motion, smoothed as it may be, that part is what
+        counts add, and what a fit leaves is just that.
+    """
+    yield from _fading(velocity)
+    yield from _changing(recording, velocity)
     yield from _out_of_proportion(recording.force)
 
 
-def _fading(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
+def _fading(velocity: Floats) -> Iterator[tuple[str, Floats]]:
     """Damping that is gone within a time."""
     from scipy.signal import lfilter
 
@@ -31,20 +42,20 @@ def _fading(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Flo
         "the damping is another at other frequencies, as with a base that gives or a connection "
         "that relaxes, and what it is at the limit's nobody saw"
     )
-    for time_s in _FADING_S:
-        kept = np.exp(-recording.period_s / time_s)
-        v = path.velocity
-        slow, _ = lfilter([1 - kept], [1, -kept], v, zi=[kept * v[0]])
-        yield why, slow - v
+    hastens = float(np.std(np.diff(velocity))) / max(float(np.std(velocity)), _TINY)  # a sample
+    for time in _FADING:
+        kept = np.exp(-hastens / time)
+        slow, _ = lfilter([1 - kept], [1, -kept], velocity, zi=[kept * velocity[0]])
+        yield why, slow - velocity
 
 
-def _changing(recording: Recording, path: SmoothMotion) -> Iterator[tuple[str, Floats]]:
+def _changing(recording: Recording, velocity: Floats) -> Iterator[tuple[str, Floats]]:
     """Damping, dry friction and gain that grow with the time."""
     grows = np.linspace(-1, 1, recording.samples)
-    slow = 0.02 * float(np.std(path.velocity))
+    slow = 0.02 * float(np.std(velocity))
     for name, force in (
-        ("damping", path.velocity),
-        ("dry friction", np.tanh(path.velocity / slow)),
+        ("damping", velocity),
+        ("dry friction", np.tanh(velocity / slow)),
         ("gain from force to motion", recording.force),
     ):
         yield f"the {name} changes in the course of the recording", grows * force

@@ -97,6 +97,11 @@ class MotionFit:
         """Of `numbers`."""
         return self.whole_sd[len(self.whole) - len(self.forces.names) :]
 
+    def velocity(self, recording: Recording) -> Floats:
+        """Of the simulated motion in the recording that was fitted, shape (N,)."""
+        pieces = replace(recording, position=self.simulated).pieces
+        return np.concatenate([np.gradient(one.position, one.period_s) for one in pieces])
+
     def loop(self, recording: Recording, later_s: float = 0.0) -> MassInLoop:
         """The loop that was followed, or that of another recording, begun so much later."""
         hums = tuple(hum.later(later_s) for hum in self.hums)
