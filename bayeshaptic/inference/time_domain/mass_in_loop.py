@@ -139,14 +139,25 @@ class MassInLoop:
         return [np.arange(first, first + self._own) for first in firsts]
 
     def begun(self, shared: Floats, numbers: Floats | None = None) -> Floats:
-        """Values with the pieces' beginnings as measured, at rest; shape (plain,)."""
-        first = self.position[[piece.start for piece in self.pieces]]
-        at_rest = np.zeros((len(first), self._own))
-        at_rest[:, 0] = first
+        """Values with the pieces' beginnings as measured; shape (plain,).
+
+        A mass that moves is not found from rest where it rubs: slopes say there that friction takes
+        whatever velocity it is begun with.
+        """
+        first = np.zeros((len(self.pieces), self._own))
+        first[:, 0] = self.position[[piece.start for piece in self.pieces]]
+        first[:, 1] = [self._speed_at_first(self.position[piece]) for piece in self.pieces]
         begun = np.array([hum.amplitude for hum in self.hums])
-        at_rest[:, 2:] = np.append(begun.real, -begun.imag)
+        first[:, 2:] = np.append(begun.real, -begun.imag)
         own = self.forces.start if numbers is None else numbers
-        return np.concatenate([shared, at_rest.ravel(), own])
+        return np.concatenate([shared, first.ravel(), own])
+
+    def _speed_at_first(self, position: Floats) -> float:
+        """Of a parabola through what a piece does before its command changes much, in units/s."""
+        fewest = 5
+        samples = max(round(1 / (2 * np.pi * self.bandwidth_hz * self.period_s)), fewest)
+        some = position[:samples]
+        return float(np.polyfit(np.arange(len(some)) * self.period_s, some, 2)[1])
 
     def hums_at(self, values: Floats) -> tuple[Hum, ...]:
         """The hums with the cosines and sines of the first piece."""
