@@ -286,6 +286,25 @@ def test_a_new_person_is_where_most_people_were() -> None:
     assert "(in configuration 0.5)" in words and "in configuration 0." in words
 
 
+def test_a_limit_is_that_of_its_recordings_period() -> None:
+    """The population's had been the first one's, for a recording of twice the period, too."""
+    model = toy_model("kc", "kh")
+    mean, _ = prior_moments(model, study_coordinates(model))
+    users = [
+        analysed(f"u-{n}", toy_posterior(one, mean, 1e-4 * np.eye(2), n), user=f"u{n}")
+        for n, one in enumerate((model, model, replace(model, period_s=2e-3)))
+    ]
+    found = study_cases(users, 0, lambda share, word: None)
+    assert found.population is not None and found.population.users == ("u0", "u1")
+    own = users[2].analysis
+    assert own is not None
+    (slow,) = [case for case in found.cases if case.label == "user u2"]
+    assert slow.limit.quantile(0.5) == pytest.approx(own.limit.quantile(0.5), rel=0.01)
+    several, odd, *_ = (notice.text for notice in found.notices)
+    assert "several periods: 1.00 ms, 2.00 ms" in several
+    assert "u-2 (no effect, 2.00 ms)" in odd
+
+
 def test_nothing_left() -> None:
     failed = Analysed("bad", StudyEntry(Path("bad.csv")), None, "bad.csv: no data")
     found = whole_study([failed])

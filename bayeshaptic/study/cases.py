@@ -14,11 +14,19 @@ from bayeshaptic.errors import Notice, describe
 from bayeshaptic.inference.population.configurations import FEWEST
 from bayeshaptic.inference.population.infer import infer_population
 from bayeshaptic.inference.population.population import Population
+from bayeshaptic.quantities import quantity
 from bayeshaptic.stability.cases import FREE, HELD, NEW_PERSON, Case, DeviceLimit, device_limit
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.configuration_limits import ConfigurationLimits, configuration_limits
-from bayeshaptic.study.recorded_cases import place_of, posterior, recorded, signature, widening
+from bayeshaptic.study.recorded_cases import (
+    period_s,
+    place_of,
+    posterior,
+    recorded,
+    signature,
+    widening,
+)
 from bayeshaptic.types import Progress
 
 
@@ -70,7 +78,7 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
     free = [one for one in good if one.entry.user is None]
     notes = _Notes()
     like, odd = _alike(held)
-    notes.notices += _odd_notice(odd, like)
+    notes.notices += _periods(good) + _odd_notice(odd, like)
     population, new_person, users = _people(like, seed, report, notes)
     ways: list[ConfigurationLimits] = []
     covered: list[Analysed] = []
@@ -128,7 +136,7 @@ def _numbered(one: Analysed) -> bool:
 
 
 def _alike(some: Sequence[Analysed]) -> tuple[list[Analysed], list[Analysed]]:
-    """The recordings with the most common model and effects, and the others."""
+    """The recordings with the most common model, effects and period, and the others."""
     counts = Counter(signature(one) for one in some)
     if not counts:
         return [], []
@@ -140,13 +148,32 @@ def _alike(some: Sequence[Analysed]) -> tuple[list[Analysed], list[Analysed]]:
 def _odd_notice(odd: Sequence[Analysed], like: Sequence[Analysed]) -> list[Notice]:
     if not odd:
         return []
-    common = ", ".join(like[0].effects) or "no effect"
-    others = "; ".join(f"{one.name} ({', '.join(one.effects) or 'no effect'})" for one in odd)
+    several = bool(_periods([*like, *odd]))
+
+    def told(one: Analysed) -> str:
+        effects = ", ".join(one.effects) or "no effect"
+        return f"{effects}, {quantity(period_s(one), 's')}" if several else effects
+
+    common = told(like[0])
+    others = "; ".join(f"{one.name} ({told(one)})" for one in odd)
     text = (
         f"The population is that of the {len(like)} recordings with the same model and {common}. "
         f"Left out, and cases of their own: {others}."
     )
     return [Notice("warning", "population", text)]
+
+
+def _periods(some: Sequence[Analysed]) -> list[Notice]:
+    """That recordings have several periods; nothing where they have one."""
+    found = sorted({f"{period_s(one):.3e}": period_s(one) for one in some}.values())
+    if len(found) < 2:
+        return []
+    text = (
+        f"The recordings have several periods: {', '.join(quantity(t, 's') for t in found)}. The "
+        "limit of each is that of a loop with its own, and the device's is the lowest of them; "
+        "study those with the period of the loop that is to render walls by themselves."
+    )
+    return [Notice("warning", "period", text)]
 
 
 def _new_person(population: Population, like: Sequence[Analysed], seed: int) -> tuple[Case, ...]:

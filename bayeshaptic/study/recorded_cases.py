@@ -68,8 +68,18 @@ def posterior(one: Analysed) -> Posterior:
 
 
 def signature(one: Analysed) -> tuple[str, ...]:
-    """What recordings must have in common to be pooled: parameters and accepted effects."""
-    return (*posterior(one).names, *sorted(one.effects))
+    """What recordings must have in common to be pooled: parameters, accepted effects, the period.
+
+    A limit is that of a loop of one period, which time stamps give to some digits.
+    """
+    return (*posterior(one).names, *sorted(one.effects), f"{period_s(one):.3e}")
+
+
+def period_s(one: Analysed) -> float:
+    """Of the loop that the limit of a recording is for."""
+    found = posterior(one).model.period_s
+    assert found is not None  # without one there is no limit
+    return found
 
 
 def place_of(configuration: float | str | None) -> str:
