@@ -89,15 +89,23 @@ class LimitKnown:
         """The limit over all draws of `posterior`, whose chains were watched."""
         if self.limit is not None and np.array_equal(self._seen, posterior.chains):
             return self.limit
-        return critical_stiffness(posterior, before=self.limit)
+        return critical_stiffness(posterior, before=self._before(posterior.chains))
 
     def _limit(self, chains: Floats) -> CriticalStiffness:
         """What has been found of the same chains is not searched again."""
-        same = self.limit is not None and np.array_equal(self._seen[:, 0], chains[:, 0])
+        before = self._before(chains)
         self._seen = chains
-        before = self.limit if same else None
         self.limit = critical_stiffness(_Chains(self.model, chains), before=before)
         return self.limit
+
+    def _before(self, chains: Floats) -> CriticalStiffness | None:
+        """What was found of these chains while they were shorter.
+
+        None of others: a proposal that is fitted again begins new ones, which may never be looked
+        at because they do not converge.
+        """
+        same = self.limit is not None and np.array_equal(self._seen[:, 0], chains[:, 0])
+        return self.limit if same else None
 
     def _risks(self, limit: CriticalStiffness, chains: Floats) -> float:
         """Share of the draws that the small risks want; 1 where no more can be afforded."""
