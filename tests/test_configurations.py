@@ -16,6 +16,7 @@ from toy_study import toy_model, toy_posterior
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.errors import InputError
+from bayeshaptic.faq import explained
 from bayeshaptic.inference.population.configurations import Configurations, infer_configurations
 from bayeshaptic.inference.population.infer import prior_moments, study_coordinates
 from bayeshaptic.inference.population.trend import Trend
@@ -142,6 +143,18 @@ def test_two_configurations_are_not_a_path() -> None:
         infer_configurations(along((0.0, 1.0)), (0.0, 1.0))
     with pytest.raises(InputError, match="1 posteriors, but 2 configurations"):
         infer_configurations(along((0.0,)), (0.0, 1.0))
+
+
+def test_a_recording_that_is_described_where_it_is_not_makes_no_path() -> None:
+    """One that left several peaks: masses of 1e61 kg followed, at the measured place, too."""
+    posteriors = along(PLACES)
+    strange = posteriors[2]
+    x = study_coordinates(strange.model).coordinate(strange.draws)
+    off = (x - x.mean(axis=0)) / x.std(axis=0) - 60
+    likelihood = -0.5 * np.sum(off**2, axis=1).reshape(strange.log_likelihood.shape)
+    posteriors[2] = replace(strange, log_likelihood=likelihood)
+    with pytest.raises(InputError, match="configuration 0.5 leaves too much open"):
+        infer_configurations(posteriors, PLACES, seed=1)
 
 
 def test_the_worst_configuration() -> None:
@@ -303,6 +316,31 @@ def test_a_limit_is_that_of_its_recordings_period() -> None:
     several, odd, *_ = (notice.text for notice in found.notices)
     assert "several periods: 1.00 ms, 2.00 ms" in several
     assert "u-2 (no effect, 2.00 ms)" in odd
+
+
+@pytest.mark.parametrize("user", [None, "h"])
+def test_what_could_not_be_made_is_explained(
+    monkeypatch: pytest.MonkeyPatch, user: str | None
+) -> None:
+    """The report of a study ended with "no entry 'configurations (free)'"."""
+
+    def refused(*arguments: object) -> None:
+        raise InputError("too much is open")
+
+    monkeypatch.setattr("bayeshaptic.study.cases.configuration_limits", refused)
+    model = toy_model("kc", "kh") if user else toy_model("kc", "m2", "b1", base="free")
+    mean, _ = prior_moments(model, study_coordinates(model))
+    posteriors = [toy_posterior(model, mean, 1e-4 * np.eye(model.size), n) for n in range(3)]
+    found = study_cases(
+        [
+            analysed(f"{n}", one, user=user, configuration=float(n))
+            for n, one in enumerate(posteriors)
+        ],
+        0,
+        lambda share, word: None,
+    )
+    told = [explained(notice) for notice in found.notices]
+    assert any("too much is open" in one and "explain configurations" in one for one in told)
 
 
 def test_nothing_left() -> None:

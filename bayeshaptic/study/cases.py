@@ -52,14 +52,14 @@ class _Notes:
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """A stage that may fail without stopping the study."""
+    def stage(self, name: str, of: str = "") -> Iterator[None]:
+        """A stage that may fail without stopping the study; `name` is the word that explains it."""
         began = time.perf_counter()
         try:
             yield
         except Exception as error:
-            self.notices.append(Notice("warning", name, f"No {name}: {describe(error)}"))
-        self.seconds[name] = time.perf_counter() - began
+            self.notices.append(Notice("warning", name, f"No {name}{of}: {describe(error)}"))
+        self.seconds[name + of] = time.perf_counter() - began
 
 
 def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> StudyCases:
@@ -84,7 +84,7 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
     covered: list[Analysed] = []
     for is_held, some, begin in ((False, free, 0.6), (True, like, 0.8)):
         measured = _alike([one for one in some if _numbered(one)])[0]
-        with notes.stage(f"configurations ({'held' if is_held else 'free'})"):
+        with notes.stage("configurations", " (held)" if is_held else " (free)"):
             way = _along(measured, is_held, seed, report, begin)
             if way is not None:
                 ways.append(way)

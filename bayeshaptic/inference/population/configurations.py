@@ -13,7 +13,7 @@ from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likeli
 from bayeshaptic.inference.population.infer import common_model, prior_moments, study_coordinates
 from bayeshaptic.inference.population.reweighting import inside
 from bayeshaptic.inference.population.sampler import LevelChains, sample_level
-from bayeshaptic.inference.population.settling import settled
+from bayeshaptic.inference.population.settling import astray, settled
 from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
@@ -129,7 +129,8 @@ def infer_configurations(
     ------
     InputError
         With fewer than three different configurations, another number of coordinates than of
-        posteriors, or posteriors of models with different parameters.
+        posteriors, posteriors of models with different parameters, or a recording that cannot be
+        described beside the others.
     """
     report = progress or silent
     measured = np.unique(np.asarray(coordinate, float))
@@ -158,9 +159,17 @@ def infer_configurations(
     first_steps = 200
     chains = sample_level(path, tune, steps=first_steps)
     report(0.5, "configurations: sampling")
-    middle = np.median(chains.thinned(1000, np.random.default_rng(rest)), axis=0)
+    again = np.random.default_rng(rest)
+    middle = np.median(chains.thinned(1000, again), axis=0)
     path = settled(path, posteriors, here, middle)
     chains = sample_level(path, run, chains)
+    lost = astray(path, posteriors, here, np.median(chains.thinned(1000, again), axis=0))
+    if lost:
+        where = ", ".join(f"{coordinate[number]:g}" for number in lost)
+        raise InputError(
+            f"what is recorded in configuration {where} leaves too much open to be on one curve "
+            "with the others."
+        )
     notices = chains.notices
     if len(measured) < 5:
         who = "held" if any(name in HAND for name in model.names) else "nobody holding it"

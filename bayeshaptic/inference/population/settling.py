@@ -18,6 +18,9 @@ from bayeshaptic.types import Floats
 
 L = TypeVar("L", Hierarchy, Trend)
 _SETTLED = 0.02  # move, in posterior standard deviations, that is none
+# Posterior standard deviations that an expectation may lie outside a recording's own draws while
+# it is looked for, and in the end.
+_BEYOND, _FAR = 2.0, 5.0
 
 
 def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: Floats) -> L:
@@ -45,11 +48,9 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
     Hierarchy or Trend
         `level` with its new descriptions.
     """
-    own = [here.coordinate(one.draws) for one in posteriors]
-    sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
+    sd, low, high = _own(posteriors, here)
     walls = here.lowest
-    beyond = 2.0  # posterior standard deviations that an expectation may lie outside its own draws
-    low, high = np.maximum(low - beyond * sd, walls), high + beyond * sd
+    low, high = np.maximum(low - _BEYOND * sd, walls), high + _BEYOND * sd
     x = np.clip(_expected(level, phi, walls), low, high)
     rounds = 8
     for number in range(rounds):
@@ -64,6 +65,31 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
             break
         x = x + (0.5 if number % 2 else 1.0) * move / np.maximum(far, 1.0)
     return level
+
+
+def astray(
+    level: Hierarchy | Trend, posteriors: Sequence[Posterior], here: Coordinates, phi: Floats
+) -> list[int]:
+    """Which recordings are expected to be where none of their own draws are near.
+
+    Where a recording leaves a ridge or several peaks, its likelihood is no Gaussian function, and
+    what is settled on may be far from all that the recording allows.
+
+    Parameters
+    ----------
+    level, posteriors, here, phi
+        As in `settled`.
+    """
+    sd, low, high = _own(posteriors, here)
+    x, far = _expected(level, phi, here.lowest), _FAR * sd
+    return np.flatnonzero(np.any((x < low - far) | (x > high + far), axis=1)).tolist()
+
+
+def _own(posteriors: Sequence[Posterior], here: Coordinates) -> tuple[Floats, Floats, Floats]:
+    """Standard deviation, least and most of every recording's own draws, each (R, D)."""
+    own = [here.coordinate(one.draws) for one in posteriors]
+    sd, low, high = (np.stack([of(x, axis=0) for x in own]) for of in (np.std, np.min, np.max))
+    return sd, low, high
 
 
 def _expected(level: Hierarchy | Trend, phi: Floats, walls: Floats) -> Floats:
