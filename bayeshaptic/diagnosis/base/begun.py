@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.base.alignment import realigned
 from bayeshaptic.diagnosis.base.asked import base_model
+from bayeshaptic.diagnosis.base.file_in_doubt import file_in_doubt
 from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.choose import Choice, choose_model
@@ -52,7 +53,11 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
         again = realigned(found, fit, model, options, _simpler(choice))
         if again is not None:
             return fitted(again, model, options)
-    parts = {**vars(found), "etfe": etfe, "seconds": clock.seconds}
+        tried = {fit.model.name: fit}
+        tried |= {name: one.fit for name, one in choice.candidates.items()} if choice else {}
+        doubt = file_in_doubt(etfe, tried, found.device, options)
+    notices = (*found.notices, *doubt)
+    parts = {**vars(found), "etfe": etfe, "notices": notices, "seconds": clock.seconds}
     return Begun(**parts, measured=found.etfe, fit=fit, choice=choice)
 
 
