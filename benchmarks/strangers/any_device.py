@@ -11,6 +11,7 @@ whether somebody holds them and the delay.
 
 from __future__ import annotations
 
+import argparse
 from typing import Any
 
 import numpy as np
@@ -49,9 +50,9 @@ def make(seed: int, clean: bool = False) -> Case | None:
     rng = np.random.default_rng([52, seed])
     draw = Draw(rng, str(rng.choice(["lhifam", "phantom"])), bool(rng.random() < 0.4), True)
     period_s, mass = float(rng.choice(PERIODS_S)), 10 ** rng.uniform(-6, 2)
-    draw.values = _device(draw, mass, period_s)
+    draw.values = device_of(draw, mass, period_s)
     effects = effects_of(draw) if rng.random() < 0.7 else ()
-    sizes = {name: _size(draw, name, period_s / USUAL_S) for name in effects if not clean}
+    sizes = {name: size_in_periods(draw, name, period_s / USUAL_S) for name in effects if not clean}
     delay_s = draw.between(0.05, 4) * period_s if rng.random() < 0.8 else 0.0
     delay_s += sizes["late"][0] if "late" in sizes else 0.0
     delay_s = max(round(delay_s / period_s * STEPS), 1) / STEPS * period_s
@@ -74,11 +75,11 @@ def make(seed: int, clean: bool = False) -> Case | None:
         f"{len(draw.values['m'])} masses {'held' if draw.held else 'free'}, {mass:.1e}, "
         f"{1e3 * period_s:.3g} ms, {len(force)} samples, told {', '.join(told) or 'nothing'}"
     )
-    truth = _limit(device, mass, period_s, delay_s) / (1 + forces.ripple)
+    truth = limit_of(device, mass, period_s, delay_s) / (1 + forces.ripple)
     return Case(recording, told, what, tuple(sizes), truth, *base_of(draw.values))
 
 
-def _device(draw: Draw, mass: float, period_s: float) -> dict[str, Any]:
+def device_of(draw: Draw, mass: float, period_s: float) -> dict[str, Any]:
     """Masses, springs and dampers in terms of the whole mass and of the period."""
     between, turn = draw.between, 2 * np.pi
     ratio = between(0.05, 20)
@@ -98,7 +99,7 @@ def _device(draw: Draw, mass: float, period_s: float) -> dict[str, Any]:
     return values
 
 
-def _size(draw: Draw, name: str, longer: float) -> tuple[float, ...]:
+def size_in_periods(draw: Draw, name: str, longer: float) -> tuple[float, ...]:
     """Of an effect, its rates and times in periods; a hand's are a hand's."""
     size = list(size_of(draw, name))
     if name in ("amplifier 1", "amplifier 2", "sensor", "base", "mode"):
@@ -133,17 +134,22 @@ def _force(draw: Draw, count: int, period_s: float) -> Array:
     return np.asarray(force / force.std() * 10 ** rng.uniform(-3, 3))
 
 
-def _limit(device: States, mass: float, period_s: float, delay_s: float) -> float:
+def limit_of(device: States, mass: float, period_s: float, delay_s: float) -> float:
     """K_CR, searched for in units in which it is near one."""
     unit = 1e-4 * mass / period_s**2
     scaled = States(device.a, unit * device.b, device.c, device.g)
     return unit * scaled.critical_stiffness(period_s, delay_s)
 
 
-def main() -> None:
-    parser = parser_of(__doc__)
+def parser_of_any(what: str | None) -> argparse.ArgumentParser:
+    """With the choice of devices that have nothing undeclared in them."""
+    parser = parser_of(what)
     parser.add_argument("--clean", action="store_true", help="without effects")
-    asked = parser.parse_args()
+    return parser
+
+
+def main() -> None:
+    asked = parser_of_any(__doc__).parse_args()
     seeds = range(asked.first, asked.first + asked.count)
     kept(seeds, asked.file, lambda seed: one(seed, asked.clean))
 

@@ -49,7 +49,7 @@ from benchmarks.strangers.motion import Forces, Law
 CONTROLLERS = ("P", "PD", "PD", "PI", "PID", "PD filtered", "PID filtered")
 REFERENCES = ("steps", "ramps", "way", "noise")
 OPEN = ("force steps", "pulses", "tone")
-_LAGS = {"amplifier 1", "amplifier 2", "sensor"}  # which the loop's delay has to stand for
+LAGS = {"amplifier 1", "amplifier 2", "sensor"}  # which the loop's delay has to stand for
 
 
 def make(seed: int) -> Case | None:
@@ -68,15 +68,15 @@ def make(seed: int) -> Case | None:
     samples = int(seconds / period_s)
     closed = bool(rng.random() < 2 / 3)
     kind = str(rng.choice(REFERENCES if closed else OPEN))
-    law, name = _law(draw, truth, period_s) if closed else (None, "open loop")
-    wanted = _wanted(draw, kind, samples, period_s)
+    law, name = law_of(draw, truth, period_s) if closed else (None, "open loop")
+    wanted = wanted_of(draw, kind, samples, period_s)
     if law is not None:
         wanted *= FORCE[draw.like] * draw.between(1, 30) / law.spring / wanted.std()
         if rng.random() < 0.2:  # cut off at its limits now and then
             law = replace(law, most=law.spring * wanted.std() * rng.uniform(0.7, 2))
     else:
         wanted *= FORCE[draw.like] * draw.between(0.3, 3) / wanted.std()
-    made = _simulated(draw, sizes, device, wanted, law, period_s, delay_s)
+    made = simulated(draw, sizes, device, wanted, law, period_s, delay_s)
     if made is None:
         return None
     force, position, friction = made
@@ -98,12 +98,12 @@ def make(seed: int) -> Case | None:
     if law is not None and rng.random() < 0.3:
         recording, also = replace(recording, reference=wanted), ["reference"]
     elif law is not None and np.isinf(law.most) and rng.random() < 0.3:
-        recording, also = replace(recording, feedback=_declared(law, period_s)), ["controller"]
+        recording, also = replace(recording, feedback=declared(law, period_s)), ["controller"]
     known = ", ".join([*told, *also]) or "nothing"
     masses = len(draw.values["m"])
     what = f"{draw.kind} {masses}, {name}, {kind}, {seconds:.1f} s, told {known}"
     base, parameters = base_of(draw.values)
-    if base == "rigid" and not set(effects) & _LAGS:
+    if base == "rigid" and not set(effects) & LAGS:
         parameters["delay_s"] = delay_s
     if base == "rigid" and set(effects) & {"warming up", "eddy"}:
         del parameters["b"]  # it is not one number
@@ -112,31 +112,37 @@ def make(seed: int) -> Case | None:
     return Case(recording, told, what, effects, truth, base, parameters)
 
 
-def _law(draw: Draw, truth: float, period_s: float) -> tuple[Law, str]:
-    """A controller that one mass would be well damped by, far below what is critical."""
+def law_of(draw: Draw, truth: float, period_s: float, longer: float = 1.0) -> tuple[Law, str]:
+    """A controller that one mass would be well damped by, far below what is critical.
+
+    Its times are `longer` than those of haptic devices; the count is that of the paper's devices.
+    """
     name, v = str(draw.rng.choice(CONTROLLERS)), draw.values
     mass, damping = float(np.sum(v["m"])), float(v["b1"] + v["b2"])
-    spring = min(mass * (2 * np.pi * draw.between(1, 8)) ** 2, 0.2 * truth)
+    spring = min(mass * (2 * np.pi * draw.between(1, 8) / longer) ** 2, 0.2 * truth)
     rad_s = np.sqrt(spring / mass)
     damper = max(2 * draw.rng.uniform(0.4, 1) * mass * rad_s - damping, 0.0)
     damper = damper / period_s if "D" in name else 0.0
     integral = spring * rad_s * draw.rng.uniform(0.05, 0.15) * period_s if "I" in name else 0.0
     keep = 0.0
     if "filtered" in name:
-        keep = float(np.exp(-2 * np.pi * draw.between(40, 200) * period_s))
+        keep = float(np.exp(-2 * np.pi * draw.between(40, 200) / longer * period_s))
     count = COUNT[draw.like] * draw.between(0.1, 1)
     return Law(spring, damper, integral, keep, np.inf, count), name
 
 
-def _declared(law: Law, period_s: float) -> Feedback:
+def declared(law: Law, period_s: float) -> Feedback:
     """As a person writes it down."""
     filter_hz = -np.log(law.keep) / (2 * np.pi * period_s) if law.keep else None
     return Feedback(law.spring, law.damper * period_s, law.integral / period_s, filter_hz)
 
 
-def _wanted(draw: Draw, kind: str, samples: int, period_s: float) -> Array:
-    """What a controller follows, or the command of an open loop, in no unit yet."""
-    rng = draw.rng
+def wanted_of(draw: Draw, kind: str, samples: int, period_s: float, longer: float = 1.0) -> Array:
+    """What a controller follows, or the command of an open loop, in no unit yet.
+
+    Its times are `longer` than what a person would have a haptic device do.
+    """
+    rng, period_s = draw.rng, period_s / longer
     time = np.arange(samples) * period_s
     if kind == "tone":
         return np.asarray(np.sin(2 * np.pi * draw.between(0.5, 20) * time))
@@ -162,7 +168,7 @@ def _wanted(draw: Draw, kind: str, samples: int, period_s: float) -> Array:
     return np.concatenate(pieces)[:samples]
 
 
-def _simulated(
+def simulated(
     draw: Draw,
     sizes: dict[str, tuple[float, ...]],
     device: States,
