@@ -81,7 +81,8 @@ def _refuse_unlike(recordings: Sequence[Recording]) -> None:
         if abs(other.period_s / first.period_s - 1) > apart:
             raise InputError(
                 f"{other.name} is sampled every {other.period_s:g} s and {first.name} every "
-                f"{first.period_s:g} s: they cannot be one; analyse them apart"
+                f"{first.period_s:g} s: they cannot be one; analyse them apart "
+                "(in a study, with pool = false at its top)"
             )
         units = (other.force_unit, other.position_unit)
         if units != (first.force_unit, first.position_unit):
