@@ -10,7 +10,7 @@ from bayeshaptic.devices import load_device
 from bayeshaptic.diagnosis.base.file_in_doubt import file_in_doubt
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.least_squares import least_squares
-from bayeshaptic.models import build_model
+from bayeshaptic.models import LogUniform, build_model
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -38,3 +38,12 @@ def test_a_value_in_another_unit_is_named(etfe: Etfe, name: str, factor: float, 
     texts = [one.text for one in file_in_doubt(etfe, {"free": fit}, wrong, Options())]
     assert len(texts) == bool(told)
     assert all(told in text for text in texts)
+
+
+def test_a_prior_of_another_model_is_no_matter(etfe: Etfe) -> None:
+    """A study's prior of m1 ended each of its reports where the rigid model was tried, too."""
+    device = load_device("lhifam")
+    fit = least_squares(build_model("rigid", device, period_s=etfe.period_s), etfe)
+    assert fit.misfits
+    options = Options(prior={"m1": LogUniform(0.1, 10.0)})
+    assert file_in_doubt(etfe, {"rigid": fit}, device, options) == ()

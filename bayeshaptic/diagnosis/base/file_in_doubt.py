@@ -46,14 +46,15 @@ def file_in_doubt(
             continue
         bare = replace(device, parameters={})
         model = build_model(name, bare, options.delay_s, options.delay_sd_s, etfe.period_s)
-        alone = least_squares(model.with_prior(dict(options.prior)), etfe, options.seed)
+        own = {key: prior for key, prior in options.prior.items() if key in model.names}
+        alone = least_squares(model.with_prior(own), etfe, options.seed)
         if alone.misfits:
             continue
         found = dict(zip(alone.model.names, alone.theta.tolist(), strict=True))
         far = {
             key: abs(np.log(found[key] / given[key])) / DEVICE_LOG_SD
             for key in _TOLD
-            if given.get(key, 0.0) > 0 and found.get(key, 0.0) > 0 and key not in options.prior
+            if given.get(key, 0.0) > 0 and found.get(key, 0.0) > 0 and key not in own
         }
         worst = max(far, key=lambda key: far[key], default=None)
         if worst is None or far[worst] < _FAR:
