@@ -8,8 +8,8 @@ import pytest
 from fake_analysis import fake_closed
 
 from bayeshaptic.diagnosis.closed import Closed
+from bayeshaptic.report.beyond_band import beyond_band
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.numbers.beyond_band import beyond_band
 from bayeshaptic.report.page.next_step import next_steps
 from bayeshaptic.stability.binding import BindingCrossing
 

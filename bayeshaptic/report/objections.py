@@ -18,8 +18,8 @@ from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
+from bayeshaptic.report.beyond_band import beyond_band
 from bayeshaptic.report.in_closed_loop import in_closed_loop
-from bayeshaptic.report.numbers.beyond_band import beyond_band
 from bayeshaptic.report.numbers.held_still import held_still
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,

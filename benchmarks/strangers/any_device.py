@@ -53,9 +53,7 @@ def make(seed: int, clean: bool = False) -> Case | None:
     draw.values = device_of(draw, mass, period_s)
     effects = effects_of(draw) if rng.random() < 0.7 else ()
     sizes = {name: size_in_periods(draw, name, period_s / USUAL_S) for name in effects if not clean}
-    delay_s = draw.between(0.05, 4) * period_s if rng.random() < 0.8 else 0.0
-    delay_s += sizes["late"][0] if "late" in sizes else 0.0
-    delay_s = max(round(delay_s / period_s * STEPS), 1) / STEPS * period_s
+    delay_s = delay_in_steps(draw, sizes, period_s, 4)
     device = states_of(draw, sizes)
     force = _force(draw, int(draw.between(4000, 50_000)), period_s)
     way = 10 ** rng.uniform(-3.3, -1)  # half a millimetre or milliradian to a hundred
@@ -97,6 +95,15 @@ def device_of(draw: Draw, mass: float, period_s: float) -> dict[str, Any]:
         values |= {"bs": 2 * between(0.03, 0.6) * hand * grip}
         values |= {"bh": 2 * between(0.2, 1) * hand * arm}
     return values
+
+
+def delay_in_steps(
+    draw: Draw, sizes: dict[str, tuple[float, ...]], period_s: float, most: float
+) -> float:
+    """The loop's delay: none, or up to so many periods, and what an effect adds; whole steps."""
+    own_s = draw.between(0.05, most) * period_s if draw.rng.random() < 0.8 else 0.0
+    delay_s = own_s + (sizes["late"][0] if "late" in sizes else 0.0)
+    return max(round(delay_s / period_s * STEPS), 1) / STEPS * period_s
 
 
 def size_in_periods(draw: Draw, name: str, longer: float) -> tuple[float, ...]:

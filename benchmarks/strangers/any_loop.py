@@ -21,6 +21,7 @@ from benchmarks.strangers.__main__ import Row, analysed, kept
 from benchmarks.strangers.any_device import (
     PERIODS_S,
     USUAL_S,
+    delay_in_steps,
     device_of,
     limit_of,
     parser_of_any,
@@ -28,7 +29,6 @@ from benchmarks.strangers.any_device import (
 )
 from benchmarks.strangers.draw import UNITS, Case, Draw, as_logged, base_of, effects_of, states_of
 from benchmarks.strangers.loops import LAGS, REFERENCES, declared, law_of, simulated, wanted_of
-from benchmarks.strangers.motion import STEPS
 
 
 def one(seed: int, clean: bool = False) -> Row:
@@ -51,9 +51,7 @@ def make(seed: int, clean: bool = False) -> Case | None:
     effects = (() if clean else effects) + ("coulomb",) * friction
     longer = period_s / USUAL_S
     sizes = {name: size_in_periods(draw, name, longer) for name in effects}
-    delay_s = draw.between(0.05, 3) * period_s if rng.random() < 0.8 else 0.0
-    delay_s += sizes["late"][0] if "late" in sizes else 0.0
-    delay_s = max(round(delay_s / period_s * STEPS), 1) / STEPS * period_s
+    delay_s = delay_in_steps(draw, sizes, period_s, 3)
     device = states_of(draw, sizes)
     truth = limit_of(device, mass, period_s, delay_s)
     kind = str(rng.choice(REFERENCES))

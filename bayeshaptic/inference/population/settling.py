@@ -19,7 +19,7 @@ from bayeshaptic.types import Floats
 L = TypeVar("L", Hierarchy, Trend)
 _SETTLED = 0.02  # move, in posterior standard deviations, that is none
 # Posterior standard deviations that an expectation may lie outside a recording's own draws while
-# it is looked for, and in the end.
+# it is looked for, and in the end: the one that was met lay 50 outside (rates are not counted).
 _BEYOND, _FAR = 2.0, 5.0
 
 

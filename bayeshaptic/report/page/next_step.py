@@ -13,7 +13,7 @@ from bayeshaptic.recordings.checks.check import USUAL_SECONDS
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.report.numbers.beyond_band import beyond_band
+from bayeshaptic.report.beyond_band import beyond_band
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.objections import changes, is_open, is_the_rest

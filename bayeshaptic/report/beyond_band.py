@@ -17,7 +17,8 @@ def beyond_band(closed: Closed) -> str | None:
     How far what is unexplained may move the response is read off the residual, which ends with the
     band.  Of 21 recordings of strangers (12 of them shorter than 2.5 s) that had a stiffness beside
     something unexplained, the limits of four lay outside: two of these stiffnesses were above it,
-    1.6 and 2.0 times, and none of the other 17.
+    1.6 and 2.0 times, and none of the other 17.  The rule was found on these; how often it refuses
+    what would have held is not counted on others.
     """
     analysis = closed.analysis
     if closed.verdict != UNEXPLAINED or analysis.in_loop is not None:
