@@ -14,7 +14,7 @@ from bayeshaptic.diagnosis.base.asked import base_model
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.saved.archive import model_from_dict, model_to_dict
-from bayeshaptic.models.chains import _as_chain
+from bayeshaptic.models.chains import _as_chain, with_a_mode_moved
 from bayeshaptic.models.structures import chain
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.rig import Bench, simulate
@@ -118,3 +118,16 @@ def test_a_fit_that_grew_a_mode_where_none_is_moves_it(tmp_path):
     frequency = np.geomspace(1.0, 400.0, 400)
     table = noisy_table(tmp_path, frequency, model.response(truth, frequency), 3e-4, seed=14)
     assert bh.least_squares(model, table).reduced_chi_square < 1.2
+
+
+def test_a_fit_whose_motor_is_let_go_moves_no_mode(tmp_path):
+    """A spring of nothing leaves modes in which the motor rests: its chain would have no masses."""
+    model = bh.chain(2, delay_s=2e-4, period_s=1e-3)
+    values = MASSES | SPRINGS | GROUND | {"kc": 1e-13, "bc": 1e-13}
+    theta = np.array([values[name] for name in model.names])
+    frequency = np.geomspace(1.0, 400.0, 400)
+    table = noisy_table(tmp_path, frequency, model.response(theta, frequency), 3e-4, seed=14)
+    for moved in (1, 2):
+        starts = with_a_mode_moved(model, theta, moved, table)
+        assert starts.shape[1] == len(theta) and np.all(np.isfinite(starts))
+    assert np.isfinite(bh.least_squares(model, table, start=theta).theta).all()

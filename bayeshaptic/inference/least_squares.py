@@ -162,13 +162,13 @@ def _sharpened(
 
 
 def _starts(model: Model, etfe: Etfe, seed: int, known: Fit | None) -> Floats:
-    """Where to begin; a chain grows from the fit of the one with a mode less."""
-    shorter = shorter_chain(model)
-    if shorter is None:
-        return starting_points(model, etfe, np.random.default_rng(seed))
-    if known is None or known.model.names != shorter.names:
-        known = least_squares(shorter, etfe, seed=seed)
-    return with_one_more_mode(shorter, known.theta, model, etfe)
+    """Where to begin; a chain grows from the fit of the one with a mode less, if it can."""
+    shorter, grown = shorter_chain(model), np.empty((0, model.size))
+    if shorter is not None:
+        if known is None or known.model.names != shorter.names:
+            known = least_squares(shorter, etfe, seed=seed)
+        grown = with_one_more_mode(shorter, known.theta, model, etfe)
+    return grown if len(grown) else starting_points(model, etfe, np.random.default_rng(seed))
 
 
 def _with_modes_moved(fit: Fit, etfe: Etfe, rounds: int) -> Fit:
@@ -178,7 +178,7 @@ def _with_modes_moved(fit: Fit, etfe: Etfe, rounds: int) -> Fit:
         if not fit.misfits or idle == modes:
             break
         start = with_a_mode_moved(fit.model, fit.theta, 1 + step % modes, etfe)
-        other = _fit(fit.model, etfe, start)
+        other = _fit(fit.model, etfe, start) if len(start) else fit
         better = other.reduced_chi_square < (1 - _ONE_VALLEY) * fit.reduced_chi_square
         fit, idle = (other, 0) if better else (fit, idle + 1)
     return fit

@@ -39,6 +39,7 @@ def with_one_more_mode(shorter: Model, theta: Floats, model: Model, etfe: Etfe) 
     Returns
     -------
     ndarray, shape (S, P)
+        Of no vectors where the modes at `theta` are of no chain.
     """
     values = dict(zip(shorter.names, theta, strict=True)) | dict(shorter.fixed)
     return _with_a_mode(values, _modes_of(values, model.structure.modes), model, etfe)
@@ -61,6 +62,7 @@ def with_a_mode_moved(model: Model, theta: Floats, moved: int, etfe: Etfe) -> Fl
     Returns
     -------
     ndarray, shape (S, P)
+        Of no vectors where the modes that stay are of no chain.
     """
     values = dict(zip(model.names, theta, strict=True)) | dict(model.fixed)
     modes = _modes_of(values, model.structure.modes + 1)
@@ -70,7 +72,11 @@ def with_a_mode_moved(model: Model, theta: Floats, moved: int, etfe: Etfe) -> Fl
 def _with_a_mode(
     values: dict[str, float], modes: tuple[Floats, ...], model: Model, etfe: Etfe
 ) -> Floats:
-    """Vectors with these modes and one more, shape (S, P); all else is as in `values`."""
+    """Vectors with these modes and one more, shape (S, P); all else is as in `values`.
+
+    None where the modes are of no chain: one in which the first mass does not move, or two of one
+    frequency, leave a mass of nothing.
+    """
     low, high = etfe.band_hz
     found = []
     frequencies = 45
@@ -81,12 +87,16 @@ def _with_a_mode(
             squares, weights, rates = (
                 np.append(part, one) for part, one in zip(modes, new, strict=True)
             )
-            masses, springs = _as_chain(squares, weights)
+            with np.errstate(all="ignore"):
+                masses, springs = _as_chain(squares, weights)
+            parts = np.append(masses, springs)
+            if not np.all(np.isfinite(parts) & (parts > 0)):
+                continue
             for ratio in _DAMPING:
                 rates[-1] = 2 * ratio * np.sqrt(square)
                 named = _named(values, masses, springs, squares, rates)
                 found.append([named[name] for name in model.names])
-    return np.array(found)
+    return np.array(found).reshape(-1, len(model.names))
 
 
 def _modes_of(values: dict[str, float], count: int) -> tuple[Floats, Floats, Floats]:

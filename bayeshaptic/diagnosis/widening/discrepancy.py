@@ -256,7 +256,8 @@ def _with_linear(
                 for d in delta[rows]
             ]
         )
-        samples[rows], places[rows] = _lowest_crossing(g * np.exp(bent), frequency)
+        with np.errstate(all="ignore"):  # draws that overflow cross nowhere
+            samples[rows], places[rows] = _lowest_crossing(g * np.exp(bent), frequency)
     kept = np.isfinite(samples)
     samples, places = samples[kept], places[kept]
     # A bent response may cross where none of the model's draws does: by what moves there.
