@@ -10,9 +10,10 @@ from effect_cases import CASES, Case, base_fit, recorded
 
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.inference.least_squares import least_squares, refine_anew
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.saved.archive import model_from_dict, model_to_dict
 from bayeshaptic.inference.screening import promising_starts
+from bayeshaptic.inference.valleys import refine_anew
 from bayeshaptic.rig.truth import sampled_loop
 from bayeshaptic.stability import critical_stiffness
 

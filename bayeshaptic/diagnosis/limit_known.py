@@ -11,7 +11,7 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.diagnostics import RHAT_LIMIT, Diagnostics, diagnose
 from bayeshaptic.inference.posterior import prior_dominated
 from bayeshaptic.inference.sampling.settings import MOST_EVALUATIONS, SamplerSettings
-from bayeshaptic.inference.stopping import EveryParameter, Verdict
+from bayeshaptic.inference.sampling.stopping import EveryParameter, Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.rank_statistics import split_rhat
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness

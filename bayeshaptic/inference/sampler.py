@@ -26,8 +26,8 @@ from bayeshaptic.inference.sampling.near_zero import (
 from bayeshaptic.inference.sampling.peaks import warmed_up_about_peaks
 from bayeshaptic.inference.sampling.run import Run, run_until_done
 from bayeshaptic.inference.sampling.settings import MOST_EVALUATIONS, SamplerSettings
+from bayeshaptic.inference.sampling.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.inference.saved.checkpoint import Checkpoint, Stored, key_of
-from bayeshaptic.inference.stopping import EveryParameter, Rule, Verdict
 from bayeshaptic.models import Model
 from bayeshaptic.models.start import informed
 from bayeshaptic.numerics.gauss_newton import minimise
@@ -100,7 +100,7 @@ def sample(
         machine; the result then says it has not converged.
     rule : callable, optional
         What to ask for instead of `ess`: judges chains of natural values, shape (ensembles, S,
-        walkers, P), and returns a `bayeshaptic.inference.stopping.Verdict`.
+        walkers, P), and returns a `bayeshaptic.inference.sampling.stopping.Verdict`.
     checkpoints : path, optional
         Folder in which a sampler that runs for longer than some ten seconds keeps its state: called
         again after an interruption, it goes on, with the same draws to the last digit.

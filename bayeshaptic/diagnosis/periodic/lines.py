@@ -37,8 +37,9 @@ from bayeshaptic.diagnosis.trials.linear import sieve
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.inference.least_squares import least_squares, refine_anew
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.screening import starting_bases
+from bayeshaptic.inference.valleys import refine_anew
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra

@@ -27,9 +27,10 @@ from bayeshaptic.diagnosis.state import (
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.fit import search_box, weighted_residuals
-from bayeshaptic.inference.least_squares import CREEPS, Optimum, anew, least_squares, refine
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.screening import promising_starts, starting_bases
+from bayeshaptic.inference.valleys import CREEPS, Optimum, anew, refine
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.numerics.spending import Meter

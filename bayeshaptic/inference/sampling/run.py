@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bayeshaptic.inference.sampling.ensembles import ENSEMBLES, WALKERS, Ensembles, refitted
 from bayeshaptic.inference.sampling.near_zero import Redraw
 from bayeshaptic.inference.sampling.several_peaks import restored
-from bayeshaptic.inference.stopping import Rule, Verdict
+from bayeshaptic.inference.sampling.stopping import Rule, Verdict
 from bayeshaptic.types import Floats, LogDensity, Progress
 
 _FIRST_STEPS = 32  # before chains are looked at for the first time

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from bayeshaptic.inference.stopping import Rule
+from bayeshaptic.inference.sampling.stopping import Rule
 from bayeshaptic.types import Progress
 
 MOST_EVALUATIONS = 1_500_000
@@ -18,8 +18,8 @@ class SamplerSettings:
     Attributes
     ----------
     rule : callable
-        When to stop: judges chains of natural values, as `bayeshaptic.inference.stopping` says.  It
-        may look at more than the parameters, the limit say.
+        When to stop: judges chains of natural values, as `bayeshaptic.inference.sampling.stopping`
+        says.  It may look at more than the parameters, the limit say.
     seed : int
         Same seed, same draws.
     progress : callable, bool or None
