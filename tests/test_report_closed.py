@@ -88,6 +88,7 @@ def test_a_response_with_a_force_taken_off_is_not_called_as_measured() -> None:
 
 def test_several_effects_are_one_sentence() -> None:
     assert listed([]) == "" and listed(["a"]) == "a" and listed(["a", "b"]) == "a and b"
+    assert listed(["a", "b", "a", "b", "b"]) == "a (twice) and b (three times)"
     closed = fake_closed()
     (one,) = closed.effects
     titles = ("cogging: a force that ripples along the way", "compliant base", "gravity")

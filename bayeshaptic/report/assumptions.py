@@ -133,7 +133,7 @@ def _model(analysis: Analysis, closed: Closed | None) -> str:
     names = [effect.name for effect in analysis.model.effects]
     if closed is not None:
         names = [effect.title for effect in closed.effects if effect.family != "measurement"]
-    effects = f"with {' and with '.join(names)}" if names else "no effect has been added to it"
+    effects = f"with {listed(names)}" if names else "no effect has been added to it"
     return f"Model: {analysis.model.structure.title}; {effects}."
 
 

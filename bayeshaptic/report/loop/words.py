@@ -134,7 +134,7 @@ def subject(closed: Closed) -> str:
 
 def names(closed: Closed) -> str:
     """The titles of what was found."""
-    return ", ".join(effect.title for effect in closed.effects)
+    return listed(effect.title for effect in closed.effects)
 
 
 def scope(closed: Closed) -> str:
