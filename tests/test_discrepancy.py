@@ -16,10 +16,10 @@ from bayeshaptic.diagnosis.traced import Traced, share_left
 from bayeshaptic.diagnosis.trials.direct import _leaves_little
 from bayeshaptic.diagnosis.trials.drift import _edge_error, _ends, _fall, _further, drift_trials
 from bayeshaptic.diagnosis.widening.deviation import Deviation, evidence, matern, merged
-from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
+from bayeshaptic.diagnosis.widening.discrepancy import _lowest_crossing, with_discrepancy
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
-from bayeshaptic.models import build_model
+from bayeshaptic.models import build_model, rigid
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings import read_recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
@@ -281,6 +281,17 @@ def test_a_crossing_is_named_where_it_binds() -> None:
         assert len(bound) > 0
         assert found.probability == pytest.approx(len(bound) / len(wide.samples))
         assert found.frequency_hz == pytest.approx(np.median(bound), rel=0.25)
+
+
+def test_a_crossing_on_a_grid_is_where_the_response_crosses():
+    """It was at the grid's line before, beside a table that had another frequency for it."""
+    model = rigid("lhifam")
+    exact = critical_stiffness(model)
+    grid = np.geomspace(0.05, 500.0, 1500)
+    stiffness, place = _lowest_crossing(model.response(model.values[None], grid), grid)
+    near = (grid[1] / grid[0] - 1) ** 2  # what a line between two points of a smooth curve is off
+    assert stiffness == pytest.approx([exact.value], rel=near)
+    assert place == pytest.approx([exact.crossings[0].frequency_hz], rel=near)
 
 
 def test_crossings_of_a_bent_response_are_told_apart_by_their_frequency(monkeypatch) -> None:

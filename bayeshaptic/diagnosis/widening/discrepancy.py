@@ -268,7 +268,10 @@ def _with_linear(
 
 
 def _lowest_crossing(g: Complexes, frequency: Floats) -> tuple[Floats, Floats]:
-    """Smallest -1/Re G where Im G changes sign with Re G negative; inf where it never does."""
+    """Smallest -1/Re G where Im G changes sign with Re G negative, and where that is.
+
+    Infinite where it never does.
+    """
     inverse = -1 / g
     before, after = inverse[:, :-1], inverse[:, 1:]
     share = before.imag / (before.imag - after.imag)
@@ -277,4 +280,5 @@ def _lowest_crossing(g: Complexes, frequency: Floats) -> tuple[Floats, Floats]:
     stiffness = np.where(turns, stiffness, np.inf)
     index = np.argmin(stiffness, axis=1)
     rows = np.arange(len(g))
-    return stiffness[rows, index], frequency[index]
+    place = frequency[index] + share[rows, index] * np.diff(frequency)[index]
+    return stiffness[rows, index], place
