@@ -195,8 +195,9 @@ def start_of(here: Coordinates, fit: Fit) -> Floats:
     for begin in quantiles:
         phi = inside(here, fit, begin)
         if np.isfinite(phi).all():
-            theta = here.natural(phi[None])
-            if fit.likelihood(theta)[0] > fit.log_likelihood - lost:
+            with np.errstate(all="ignore"):  # what follows the small ones far away may overflow
+                found = fit.likelihood(here.natural(phi[None]))[0]
+            if found > fit.log_likelihood - lost:
                 break
     return phi
 
