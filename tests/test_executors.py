@@ -20,6 +20,10 @@ def double_or_fail(number: int) -> int:
     return 2 * number
 
 
+def cannot_be_handed_back(number: int) -> Any:
+    return (lambda: number) if number == 1 else number
+
+
 def die_at_first(mark: Path) -> str:
     if mark.name == "1" and not mark.exists():
         mark.touch()
@@ -44,6 +48,11 @@ def test_jobs_in_this_process() -> None:
 
 def test_jobs_in_processes() -> None:
     assert outcomes(executors.processes(2), double_or_fail, [1, -2, 3]) == EXPECTED
+
+
+def test_a_result_that_cannot_come_back_is_a_failure_of_its_own() -> None:
+    ended = outcomes(executors.processes(2), cannot_be_handed_back, [1, 2])
+    assert ended[2] == (2, None) and "pickle" in ended[1][1]
 
 
 def test_a_worker_that_dies_is_a_failure_and_not_a_hang() -> None:

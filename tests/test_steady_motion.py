@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from scipy.signal import chirp
@@ -11,6 +13,8 @@ from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
 from bayeshaptic.diagnosis.periodic.period import one_period
 from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Following
+from bayeshaptic.effects.laws import fitted
+from bayeshaptic.effects.nonlinear.shapes import Usual
 from bayeshaptic.numerics.extrapolation import Approach
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, Multisine, simulate
@@ -53,6 +57,17 @@ def test_dry_friction_is_found(seed: int) -> None:
     assert found.converged
     assert found.rms() < without.rms() / 4
     assert found.strength[0] == pytest.approx(0.1 * FORCE_RMS_N, rel=0.1)
+
+
+def test_a_force_comes_back_from_a_worker() -> None:
+    """A study of a periodic recording with friction ended in the pickling of its result."""
+    _, found = with_friction(0.1, 0)
+    (force,), (kept,) = found.forces, pickle.loads(pickle.dumps(found)).forces
+    motion = found.motions[force.place]
+    assert np.array_equal(kept.force(motion), force.force(motion))
+    usual = Usual.of(motion.velocity, motion.position, "rad")
+    shapes = [(name, shape.name) for name, shape in fitted(force.place, usual)]
+    assert len(set(shapes)) == len(shapes)  # they are found again by these
 
 
 def test_a_drag_is_sized_while_a_constant_force_drives_the_device_on() -> None:

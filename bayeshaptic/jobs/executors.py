@@ -123,9 +123,13 @@ def _until_a_worker_dies(
             for future in done:
                 item = running.pop(future)
                 try:
-                    yield future.result()
+                    outcome = future.result()
                 except BrokenProcessPool:
                     suspects.append(item)
+                    continue
+                except Exception as error:  # of a result on its way here
+                    outcome = Outcome(item, error=explained(error))
+                yield outcome
     except BaseException:
         _end_children(others)
         raise

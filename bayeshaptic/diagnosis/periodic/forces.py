@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,6 +18,32 @@ from bayeshaptic.models import Model
 from bayeshaptic.types import Floats
 
 _WHERE = {MOTOR: "at the motor", LOAD: "on the body", CONNECTION: "in the connection"}
+_SHARP = 0.02  # of the variable's rms: where a jump is rounded off
+
+
+@dataclass(frozen=True)
+class _Force:
+    """A law's shape as a force of a motion; harmonics need a jump to be rounded off.
+
+    It is kept by its names: a shape holds functions, which no worker process can hand back.
+    """
+
+    effect: str
+    shape: str
+    place: Place
+    usual: Usual
+
+    def __call__(self, motion: Motion) -> Floats:
+        shape, usual = _shapes(self.place, self.usual)[self.effect, self.shape], self.usual
+        variable = motion.velocity if shape.over == VELOCITY else motion.position
+        unit = usual.velocity if shape.over == VELOCITY else usual.position
+        smooth = np.tanh(np.abs(variable) / (_SHARP * unit)) if shape.jumps else 1.0
+        return np.asarray(shape.force(variable) * smooth)
+
+
+@lru_cache(maxsize=64)
+def _shapes(place: Place, usual: Usual) -> dict[tuple[str, str], Shape]:
+    return {(name, shape.name): shape for name, shape in fitted(place, usual)}
 
 
 def force_candidates(model: Model, motions: Mapping[Place, Motion]) -> dict[str, tuple[Basis, ...]]:
@@ -37,23 +65,9 @@ def force_candidates(model: Model, motions: Mapping[Place, Motion]) -> dict[str,
                 name,
                 shape.title.format(where=_WHERE[place]),
                 place,
-                _force(shape, usual),
+                _Force(name, shape.name, place, usual),
                 shape.unit(model.force_unit, model.position_unit),
                 shape.positive,
             )
             found.setdefault(name, []).append(basis)
     return {name: tuple(variants) for name, variants in found.items()}
-
-
-def _force(shape: Shape, usual: Usual) -> Callable[[Motion], Floats]:
-    """Of a motion; harmonics need a jump to be rounded off."""
-
-    sharp = 0.02  # of the variable's rms: where a jump is rounded off
-
-    def force(motion: Motion) -> Floats:
-        variable = motion.velocity if shape.over == VELOCITY else motion.position
-        unit = usual.velocity if shape.over == VELOCITY else usual.position
-        smooth = np.tanh(np.abs(variable) / (sharp * unit)) if shape.jumps else 1.0
-        return np.asarray(shape.force(variable) * smooth)
-
-    return force
