@@ -10,7 +10,8 @@ import pytest
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.base.begun import begin
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
+from bayeshaptic.diagnosis.residuals.pieces import force_in_pieces
+from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.between_pieces import between_pieces
@@ -23,7 +24,7 @@ from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.report.headline import headline
-from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
+from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
 
 PERIOD_S = 1e-3
 TRUTH = {"m": 2.0, "b": 20.0, "coulomb": 1.2, "offset": 0.5, "delay_s": 0.8e-3}
@@ -182,16 +183,50 @@ def test_pieces_in_open_loop_say_what_is_not_looked_for_in_them() -> None:
     assert not any(n.topic == "pieces" for n in alone)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_friction_shows_in_the_longest_piece(friction: float) -> None:
+def lhifam(friction: float, seconds: float, seeds: range) -> list[Recording]:
+    """White noise on a free LHIfAM that rubs with a share of the force's rms."""
     bench = Bench.from_device("lhifam", False, "free")
     if friction:
         bench = bench.with_effect("coulomb_friction", force=friction * bench.force_rms)
-    played = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 5.0)
-    made = [simulate(bench, played, seed=seed) for seed in (1, 2)]
-    etfe = estimate_etfe(
-        bh.join_recordings([bh.recording_from_arrays(**one.signals) for one in made])
-    )
-    fit = least_squares(build_model("free", period_s=bench.period_s), etfe)
-    found = [test.name for test in nonlinear_tests(fit, etfe) if test.flagged]
+    played = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds)
+    made = [simulate(bench, played, seed=seed) for seed in seeds]
+    return [bh.recording_from_arrays(**one.signals) for one in made]
+
+
+def scores(recordings: list[Recording]) -> dict[str, ResidualTest]:
+    """The tests for a force of recordings taken as one."""
+    etfe = estimate_etfe(bh.join_recordings(recordings))
+    fit = least_squares(build_model("free", period_s=etfe.period_s), etfe)
+    return {test.name: test for test in force_in_pieces(fit, etfe)}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_friction_shows_in_pieces(friction: float) -> None:
+    found = [
+        name for name, test in scores(lhifam(friction, 5.0, range(1, 3))).items() if test.flagged
+    ]
     assert ("sign(v)" in found) == bool(friction)
+
+
+def test_pieces_show_together_what_the_longest_does_not() -> None:
+    series = lhifam(0.0007, 5.0, range(6))
+    whole = scores(series)["sign(v)"]
+    alone = [scores([one])["sign(v)"] for one in series]
+    assert whole.flagged and not any(test.flagged for test in alone)
+    assert whole.force is not None and alone[0].force is not None
+    assert whole.force.sd == pytest.approx(alone[0].force.sd / np.sqrt(6), rel=0.3)
+    # Of nothing the scores are those of chance: the 99.9 % point of chi-square of eight.
+    nothing = [scores(lhifam(0.0, 2.5, range(3 * n, 3 * n + 3)))["sign(v)"] for n in range(8)]
+    assert np.sum([test.statistic**2 for test in nothing]) < 26.1
+
+
+def test_the_one_piece_that_counts_is_as_if_recorded_alone() -> None:
+    """Friction was looked for in the longest piece, which was not in the response at all."""
+    bench = Bench.from_device("phantom", False, "free").with_effect("coulomb_friction", force=0.004)
+    played = WhiteNoise(bench.force_rms, 400, 0.5, 3.0), Multisine(bench.force_rms, 1, 120, 1.0, 6)
+    made = [simulate(bench, each, seed=seed) for seed, each in enumerate(played)]
+    pieces = [bh.recording_from_arrays(**one.signals) for one in made]
+    begun = begin(bh.join_recordings(pieces), "free", Options())
+    assert begun.etfe.unbroken is not None and begun.etfe.unbroken.samples == pieces[0].samples
+    (told,) = (n.text for n in begun.notices if (n.level, n.topic) == ("warning", "pieces"))
+    assert "1 of 2 (number 2): they have a force that repeats" in told

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.causal import causal_tests
-from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.diagnosis.residuals.drift import drift_tests
 from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
 from bayeshaptic.diagnosis.residuals.periods import change_tests
+from bayeshaptic.diagnosis.residuals.pieces import force_in_pieces
 from bayeshaptic.diagnosis.residuals.residual import (
     Test,
     chi_square_score,
@@ -49,7 +49,7 @@ def residual_tests(
     if etfe.direct:
         return causal_tests(fit, etfe, acted)
     if etfe.through_reference:
-        return (*frequency_tests(fit), *nonlinear_tests(fit, etfe))
+        return (*frequency_tests(fit), *force_in_pieces(fit, etfe))
     return (*model_tests(fit, etfe), *measurement_tests(fit, etfe, look))
 
 
@@ -57,7 +57,7 @@ def model_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     """Those of a random recording that ask whether the model is right."""
     return (
         *frequency_tests(fit),
-        *nonlinear_tests(fit, etfe),
+        *force_in_pieces(fit, etfe),
         *drift_tests(fit, etfe),
         *excess_noise_test(fit, etfe),
         *ripple_tests(fit, etfe),

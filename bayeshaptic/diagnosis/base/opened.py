@@ -100,7 +100,10 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
             etfe, notices = _response(measurement, options.band_hz, notices, unread)
-            notices += _not_looked_for(measurement, notices)
+            if len(etfe.parts) == 1 and not (one_mass or has_feedback(notices)):
+                # Where nothing is followed in time, the other pieces have no part in what follows.
+                etfe = replace(etfe.parts[0], notices=etfe.notices)
+            notices += _not_looked_for(etfe.recording, notices)
     else:
         etfe = measurement
         if not etfe.direct:  # of a loop, whose controller biases it
@@ -173,14 +176,16 @@ def with_delay_of_the_loop(
     return measurement.later(delay_s), ()
 
 
-def _not_looked_for(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+def _not_looked_for(recording: Recording | None, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
     """A note of what no test looks for in pieces: one piece says nothing of how the next began."""
-    if not recording.joints or has_feedback(notices) or told_too_little(notices):
+    if recording is None or not recording.joints:
+        return ()
+    if has_feedback(notices) or told_too_little(notices):
         return ()
     text = (
         "In several pieces taken as one neither drift nor faults of samples are looked for, and "
-        "dry friction (or any other force that is not linear) in the longest alone; it is not "
-        "taken off, and makes the limit too high: report on the longest piece by itself, too."
+        "dry friction (or any other force that is not linear) is not taken off where it is seen, "
+        "and makes the limit too high: report on the longest piece by itself, too."
     )
     return (Notice("warning", "pieces", text),)
 

@@ -25,12 +25,10 @@ from bayeshaptic.effects.nonlinear.shapes import (
     STRETCH,
     VELOCITY,
 )
-from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows, remembered
 from bayeshaptic.types import Complexes, Floats
@@ -46,15 +44,9 @@ WEAK = 0.05
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     """One test for each nonlinear function of command and motion; none without a recording.
 
-    Of several pieces the longest is looked at: what holds there is of the device.
+    Of one piece; see `bayeshaptic.diagnosis.residuals.pieces`.
     """
     recording = etfe.unbroken
-    if etfe.recording is not None and etfe.recording.joints:
-        recording = max(etfe.recording.pieces, key=lambda piece: piece.samples)
-        try:
-            etfe = estimate_etfe(recording)
-        except InputError:
-            return ()
     if recording is None or etfe.period_lines is not None:
         return ()
     tests = []

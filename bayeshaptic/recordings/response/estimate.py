@@ -142,40 +142,44 @@ def _joined(
     Pieces whose force excites nothing by itself are left out, and so are the few whose excitation
     is of another kind, periodic or not, than that of the most.
     """
-    found, left_out, why = [], [], None
+    found, silent, why = [], [], None
     for number, piece in enumerate(recording.pieces, start=1):
         try:
             found.append((number, estimate_etfe(piece, band_hz, minimum_lines=minimum_lines)))
         except InputError as error:
-            left_out.append(number)
+            silent.append(number)
             why = why or error
     if not found:
         raise why or InputError(f"{recording.name}: there are no pieces")
     periodic = [isinstance(part.spectra, PeriodicSpectra) for _, part in found]
     most = sum(periodic) > len(periodic) / 2
-    left_out += [n for (n, _), own in zip(found, periodic, strict=True) if own != most]
-    parts = [part for (_, part), own in zip(found, periodic, strict=True) if own == most]
+    other = [n for (n, _), own in zip(found, periodic, strict=True) if own != most]
+    parts = tuple(part for (_, part), own in zip(found, periodic, strict=True) if own == most)
     band = min(p.band_hz[0] for p in parts), max(p.band_hz[1] for p in parts)
     text = f"Band {band[0]:.3g} to {band[1]:.4g} Hz; that of each piece was chosen by itself."
     notices = {Notice("note", "band", text): None}
     notices |= dict.fromkeys(n for part in parts for n in part.notices if n.topic != "band")
-    if left_out:
-        named = ", ".join(str(number) for number in sorted(left_out))
-        text = (
-            f"Of {len(recording.pieces)} pieces {len(left_out)} say nothing of the response and "
-            f"are left out (number {named})."
-        )
-        notices[Notice("warning", "pieces", text)] = None
+    repeat = "does not repeat" if most else "repeats"
+    unlike = (
+        f"have a force that {repeat}, unlike the most, and the two kinds are no sum: in a study "
+        "give them a level or a trial of their own, so that each kind counts"
+    )
+    for which, reason in ((silent, "say nothing of the response"), (other, unlike)):
+        if which:
+            named = ", ".join(str(number) for number in which)
+            text = f"Pieces left out, {len(which)} of {len(recording.pieces)} (number {named}): "
+            notices[Notice("warning", "pieces", text + f"they {reason}.")] = None
     return replace(
         _mean_of_longest(parts),
         band_hz=band,
         spectra=JoinedSpectra(tuple(part.spectra for part in parts)),
         recording=recording,
         notices=tuple(notices),
+        parts=parts,
     )
 
 
-def _mean_of_longest(parts: list[Etfe]) -> Etfe:
+def _mean_of_longest(parts: tuple[Etfe, ...]) -> Etfe:
     """The mean of those that have the frequencies of the longest, weighted by their variances."""
     longest = max(parts, key=lambda part: len(part.frequency_hz))
     alike = [

@@ -64,6 +64,8 @@ class Etfe(Shown):
     period_lines : int or None
         Number of excited lines; None when the excitation is not periodic.
     notices : tuple of Notice
+    parts : tuple of Etfe
+        Those of the pieces of a recording that count, where it has several; else none.
     """
 
     frequency_hz: NDArray[Any]
@@ -78,6 +80,7 @@ class Etfe(Shown):
     recording: Recording | None = field(default=None, repr=False)
     period_lines: int | None = None
     notices: tuple[Notice, ...] = ()
+    parts: tuple[Etfe, ...] = field(default=(), repr=False)
 
     @property
     def lines(self) -> int:
