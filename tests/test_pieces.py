@@ -168,6 +168,26 @@ def test_a_study_joins_what_nothing_tells_apart(tmp_path: Path) -> None:
     assert any(n.level == "warning" and "1.csv" in n.text for n in joined.notices)
 
 
+def test_recordings_of_several_periods_count_together_by_period(tmp_path: Path) -> None:
+    """They were joined, and then refused."""
+    for number, period_s in enumerate((1e-3, 5e-4, 1.0002e-3, 5e-4)):
+        rows = np.random.default_rng(number).standard_normal((1200, 3))
+        rows[:, 0] = np.arange(1200) * period_s
+        header = "time_s,torque_nm,angle_rad"
+        np.savetxt(tmp_path / f"{number}.csv", rows, delimiter=",", header=header, comments="")
+    (tmp_path / "4.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
+    entries = "".join(f'[[recording]]\nfile = "{n}.csv"\n' for n in range(5))
+    path = tmp_path / "study.toml"
+    path.write_text('[device]\nname = "phantom"\n' + entries, encoding="utf-8")
+    study = bh.read_study(path).with_periods_apart()
+    names = [[one.path.stem for one in (entry, *entry.more)] for entry in study.entries]
+    assert names == [["0", "2", "4"], ["1", "3"]]
+    slow, fast = (one for one in study.read_all() if isinstance(one, Recording))
+    assert slow.period_s == pytest.approx(1e-3) and len(slow.pieces) == 2
+    assert fast.period_s == pytest.approx(5e-4) and len(fast.pieces) == 2
+    assert any("4.csv" in notice.text for notice in slow.notices)
+
+
 def test_pieces_in_open_loop_say_what_is_not_looked_for_in_them() -> None:
     rng = np.random.default_rng(4)
     force = rng.standard_normal((2, 4000))

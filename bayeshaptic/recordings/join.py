@@ -76,13 +76,12 @@ def join_recordings(
 
 def _refuse_unlike(recordings: Sequence[Recording]) -> None:
     """Refuse what has another period or other units than the first, or is far too short."""
-    first, apart = recordings[0], 1e-3  # of a period: what clocks' stamps differ by
+    first = recordings[0]
     for other in recordings:
-        if abs(other.period_s / first.period_s - 1) > apart:
+        if not same_period(other.period_s, first.period_s):
             raise InputError(
                 f"{other.name} is sampled every {other.period_s:g} s and {first.name} every "
-                f"{first.period_s:g} s: they cannot be one; analyse them apart "
-                "(in a study, with pool = false at its top)"
+                f"{first.period_s:g} s: they cannot be one; analyse them apart"
             )
         units = (other.force_unit, other.position_unit)
         if units != (first.force_unit, first.position_unit):
@@ -95,6 +94,16 @@ def _refuse_unlike(recordings: Sequence[Recording]) -> None:
                 f"{other.name}: {other.samples} samples are too few even for a piece; leave it "
                 f"out, or record at least {FEWEST_SAMPLES}"
             )
+
+
+def same_period(one_s: float, other_s: float) -> bool:
+    """Whether two sampling periods differ by no more than clocks' stamps do.
+
+    Parameters
+    ----------
+    one_s, other_s : float
+    """
+    return abs(one_s / other_s - 1) <= 1e-3
 
 
 def _refuse_twice(pieces: Sequence[Recording]) -> None:

@@ -10,7 +10,7 @@ from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.cut import Span
 from bayeshaptic.recordings.feedback import Feedback
-from bayeshaptic.recordings.join import join_recordings
+from bayeshaptic.recordings.join import join_recordings, same_period
 from bayeshaptic.recordings.known_limits import KnownLimit
 from bayeshaptic.recordings.measurement import read_measurement
 from bayeshaptic.recordings.read import Columns
@@ -144,6 +144,30 @@ class Study(Shown):
             f"{len(lost)} of {len(found) + len(lost)} recordings that count as one left out: {why}"
         )
         return replace(joined, notices=(*joined.notices, Notice("warning", "pieces", text)))
+
+    def with_periods_apart(self) -> Study:
+        """The study in which nothing counts together that was sampled at another rate.
+
+        For this what counts together is read. What cannot be read stays with the first.
+        """
+        entries: list[StudyEntry] = []
+        for entry in self.entries:
+            groups: dict[float, list[StudyEntry]] = {}
+            lost = []
+            for one in (replace(entry, more=()), *entry.more) if entry.more else ():
+                try:
+                    period_s = self._read_one(one).period_s
+                except InputError:
+                    lost.append(one)
+                    continue
+                known = (other for other in groups if same_period(period_s, other))
+                groups.setdefault(next(known, period_s), []).append(one)
+            if len(groups) < 2:
+                entries.append(entry)
+                continue
+            first, *others = groups.values()
+            entries += [replace(one, more=tuple(more)) for one, *more in ([*first, *lost], *others)]
+        return replace(self, entries=tuple(entries))
 
     def _read_one(self, entry: StudyEntry) -> Recording | Etfe:
         columns = entry.columns if entry.columns is not None else self.columns

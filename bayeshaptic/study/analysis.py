@@ -182,6 +182,7 @@ def analyse_study(
     InputError
         Where a prior of the study cannot be understood, or is of no parameter, or no effect.
     """
+    study = study.with_periods_apart()
     prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
     chosen = options_from(options, changes)
     device = device_of(chosen, model) or study.device
