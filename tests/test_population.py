@@ -23,6 +23,10 @@ from bayeshaptic.inference.population.infer import (
 )
 from bayeshaptic.inference.population.population import Population
 from bayeshaptic.inference.population.sampler import sample_level
+from bayeshaptic.inference.population.walkers import Walkers
+from bayeshaptic.inference.sampling.ensembles import Ensembles
+from bayeshaptic.inference.sampling.proposal import Proposal
+from bayeshaptic.numerics.mixture import student
 from bayeshaptic.numerics.pareto import pareto_k
 from bayeshaptic.types import Floats
 
@@ -394,6 +398,27 @@ def test_walkers_find_a_shoulder() -> None:
     ordered, walkers = found.in_order(2000)
     assert len(ordered) % walkers == 0 and 1000 < len(ordered) <= 2000
     np.testing.assert_array_equal(ordered[0], found.chains[0, 0, 0])
+
+
+def test_a_sampler_that_is_stopped_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    calls = []
+
+    def stopped(phi: Floats) -> Floats:
+        calls.append(len(phi))
+        if len(calls) > 3:
+            raise KeyboardInterrupt
+        return np.asarray(-0.5 * np.sum(phi**2, axis=1))
+
+    rng = np.random.default_rng(1)
+    walkers = Walkers(stopped, rng.standard_normal((16, 3)), np.random.RandomState(1).get_state())
+    with pytest.raises(KeyboardInterrupt):
+        walkers.advance(20)
+    calls.clear()
+    start, state = rng.standard_normal((256, 3)), np.random.RandomState(1).get_state()
+    proposal = Proposal.first(student(np.zeros(3), np.eye(3), 8.0), rng)
+    with pytest.raises(KeyboardInterrupt):
+        Ensembles(stopped, proposal, 0.5, start, state).advance(20)
+    assert not any(capsys.readouterr())
 
 
 def test_tail_of_weights() -> None:

@@ -47,6 +47,9 @@ class Walkers:
             *self.positions.shape, self.density, moves=_subspace_move(), vectorize=True
         )
         self.sampler.random_state = self.state
+        self.sampler.log_prob_fn = (
+            self.density
+        )  # emcee's own prints all walkers where it is stopped
 
     def advance(self, steps: int) -> Floats:
         """Go on by `steps`, and hand back every fifth position: (steps // 5, walkers, Q)."""

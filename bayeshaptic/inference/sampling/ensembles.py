@@ -75,21 +75,25 @@ class Ensembles(Generic[P]):
             redrawn = 0.15  # of redrawing moves, for each of the others
             moves.append((alone, redrawn))
 
+        def density(y: Floats) -> Floats:
+            return self.density(straightening.bent(y))
+
         class Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
             """Without emcee's conversion of each walker's number, a tenth of a step.
 
-            And without its copy of the generator's state in every step, a twentieth.
+            And without its copy of the generator's state in every step, a twentieth; nor does it
+            print all walkers where it is stopped.
             """
 
             random_state = None
 
             def compute_log_prob(self, coords: Floats) -> tuple[Floats, None]:
-                return self.log_prob_fn(coords), None
+                return density(coords), None
 
         self.sampler = Sampler(
             len(self.positions),
             size,
-            lambda y: self.density(straightening.bent(y)),
+            density,
             moves=[(emcee.moves.MHMove(move, ndim=size), share) for move, share in moves],
             vectorize=True,
         )
