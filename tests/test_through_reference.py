@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.base.begun import begin
+from bayeshaptic.diagnosis.base.direct import against_direct
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.feedback.mode_above_band import mode_above_band
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.residuals.columns import force_test
+from bayeshaptic.diagnosis.residuals.residual import ForceSeen
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.least_squares import least_squares, polish
@@ -259,6 +262,18 @@ def test_what_one_mass_that_is_followed_sets_aside_is_said(given: dict, words: s
     assert lights(result)[1].word == "in doubt"
     steps = next_steps(headline(result), result)
     assert steps and not any("reference" in step.text for step in steps)
+
+
+def test_a_force_that_all_lines_show_speaks_against_what_the_reference_moves() -> None:
+    """A mass that rubs, read as two masses without friction: 1.74 times its limit, with caution."""
+    recording, _, _ = in_loop()
+    closed = close_loop(recording, held=False, band_hz=(1.0, 400.0), hidden=False, ess=100)
+    assert closed.analysis.etfe.through_reference and headline(closed).stiffness is not None
+    seen = force_test("sign(v)", 10.1, ForceSeen(1.0, 0.1, 1.0))
+    (against,) = against_direct(closed.analysis.fit, (seen,), through=True)
+    notices = (*closed.analysis.notices, against)
+    told = headline(replace(closed, analysis=replace(closed.analysis, notices=notices)))
+    assert told.stiffness is None and "a force that is not linear" in told.sentence
 
 
 def test_a_mode_among_few_windows_is_doubted_where_one_above_them_explains_as_much() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bayeshaptic.diagnosis.base.direct import AGAINST
 from bayeshaptic.diagnosis.feedback.in_loop import WIDE, is_wide
 from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
 from bayeshaptic.quantities import quantity
@@ -51,6 +52,11 @@ def _through_reference(analysis: Analysis, verdict: str | None) -> list[str]:
         found.append(
             f"nothing moves the force above {quantity(etfe.band_hz[1], 'Hz')} but noise, "
             "and a vibration mode there may set a lower limit than that of one mass"
+        )
+    if any(notice.topic == AGAINST for notice in analysis.notices):
+        found.append(
+            "where all lines are fitted a force that is not linear acts, which what the reference "
+            "moves does not show"
         )
     if any(notice.topic == VALLEY for notice in analysis.notices):
         found.append("a vibration mode elsewhere explains what the reference moves as well")

@@ -14,6 +14,7 @@ from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 
+AGAINST = "direct"  # the topic of what speaks against such a fit
 _WHATEVER = (
     "whatever controller made it: all lines of the spectrum are fitted, up to the Nyquist "
     "frequency, whose sum feedback does not bias. The measured response is biased, and shown for "
@@ -74,4 +75,4 @@ def against_direct(fit: Fit, tests: Iterable[Test], through: bool) -> tuple[Noti
     else:
         return ()
     text = f"Of the base models, fitted so that feedback does not bias them, {why}."
-    return (Notice("warning", "direct", text),)
+    return (Notice("warning", AGAINST, text),)
