@@ -14,7 +14,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.population.below import draw_below
 from bayeshaptic.inference.population.cavity import Cavity, cavity, described
 from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, fit_quadratic
-from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.inference.population.hierarchy import Hierarchy, inverse_and_log_det
 from bayeshaptic.inference.population.hyperparameters import LKJ, Unknowns
 from bayeshaptic.inference.population.infer import (
     infer_population,
@@ -398,6 +398,18 @@ def test_walkers_find_a_shoulder() -> None:
     ordered, walkers = found.in_order(2000)
     assert len(ordered) % walkers == 0 and 1000 < len(ordered) <= 2000
     np.testing.assert_array_equal(ordered[0], found.chains[0, 0, 0])
+
+
+def test_small_matrices_are_inverted_as_numpy_does() -> None:
+    roots = np.random.default_rng(2).standard_normal((3, 7, 6, 12)) * np.logspace(-2, 2, 6)[:, None]
+    matrices = roots @ roots.transpose(0, 1, 3, 2)
+    found, log_det = inverse_and_log_det(matrices)
+    scale = np.logspace(-2, 2, 6)
+    whole = (found @ matrices) * scale[:, None] / scale
+    np.testing.assert_allclose(whole, np.broadcast_to(np.eye(6), whole.shape), atol=1e-10)
+    np.testing.assert_allclose(log_det, np.linalg.slogdet(matrices)[1], rtol=1e-12, atol=1e-12)
+    with pytest.raises(np.linalg.LinAlgError):
+        inverse_and_log_det(matrices * np.where(np.arange(7) == 3, -1.0, 1.0)[:, None, None])
 
 
 def test_a_sampler_that_is_stopped_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:

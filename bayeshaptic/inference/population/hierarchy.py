@@ -177,9 +177,8 @@ class Hierarchy:
         level = self.layout.read(phi)
         spread = self.spread(level)
         marginal = self.covariance + spread[:, None, :, None] * np.eye(spread.shape[1])
-        root = np.linalg.cholesky(marginal)
-        weight = inverse(marginal)  # (B, R, D, D)
-        log_det = 2 * np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=(1, 2))
+        weight, log_dets = inverse_and_log_det(marginal)  # (B, R, D, D), (B, R)
+        log_det = log_dets.sum(axis=1)
         pull = (weight @ self.mean[:, :, None])[..., 0]
         seen = weight @ self.design  # (B, R, D, q)
         count, people, hand = len(phi), len(self.members), len(self.hand)
@@ -191,7 +190,7 @@ class Hierarchy:
         own = self._by_user(weight[:, :, self.hand][..., self.hand]) + level.precision[:, None]
         own_score = self._by_user(pull[..., self.hand])
         own_seen = self._by_user(seen[:, :, self.hand])
-        own_covariance = inverse(own)
+        own_covariance, own_log_dets = inverse_and_log_det(own)
         gain = own_covariance @ own_seen
         gains = gain.reshape(count, people * hand, -1).transpose(0, 2, 1)
         precision -= gains @ own_seen.reshape(count, people * hand, -1)
@@ -201,7 +200,7 @@ class Hierarchy:
         beta = np.asarray(np.linalg.solve(precision, score[..., None])[..., 0], np.float64)
         root_diagonal = np.diagonal(level.correlation_root, axis1=1, axis2=2) * level.hand_sd
         log_det += 2 * people * np.log(root_diagonal).sum(axis=1)
-        log_det += np.linalg.slogdet(own)[1].sum(axis=1) + np.linalg.slogdet(precision)[1]
+        log_det += own_log_dets.sum(axis=1) + np.linalg.slogdet(precision)[1]
         value = level.log_prior - 0.5 * (log_det + chi - np.sum(score * beta, axis=1))
         return Conditionals(
             level, spread, weight, precision, beta, own_covariance, own_score, gain, value
@@ -255,6 +254,22 @@ class Conditionals:
         mean -= np.einsum("buiq,bq->bui", self.gain, beta)
         root = np.linalg.cholesky(self.own_covariance)
         return mean + np.einsum("buij,buj->bui", root, rng.standard_normal(mean.shape))
+
+
+def inverse_and_log_det(matrices: Floats) -> tuple[Floats, Floats]:
+    """Inverses, (..., n, n), and log determinants, (...), of positive definite matrices.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Where one is not positive definite.
+    """
+    from bayeshaptic.inference.population.positive_kernel import inverses
+
+    found, log_det = inverses(np.ascontiguousarray(matrices.reshape(-1, *matrices.shape[-2:])))
+    if np.isnan(log_det).any():
+        raise np.linalg.LinAlgError("Matrix is not positive definite")
+    return found.reshape(matrices.shape), log_det.reshape(matrices.shape[:-2])
 
 
 def inverse(matrices: Floats) -> Floats:
