@@ -75,6 +75,17 @@ def test_safe_wants_draws_in_the_tail() -> None:
     assert device_limit(many).safe(0.01) is None  # draws of a case that never binds do not count
 
 
+def test_where_some_are_stable_at_no_stiffness_the_draws_say_so() -> None:
+    """It was said that they are too few."""
+    rng = np.random.default_rng(5)
+    samples = np.exp(rng.standard_normal(4000))
+    some = np.where(rng.random(4000) < 0.17, 0.0, samples)
+    limit = device_limit([case("nobody holds it", samples), case("a new person", some)], 1)
+    assert limit.safe(0.05) == limit.safe(0.01) == 0.0
+    few = device_limit([case("nobody holds it", some[:40])], 1)
+    assert few.safe(0.01) is None
+
+
 def test_few_draws_of_the_binding_case_limit_the_whole() -> None:
     rng = np.random.default_rng(3)
     few, plenty = rng.normal(100, 5, 400), rng.normal(100, 5, 50_000)

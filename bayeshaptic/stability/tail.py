@@ -71,7 +71,9 @@ def low_quantile(
         return None
     ordered = np.sort(samples)
     own = quantile_with_error(ordered, risk, effective)
-    if risk * effective(own.value) >= ENOUGH_BELOW:
+    # Below a lowest value that many draws have, none where no stiffness is stable, there are none.
+    least = own.value <= ordered[0]
+    if risk * effective(np.nextafter(own.value, np.inf) if least else own.value) >= ENOUGH_BELOW:
         return own
     low, high = quantiles(ordered, np.array([0.05, 0.95]))
     share = max(_SHARE, 5 * risk)

@@ -55,7 +55,8 @@ def study_headline(study: StudyAnalysis) -> Headline:
     assert safe is not None
     if not math.isfinite(safe) or safe <= 0:
         extreme = "nothing limits the stiffness" if safe > 0 else "no stiffness is stable"
-        return Headline(CAUTION, f"Over all cases {extreme}.", (), doubts=(extreme,))
+        sentence = f"Over all cases {extreme} at a risk of {percent(risk)}."
+        return Headline(CAUTION, sentence, (what_binds(study),), doubts=(extreme,))
     return _recommended(study, parts, risk, safe)
 
 

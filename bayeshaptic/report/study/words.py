@@ -60,6 +60,8 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
             f"{where} it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does "
             "not matter for the limit. More people would not narrow it."
         )
+    elif not math.isfinite(spread):
+        first = f"For a person not yet seen{where} the critical stiffness is {seen}."
     else:
         little_db = 0.5
         size = "a little, " if spread < little_db else ""
