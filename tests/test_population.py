@@ -11,6 +11,7 @@ from toy_study import toy_model, toy_posterior
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.population import settling
 from bayeshaptic.inference.population.below import draw_below
 from bayeshaptic.inference.population.cavity import Cavity, cavity, described
 from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, fit_quadratic
@@ -431,6 +432,27 @@ def test_a_sampler_that_is_stopped_prints_nothing(capsys: pytest.CaptureFixture[
     with pytest.raises(KeyboardInterrupt):
         Ensembles(stopped, proposal, 0.5, start, state).advance(20)
     assert not any(capsys.readouterr())
+
+
+def test_recordings_that_went_astray_keep_their_own_descriptions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Seven people whose hands differ by 1.5 were said to differ by 30."""
+
+    def description(mean: float) -> GaussianLikelihood:
+        return GaussianLikelihood(np.array([mean]), np.eye(1), np.eye(1), 0.0)
+
+    own = [description(mean) for mean in (0.0, 1.0, 2.0)]
+    level = Hierarchy(
+        tuple(description(mean) for mean in (-106.0, 1.1, 104.0)),
+        *(np.arange(3), np.zeros(3, int), np.arange(1), np.arange(0), np.zeros(1), np.ones(1)),
+    )
+    # One that lay far away drew another one with it, and the third is alright once it is back.
+    rounds = iter([[0], [0, 2], []])
+    monkeypatch.setattr(settling, "settled", lambda level, *_: level)
+    monkeypatch.setattr(settling, "astray", lambda *_: next(rounds))
+    found = settling.settled_nearby(level, own, [], None, np.zeros(1))  # type: ignore[arg-type]
+    assert [float(one.mean[0]) for one in found.likelihoods] == [0.0, 1.1, 2.0]
 
 
 def test_tail_of_weights() -> None:

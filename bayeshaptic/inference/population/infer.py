@@ -17,7 +17,7 @@ from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.population import Population
 from bayeshaptic.inference.population.reweighting import ALONE, Reweighted, redescribed, reweight
 from bayeshaptic.inference.population.sampler import LevelChains, sample_level
-from bayeshaptic.inference.population.settling import settled
+from bayeshaptic.inference.population.settling import settled_nearby
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import HalfNormal, MaybeZero, Model
 from bayeshaptic.models.build import DAMPER_SCALE
@@ -136,10 +136,11 @@ def _settled_twice(
     The first round goes by the scatter of the recordings' own estimates, the second by the chains
     of the first.
     """
-    hierarchy = settled(hierarchy, posteriors, here, hierarchy.guess()[0])
+    own = hierarchy.likelihoods
+    hierarchy = settled_nearby(hierarchy, own, posteriors, here, hierarchy.guess()[0])
     chains = sample_level(hierarchy, seeds[0], steps=_FIRST_STEPS)
     middle = np.median(chains.thinned(_SOME, rng), axis=0)
-    hierarchy = settled(hierarchy, posteriors, here, middle)
+    hierarchy = settled_nearby(hierarchy, own, posteriors, here, middle)
     return hierarchy, sample_level(hierarchy, seeds[1], chains, steps=_FIRST_STEPS)
 
 
