@@ -85,6 +85,7 @@ def test_degrees_gaps_and_rows_that_are_there_twice(tmp_path: Path) -> None:
         ("t_us,cmd_mNm,x_mm", 1.3, "force=cmd_mNm[mNm],position=x_mm[mm],time=t_us[us]", "in mm"),
         ("t,u,y", 1.3, "force=u,position=y[UNIT],time=t[ms]", "large for metres or radians"),
         ("t,u,y", 1.0, "force=u,position=y,time=t[ms]", "whole numbers: encoder counts?"),
+        ("Sample,u,y", 1.0, "force=u,position=y,time=Sample[UNIT]", "the number of the sample?"),
     ],
 )
 def test_the_line_has_the_unit_or_asks_for_it(
@@ -99,7 +100,7 @@ def test_the_line_has_the_unit_or_asks_for_it(
     assert words in "\n".join(lines(found))
     assert cli.main(["inspect", str(path), "--write", str(study)]) == 0
     if "UNIT" in line:
-        with pytest.raises(InputError, match="'UNIT' is no unit of position: use m, mm"):
+        with pytest.raises(InputError, match="'UNIT' is no unit of (position|time): use"):
             read_recording(path, line)
 
 

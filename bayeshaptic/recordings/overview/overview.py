@@ -25,7 +25,7 @@ from bayeshaptic.recordings.columns import (
     parse_columns,
     pick,
 )
-from bayeshaptic.recordings.overview.roles import ColumnFacts, guess_roles, says
+from bayeshaptic.recordings.overview.roles import ColumnFacts, guess_roles, says, says_number
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.units import base_unit, says_volts, unit_by_name, unit_in_name, units_of
@@ -138,10 +138,15 @@ def _scale(role: str, column: ColumnFacts) -> str:
         return UNIT_TO_SAY
     if role == "time":
         units = tuple(_rates(column))
-        if len(units) > 1:
+        if len(units) > 1 or _counts_samples(column):
             return UNIT_TO_SAY
         return f"[{units[0]}]" if units and units != ("s",) else ""
     return ""
+
+
+def _counts_samples(column: ColumnFacts) -> bool:
+    """Whether a time may be the number of the sample: it would be milliseconds otherwise."""
+    return column.whole and column.period == 1.0 and says_number(column.name)
 
 
 def _rates(column: ColumnFacts) -> dict[str, float]:
@@ -168,6 +173,10 @@ def doubts(column: ColumnFacts, role: str) -> str:
             return said
         if _scale(role, column) != UNIT_TO_SAY:
             return ""
+        if _counts_samples(column):
+            return (
+                "the number of the sample? multiply by the period, as in *0.001[s]; or is it [ms]?"
+            )
         rates = (f"{rate:.4g} Hz in {unit}" for unit, rate in _rates(column).items())
         return f"{', '.join(rates)}: write the unit after the name"
     if column.name in DEFAULT_HEADERS[role]:

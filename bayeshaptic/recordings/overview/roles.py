@@ -27,6 +27,8 @@ _FOLLOWED = r"ref|target|desired|set.?point|soll|goal|demand|cmd|command"
 _MEASURED = r"meas|actual|feedback|sens|(^|[_ ])(act|fb|adc|mon)([_ ]|$)"
 # Behind these a signal is not what was commanded, or not a position.
 _OTHERS = r"vel|speed|acc|err|omega|dot|status|index|count(er)?$|(^|[/._ ])d(x|y|q|phi|theta)\b"
+# Of a time: it counts samples, or ticks of a clock.
+_NUMBERS = r"sampl|index|count|tick|number|nummer|(^|[_ ])(n|k|no|nr|row|step)$"
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,11 @@ def _is_integral(position: NDArray[Any], speed: NDArray[Any]) -> bool:
     if not good.any() or min(np.ptp(way[good]), np.ptp(expected[good])) == 0:
         return False
     return bool(abs(np.corrcoef(way[good], expected[good])[0, 1]) > least)
+
+
+def says_number(name: str) -> bool:
+    """Whether a name tells of a number that counts."""
+    return bool(re.search(_NUMBERS, name_and_unit(name)[0], re.I))
 
 
 def says(name: str, role: str) -> bool:
