@@ -47,9 +47,8 @@ class Walkers:
             *self.positions.shape, self.density, moves=_subspace_move(), vectorize=True
         )
         self.sampler.random_state = self.state
-        self.sampler.log_prob_fn = (
-            self.density
-        )  # emcee's own prints all walkers where it is stopped
+        # What emcee makes of it prints all walkers where it is stopped.
+        self.sampler.log_prob_fn = self.density
 
     def advance(self, steps: int) -> Floats:
         """Go on by `steps`, and hand back every fifth position: (steps // 5, walkers, Q)."""
