@@ -227,8 +227,8 @@ def own_limits(population: bh.Population, truth: np.ndarray) -> tuple[float, flo
         bh.critical_stiffness(population.model, one.draws[:DRAWS]).samples
         for one in population.recordings
     ]
-    low, high = np.quantile(samples, [0.05, 0.95], axis=1)
-    pull = (np.mean(samples, axis=1) - truth) / np.std(samples, axis=1)
+    low, high = np.array([np.quantile(own, [0.05, 0.95]) for own in samples]).T  # some have fewer
+    pull = [(own.mean() - true) / own.std() for own, true in zip(samples, truth, strict=True)]
     return float(np.mean((low <= truth) & (truth <= high))), float(np.mean(pull))
 
 
