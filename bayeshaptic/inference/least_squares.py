@@ -86,7 +86,7 @@ def least_squares(
 def _from_other_sets(fit: Fit, first: Optimum, etfe: Etfe, seed: int, most: int) -> Fit:
     """The fit, or that of the deepest valley that other sets of starting points find.
 
-    None of them is looked at once one has reached the noise.
+    No more of them are taken once one has reached the noise.
     """
     # Of a position that is early an image takes up the lead that no delay leaves over.
     images = "delay_s" not in fit.impossible
