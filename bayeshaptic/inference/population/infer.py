@@ -270,9 +270,10 @@ def _notices(recordings: Sequence[Reweighted], users: tuple[str, ...]) -> tuple[
         )
         notices.append(Notice("warning", "population", text))
     if len(users) < 4:
+        says = "user says" if len(users) == 1 else "users say"
         text = (
-            f"{len(users)} user(s) say little about how much people differ: the prior decides, and "
-            "the interval of a new person is wide; record at least six people."
+            f"{len(users)} {says} little about how much people differ: the prior decides, and the "
+            "interval of a new person is wide; record at least six people."
         )
         notices.append(Notice("warning", "population", text))
     return tuple(notices)
