@@ -100,7 +100,6 @@ WRONG = {
     "kind = 'rotational'\nperiod_s = true": "period_s must be a number above 0, not True",
     "kind = 'rotational'\ndelay_s = '1e-3'": "delay_s must be a number of at least 0, not '1e-3'",
     "kind = 'rotational'\ndelay_sd_s = 1e-5": "delay_sd_s without delay_s",
-    "kind = 'translational'\nlever_m = 0.1": "only what turns has a lever arm",
     "kind = 'rotational'\nlever_m = inf": "lever_m must be a number above 0, not inf",
     "kind = 'rotational'\nband_hz = [9, 1]": "band_hz must be two frequencies",
     "kind = 'rotational'\nband_hz = 'all'": "band_hz must be two frequencies",

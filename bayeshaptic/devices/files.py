@@ -122,11 +122,6 @@ def device_from_table(
     device = replace(base, **{key: value for key, value in facts.items() if value is not None})
     if device.delay_sd_s is not None and device.delay_s is None:
         raise InputError(f"{where}: delay_sd_s without delay_s; give both, or neither")
-    if device.lever_m is not None and device.kind != "rotational":
-        raise InputError(
-            f"{where}: lever_m, but the device is {device.kind}: only what turns has a lever arm; "
-            "leave it out, or write kind = 'rotational'"
-        )
     return device
 
 
