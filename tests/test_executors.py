@@ -52,7 +52,7 @@ def test_jobs_in_processes() -> None:
 
 def test_a_result_that_cannot_come_back_is_a_failure_of_its_own() -> None:
     ended = outcomes(executors.processes(2), cannot_be_handed_back, [1, 2])
-    assert ended[2] == (2, None) and "pickle" in ended[1][1]
+    assert ended[2] == (2, None) and "local object" in ended[1][1]
 
 
 def test_a_worker_that_dies_is_a_failure_and_not_a_hang() -> None:
