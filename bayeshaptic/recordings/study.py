@@ -148,26 +148,29 @@ class Study(Shown):
     def with_periods_apart(self) -> Study:
         """The study in which nothing counts together that was sampled at another rate.
 
-        For this what counts together is read. What cannot be read stays with the first.
+        For this what counts together is read.  What cannot be read stays with the first.
         """
-        entries: list[StudyEntry] = []
-        for entry in self.entries:
-            groups: dict[float, list[StudyEntry]] = {}
-            lost = []
-            for one in (replace(entry, more=()), *entry.more) if entry.more else ():
-                try:
-                    period_s = self._read_one(one).period_s
-                except InputError:
-                    lost.append(one)
-                    continue
-                known = (other for other in groups if same_period(period_s, other))
-                groups.setdefault(next(known, period_s), []).append(one)
-            if len(groups) < 2:
-                entries.append(entry)
+        found = [one for entry in self.entries for one in self._of_each_period(entry)]
+        return replace(self, entries=tuple(found))
+
+    def _of_each_period(self, entry: StudyEntry) -> list[StudyEntry]:
+        """What an entry counts together, an entry for each sampling period."""
+        if not entry.more:
+            return [entry]
+        groups: dict[float, list[StudyEntry]] = {}
+        lost = []
+        for one in (replace(entry, more=()), *entry.more):
+            try:
+                period_s = self._read_one(one).period_s
+            except InputError:
+                lost.append(one)
                 continue
-            first, *others = groups.values()
-            entries += [replace(one, more=tuple(more)) for one, *more in ([*first, *lost], *others)]
-        return replace(self, entries=tuple(entries))
+            known = (other for other in groups if same_period(period_s, other))
+            groups.setdefault(next(known, period_s), []).append(one)
+        if len(groups) < 2:
+            return [entry]
+        first, *others = groups.values()
+        return [replace(one, more=tuple(more)) for one, *more in ([*first, *lost], *others)]
 
     def _read_one(self, entry: StudyEntry) -> Recording | Etfe:
         columns = entry.columns if entry.columns is not None else self.columns

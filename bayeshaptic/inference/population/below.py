@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bayeshaptic.inference.population.hierarchy import Conditionals, Hierarchy, inverse
+from bayeshaptic.inference.population.hierarchy import Conditionals, Hierarchy, inverse_and_log_det
 from bayeshaptic.inference.population.hyperparameters import Hyperparameters
 from bayeshaptic.numerics.truncated_normal import draw_above
 from bayeshaptic.types import Bools, Floats
@@ -79,7 +79,8 @@ def _draw(
     given = hierarchy.given(phi)
     order = np.concatenate([hierarchy.hand, *[hierarchy.device] * (int(hierarchy.place.max()) + 1)])
     low = (walls - hierarchy.prior_mean)[order]
-    beta = draw_above(low, given.beta, inverse(given.precision), rng, spike[order])
+    covariance, _ = inverse_and_log_det(given.precision)
+    beta = draw_above(low, given.beta, covariance, rng, spike[order])
     people = given.draw_people(beta, rng)
     x = np.einsum("rip,bp->bri", hierarchy.design, beta)
     x[:, :, hierarchy.hand] += people[:, hierarchy.user]

@@ -270,8 +270,3 @@ def inverse_and_log_det(matrices: Floats) -> tuple[Floats, Floats]:
     if np.isnan(log_det).any():
         raise np.linalg.LinAlgError("Matrix is not positive definite")
     return found.reshape(matrices.shape), log_det.reshape(matrices.shape[:-2])
-
-
-def inverse(matrices: Floats) -> Floats:
-    """Inverses of matrices of shape (..., n, n)."""
-    return np.asarray(np.linalg.inv(matrices), np.float64)

@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood
-from bayeshaptic.inference.population.hierarchy import inverse
+from bayeshaptic.inference.population.hierarchy import inverse_and_log_det
 from bayeshaptic.inference.population.hyperparameters import DEVICE_SPREAD
 from bayeshaptic.types import Bools, Floats
 
@@ -112,15 +112,14 @@ class Trend:
         """
         scatter = self._read(phi)[1]
         marginal = self.covariance + (scatter**2)[:, None, :, None] * np.eye(len(self.hand))
-        weight = inverse(marginal)  # (B, R, D, D)
+        weight, log_dets = inverse_and_log_det(marginal)  # (B, R, D, D), (B, R)
         pull = (weight @ self.mean[:, :, None])[..., 0]
         precision = np.einsum("cr,brij->bcij", self.members, weight)
         score = np.einsum("cr,bri->bci", self.members, pull)
-        together = inverse(precision)
+        together, own_log_dets = inverse_and_log_det(precision)
         mean = (together @ score[..., None])[..., 0]
         left = np.sum(score * mean, axis=(1, 2)) - np.sum(pull * self.mean, axis=(1, 2))
-        left -= np.linalg.slogdet(marginal)[1].sum(axis=1)
-        left -= np.linalg.slogdet(precision)[1].sum(axis=1)
+        left -= log_dets.sum(axis=1) + own_log_dets.sum(axis=1)
         return Seen(mean, together, weight, 0.5 * left)
 
     def expected(self, phi: Floats) -> tuple[Floats, Floats]:
