@@ -53,6 +53,7 @@ def _through_reference(analysis: Analysis, verdict: str | None) -> list[str]:
             f"nothing moves the force above {quantity(etfe.band_hz[1], 'Hz')} but noise, "
             "and a vibration mode there may set a lower limit than that of one mass"
         )
+    # Of 48 loops without such a force five are read so, and one loses its stiffness for this.
     if any(notice.topic == AGAINST for notice in analysis.notices):
         found.append(
             "where all lines are fitted a force that is not linear acts, which what the reference "
