@@ -11,7 +11,7 @@ from bayeshaptic.inference.time_domain.between_pieces import between_pieces
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, SHARED, MassInLoop
 from bayeshaptic.inference.time_domain.one_way import one_way
 from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, ridge
-from bayeshaptic.inference.time_domain.widths import covariance
+from bayeshaptic.inference.time_domain.widths import covariance, of_white
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
@@ -77,7 +77,10 @@ def _spread(
 ) -> Floats:
     """Covariance of the values, (V, V): within pieces, between them, and of what goes one way."""
     plain = loop.plain
-    spread = covariance(columns, left, solved, loop.independent, SHARED)
+    if loop.white:
+        spread = of_white(left, solved, loop.independent)
+    else:
+        spread = covariance(columns, left, solved, loop.independent, SHARED)
     friction = np.array([NAMES.index("b"), NAMES.index("coulomb")])
     own = loop.pieces, friction, loop.beginnings
     spread = spread + between_pieces(columns, left, solved, *own, loop.independent)

@@ -166,6 +166,11 @@ class MassInLoop:
         return tuple(replace(hum, amplitude=complex(amplitude)) for hum, amplitude in found)
 
     @property
+    def white(self) -> bool:
+        """Whether errors are independent of each other."""
+        return False
+
+    @property
     def independent(self) -> float:
         """How many independent samples this is worth, about."""
         seconds = len(self.force) * self.period_s

@@ -3,6 +3,7 @@
 Equal weights (`bayeshaptic.inference.time_domain.fit`) are right on average whatever force remains,
 and several times as far from the truth as need be where that is white.  Which of the two it is the
 innovations show: a force that depends on the position or the direction does not leave them white.
+What they do not show is that a controller makes its command of counts; that is asked for first.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.descent import Descended, descend
+from bayeshaptic.inference.time_domain.descent import descend
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.innovations.filter import (
     Disturbance,
@@ -21,7 +22,7 @@ from bayeshaptic.inference.time_domain.innovations.filter import (
 )
 from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES
-from bayeshaptic.inference.time_domain.widths import SURELY, mean_of_uneven
+from bayeshaptic.inference.time_domain.widths import mean_of_uneven
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
@@ -32,9 +33,10 @@ _SIZES = 10.0 ** np.arange(-6.0, 0.1, 0.4)  # of the command, that a white force
 _CLOSER = (0.2, 0.05, 0.012, 0.003)
 _ROUNDS = 2  # fits, each with the filter of the last
 _LAGS = 20  # samples
+_WINDOW = 512  # samples of the spectra that show where a position is no more than counts
+_FEWEST = 300  # samples that show whether a series is white
 _RARE = 1e-3  # how often chance is told from white noise by a test
-_MOSTLY = 0.5  # of the time, for which the sign of friction must be clear
-_ALIKE = 0.1  # of a variance: no less is allowed for between estimates that know as much
+_MOSTLY = 0.5  # of the time it moves, of the power of a command's changes
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,11 @@ class WhitenedLoop(MassInLoop):
     """
 
     filtered: Innovations | None = None
+
+    @property
+    def white(self) -> bool:
+        """Whether errors are independent of each other."""
+        return True
 
     @property
     def independent(self) -> float:
@@ -80,6 +87,8 @@ def in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
 
 def _in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
     loop = motion.loop(recording)
+    if _lost_in_counts(loop):
+        return motion
     disturbed = _usual(loop)
     tried, values = _SIZES * float(np.std(loop.force)), motion.whole
     for _ in range(_ROUNDS):
@@ -89,7 +98,7 @@ def _in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
             return motion
         found = descend(whitened, values, recording.name)
         tried, values = _around(disturbed.force_sd, _CLOSER[0]), found.inside
-    if not (found.converged and _agree(motion, found)):
+    if not found.converged:
         return motion
     shared = len(NAMES)
     spread = found.covariance[:shared, :shared].copy()
@@ -140,9 +149,9 @@ def _disturbance(
         for force_sd in tried:
             sizes = Disturbance(float(force_sd), position_sd)
             filtered = innovations(*beside, sizes, loop.period_s)
-            left = _left(filtered, error, slopes)[clear]
-            power = float(np.mean(left**2))
-            lack = np.log(power) + np.mean(np.log(filtered.variances[clear]))
+            counted = clear & filtered.moving
+            power = float(np.mean(_left(filtered, error, slopes)[counted] ** 2))
+            lack = np.log(power) + np.mean(np.log(filtered.variances[counted]))
             lacks.append((float(lack), float(force_sd), power, filtered))
         _, force_sd, power, filtered = min(lacks, key=lambda one: one[0])
         # A common factor of both sizes, and of what friction is beside them.
@@ -166,14 +175,14 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
     """Whether innovations are white, and owe nothing to the way, as far as a line says.
 
     Correlations of 20 lags (G. E. P. Box and D. A. Pierce, Journal of the American Statistical
-    Association 65, 1970), where friction is clear, for half of the recording at least; and whether
+    Association 65, 1970), where friction is clear, for half of the motion at least; and whether
     forces along the way explain more than chance does.
     """
     from scipy.stats import chi2
 
     assert loop.filtered is not None
-    clear = loop.filtered.clear
-    if np.mean(clear) < _MOSTLY:
+    clear, moving = loop.filtered.clear, np.count_nonzero(loop.filtered.moving)
+    if np.count_nonzero(clear) < max(_MOSTLY * moving, _FEWEST):
         return False
     waves = np.zeros(2 * WAVES)
     error = loop.error(values, waves)
@@ -185,7 +194,7 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
         error - part @ np.linalg.lstsq(part, error)[0]
         for part in (columns[:, : loop.plain], columns)
     )
-    along = len(error) * (plain @ plain / (with_waves @ with_waves) - 1)
+    along = moving * (plain @ plain / (with_waves @ with_waves) - 1)
     noise = np.where(clear, plain, 0.0)
     noise /= np.sqrt(np.mean(noise[clear] ** 2))
     known = clear.astype(float)
@@ -194,10 +203,24 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
     return bool(correlated < chi2.isf(_RARE, _LAGS) and along < chi2.isf(_RARE, 2 * WAVES))
 
 
-def _agree(motion: MotionFit, found: Descended) -> bool:
-    """Whether the values are no further apart than their variances are (Hausman)."""
-    shared = len(NAMES)
-    variance = motion.sd**2 - np.diag(found.covariance)[:shared]
-    least = _ALIKE * motion.sd**2
-    apart = np.abs(found.values[:shared] - motion.values)
-    return bool(np.all(apart < SURELY * np.sqrt(np.maximum(variance, least))))
+def _lost_in_counts(loop: MassInLoop) -> bool:
+    """Whether most of what the command changes by moves the mass by no more than counts.
+
+    That is at frequencies at which the position shows nothing but counts.  They are no noise that
+    is independent of the command, where a controller makes much of it of them: they are white, and
+    yet the delay comes out too small, by up to its size.
+    """
+    from scipy.signal import welch
+
+    unit = increment_unit(loop.position)
+    if unit is None:
+        return False
+    moved, changed = (
+        np.concatenate([np.diff(one[piece]) for piece in loop.pieces])
+        for one in (loop.position, loop.force)
+    )
+    samples = min(_WINDOW, len(moved) // 4)
+    line, seen = welch(moved, nperseg=samples)
+    _, power = welch(changed, nperseg=samples)
+    of_counts = 2 * unit**2 / 12 * np.abs(1 - np.exp(-2j * np.pi * line)) ** 2
+    return bool(np.sum(power[seen < 2 * of_counts]) > _MOSTLY * np.sum(power))

@@ -21,6 +21,7 @@ from bayeshaptic.types import Floats, Ints
 
 _UNKNOWN = 100.0  # counts a sample, that a velocity may be off where a piece begins
 _FORGOTTEN = 5  # samples, after which it no longer matters how a piece begins
+_HELD = 5  # samples without any motion, from which on the mass rests
 _CLEAR = 1.5  # of the least variance: above it friction may have either sign
 
 
@@ -42,21 +43,30 @@ class Innovations:
         Position and velocity a sample later, without a force.
     gains : ndarray, shape (N, 2)
     variances : ndarray, shape (N,)
-    unled : Follower
-        What takes the follower off: its answer to an error is added to the error.
+        Infinite while the mass rests.
+    follower : Follower
+        That led the motion; what it did to the position is added to the error.
+    answer : Follower
+        Position over a command: numerator and denominator in powers of 1/z.
     pieces : tuple of slice
     """
 
     motion: Floats
     gains: Floats = field(repr=False)
     variances: Floats = field(repr=False)
-    unled: Follower
+    follower: Follower
+    answer: Follower
     pieces: tuple[slice, ...]
+
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """Samples that count, shape (N,)."""
+        return np.isfinite(self.variances)
 
     @property
     def clear(self) -> NDArray[np.bool_]:
         """Samples at which dry friction has one sign for certain, shape (N,)."""
-        usual = np.quantile(self.variances, 0.1)
+        usual = np.quantile(self.variances[self.moving], 0.1)
         known = self.variances < _CLEAR * usual
         for piece in self.pieces:
             known[piece.start : piece.start + _FORGOTTEN] = False
@@ -68,11 +78,12 @@ class Innovations:
 
         from bayeshaptic.inference.time_domain.innovations.kernels import innovations_of
 
-        above, below = self.unled.above, self.unled.below
-        alone = [error[piece] + lfilter(above, below, error[piece]) for piece in self.pieces]
-        starts = _starts(self.pieces)
-        args = self.motion, self.gains, self.variances, starts, np.concatenate(alone)
-        return np.asarray(innovations_of(*args))
+        led = self.follower
+        force = np.concatenate([lfilter(led.above, led.below, error[one]) for one in self.pieces])
+        beside = self.motion, self.gains, self.variances, _starts(self.pieces)
+        return np.asarray(
+            innovations_of(*beside, self.answer.above, self.answer.below, force, error)
+        )
 
 
 def innovations(
@@ -86,7 +97,8 @@ def innovations(
     """The filter beside a simulated motion.
 
     Dry friction has one sign or the other: where the velocity is no further from zero than the
-    filter knows it, that is as good as a white force of its size.
+    filter knows it, that is as good as a white force of its size.  While it holds the mass nothing
+    counts.
 
     Parameters
     ----------
@@ -106,10 +118,16 @@ def innovations(
     motion, push = _held(mass, damping, period_s)
     unknown = _UNKNOWN * disturbed.position_sd / period_s
     sizes = np.array([disturbed.force_sd, disturbed.position_sd, dry, unknown])
-    gains, variances = gains_of(motion, push, sizes, velocity, _starts(pieces))
-    above, below = _position_over_force(mass, damping, delay_s, period_s)
-    unled = Follower(np.convolve(above, follower.above), np.convolve(below, follower.below))
-    return Innovations(motion, gains, variances, unled, tuple(pieces))
+    gains, variances = gains_of(motion, push, sizes, velocity, _rests(velocity), _starts(pieces))
+    answer = Follower(*_position_over_force(mass, damping, delay_s, period_s))
+    return Innovations(motion, gains, variances, follower, answer, tuple(pieces))
+
+
+def _rests(velocity: Floats) -> NDArray[np.bool_]:
+    """Samples of runs of `_HELD` and more without any motion, shape (N,)."""
+    from scipy.ndimage import binary_opening
+
+    return np.asarray(binary_opening(velocity == 0.0, np.ones(_HELD)))
 
 
 def _starts(pieces: Sequence[slice]) -> Ints:

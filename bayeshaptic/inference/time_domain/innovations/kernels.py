@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayeshaptic.compiled import kernel
 from bayeshaptic.types import Floats, Ints
@@ -19,9 +20,13 @@ def gains_of(
     push: Floats,
     sizes: Floats,
     velocity: Floats,
+    resting: NDArray[np.bool_],
     starts: Ints,
 ) -> tuple[Floats, Floats]:
     """The filter's gains, shape (N, 2), and its innovations' variances, shape (N,).
+
+    A mass that friction holds is no linear filter's: variances are infinite there, and where it
+    begins to move the filter begins anew, with the position as measured and any velocity.
 
     Parameters
     ----------
@@ -34,6 +39,7 @@ def gains_of(
         standard deviation of the velocity where a piece begins.
     velocity : ndarray, shape (N,)
         Simulated.
+    resting : ndarray of bool, shape (N,)
     starts : ndarray of int, shape (J,)
         Where the pieces begin.
     """
@@ -43,11 +49,15 @@ def gains_of(
     xx = xv = vv = 0.0  # the state's covariance
     piece, since = 0, 0
     for k in range(len(velocity)):
-        if piece < len(starts) and k == starts[piece]:
+        first = piece < len(starts) and k == starts[piece]
+        if first:
             xx = xv = vv = 0.0
             piece, since = piece + 1, 0
         total = xx + position_sd**2
         variances[k] = total
+        if resting[k] or (not first and resting[k - 1]):
+            total = variances[k] = np.inf
+            xx, xv, vv, since = position_sd**2, 0.0, 0.0, 0
         of_x, of_v = xx / total, xv / total
         gains[k, 0], gains[k, 1] = of_x + far * of_v, kept * of_v
         vv -= of_v * xv
@@ -71,26 +81,46 @@ def gains_of(
 
 @kernel
 def innovations_of(
-    motion: Floats, gains: Floats, variances: Floats, starts: Ints, error: Floats
+    motion: Floats,
+    gains: Floats,
+    variances: Floats,
+    starts: Ints,
+    above: Floats,
+    below: Floats,
+    force: Floats,
+    error: Floats,
 ) -> Floats:
     """What the filter does not foresee of errors, over its standard deviation; shape (N,).
+
+    Zero while the mass rests.
 
     Parameters
     ----------
     motion, gains, variances, starts : ndarray
         As `gains_of` takes and gives them.
+    above, below : ndarray
+        Position over a command, in powers of 1/z; the first coefficient of `below` is 1.
+    force : ndarray, shape (N,)
+        Of the follower: what it does to the position is added to the error.
     error : ndarray, shape (N,)
         Measured less simulated position.
     """
-    out = np.empty_like(error)
+    out, led = np.zeros_like(error), np.zeros_like(error)
     far, kept = motion[0, 1], motion[1, 1]
     x = v = 0.0
-    piece = 0
+    piece = begun = 0
     for k in range(len(error)):
         if piece < len(starts) and k == starts[piece]:
             x = v = 0.0
-            piece += 1
-        new = error[k] - x
+            piece, begun = piece + 1, k
+        if math.isinf(variances[k]):
+            x, v, begun = error[k], 0.0, k
+            continue
+        for j in range(min(len(above), k - begun + 1)):
+            led[k] += above[j] * force[k - j]
+        for j in range(1, min(len(below), k - begun + 1)):
+            led[k] -= below[j] * led[k - j]
+        new = error[k] + led[k] - x
         out[k] = new / math.sqrt(variances[k])
         x += far * v + gains[k, 0] * new
         v = kept * v + gains[k, 1] * new
