@@ -168,3 +168,14 @@ def test_units_in_headers(tmp_path: Path) -> None:
     write_csv(path, "Time (s),Force (V),Position (mm)")
     with pytest.raises(InputError, match="'V' is no unit of force.*multiply"):
         read_recording(path)
+
+
+def test_headers_are_known_in_any_case(tmp_path: Path) -> None:
+    write_csv(tmp_path / "a.csv", "Time_s,Force_N,Position_M")
+    write_csv(tmp_path / "b.csv", "time_s,force_n,position_m")
+    upper, lower = (read_recording(tmp_path / name) for name in ("a.csv", "b.csv"))
+    assert upper.force_unit == lower.force_unit == "N"
+    assert np.array_equal(upper.position, lower.position)
+    write_csv(tmp_path / "c.csv", "time_s,force_n,Force_N")
+    with pytest.raises(InputError, match="both force_n and Force_N; say which"):
+        read_recording(tmp_path / "c.csv")

@@ -131,7 +131,8 @@ def is_frequency_response(arrays: Arrays, mapping: Mapping[str, Column]) -> bool
     """Whether a file is a table of a frequency response and not a recording."""
     if any(role in mapping for role in FRF_ROLES):
         return True
-    return not any(role in mapping for role in RECORDING_ROLES) and "frequency_hz" in arrays
+    named = any(default_unit("frequency", name)[0] for name in arrays)
+    return named and not any(role in mapping for role in RECORDING_ROLES)
 
 
 def played_by(roles: tuple[str, ...], mapping: Mapping[str, Column], path: Path) -> str:
@@ -154,6 +155,12 @@ def name_and_unit(name: str) -> tuple[str, str | None]:
     if match is None or not is_unit(match["unit"]):
         return name, None
     return match["name"], match["unit"]
+
+
+def default_unit(role: str, name: str) -> tuple[bool, str | None]:
+    """Whether a header needs no mapping to play a role (force_n, force_N), and the unit it says."""
+    plain, headers = name.lower(), DEFAULT_HEADERS[role]
+    return plain in headers, headers.get(plain)
 
 
 def _find(arrays: Arrays, name: str) -> str | None:
@@ -189,7 +196,8 @@ def _unit_times(key: str, factor: float, role: str, path: Path) -> str | None:
 
 def _defaults(arrays: Arrays, role: str) -> dict[str, str | None]:
     """Arrays that say by their names that they play a role, with their units."""
-    found = {name: unit for name, unit in DEFAULT_HEADERS[role].items() if name in arrays}
+    said = {name: default_unit(role, name) for name in arrays}
+    found = {name: unit for name, (is_default, unit) in said.items() if is_default}
     if role == REFERENCE:
         return found
     for key in arrays:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.units_in_doubt import is_whole, steps_of_a_turn
 from bayeshaptic.recordings.columns import (
-    DEFAULT_HEADERS,
     POSITIONS,
     REFERENCE,
+    default_unit,
     is_frequency_response,
     name_and_unit,
     parse_columns,
@@ -128,7 +128,7 @@ def _scale(role: str, column: ColumnFacts) -> str:
     By the name, or by what the numbers speak for; where they speak against m and rad it is left to
     be said.
     """
-    if column.unit is not None or column.name in DEFAULT_HEADERS[role]:
+    if column.unit is not None or default_unit(role, column.name)[0]:
         return ""
     if (unit := unit_in_name(role, column.name)) is not None:
         return f"[{unit}]"
@@ -179,7 +179,7 @@ def doubts(column: ColumnFacts, role: str) -> str:
             )
         rates = (f"{rate:.4g} Hz in {unit}" for unit, rate in _rates(column).items())
         return f"{', '.join(rates)}: write the unit after the name"
-    if column.name in DEFAULT_HEADERS[role]:
+    if default_unit(role, column.name)[0]:
         return ""
     if column.missing:
         return f"{column.missing} rows without a number: fill them in, or read a part without them"
@@ -206,7 +206,7 @@ def doubts(column: ColumnFacts, role: str) -> str:
 
 def _said_of(column: ColumnFacts) -> str | None:
     """Where a time's name says its unit: what to doubt of that, empty where nothing."""
-    by_name = DEFAULT_HEADERS["time"].get(column.name) or unit_in_name("time", column.name)
+    by_name = default_unit("time", column.name)[1] or unit_in_name("time", column.name)
     unit = column.unit or by_name
     if unit is None or not column.period:
         return None
