@@ -9,9 +9,9 @@ import pytest
 
 from bayeshaptic.effects.linear.reflex import reflex_stiffness
 from bayeshaptic.models import LinearSystem, build_model
+from bayeshaptic.models.response.aliases import aliases
 from bayeshaptic.models.response.dynamic_link import DynamicLink
 from bayeshaptic.models.response.mechanism import Mechanism
-from bayeshaptic.models.response.remainder import aliases
 from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.stability import find_crossings
 from bayeshaptic.stability.crossings import search
@@ -195,6 +195,25 @@ def test_one_link_is_compiled_as_it_is_written():
     ratio = compliance / evaluate(one.denominator, 1j * own)
     difference = 1 + link.stiffness(1j * own) * ratio
     np.testing.assert_allclose(one.return_difference(own), difference, rtol=1e-11)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_several_links_are_compiled_as_they_are_written(count):
+    system = filtered(linked("lhifam", "grasped"), 3e-4)
+    links = (*system.dynamic_links, *system.dynamic_links)[:count]
+    several = replace(system, dynamic_links=links).remainder
+    own = np.exp(np.random.default_rng(1).uniform(0, 9, (40, system.batch)))  # of each vector
+    s = 1j * own
+    np.testing.assert_allclose(several.on_axis(own), several.at(s) / s, rtol=1e-10)
+    # All at once: det(1 + Lambda H), H the compliances between their pairs of masses.
+    h = np.empty((*own.shape, count, count), complex)
+    for (i, j), numerator in several.compliances.items():
+        if i > 0:
+            h[..., i - 1, j - 1] = evaluate(numerator, s) / evaluate(several.denominator, s)
+            h[..., j - 1, i - 1] = h[..., i - 1, j - 1]
+    stiffness = np.stack([link.stiffness(s) for link in several.links], axis=-1)
+    whole = np.linalg.det(np.eye(count) + stiffness[..., None] * h)
+    np.testing.assert_allclose(several.return_difference(own), whole, rtol=1e-9)
 
 
 def test_aliases_hold_and_delay_are_compiled_as_they_are_written():

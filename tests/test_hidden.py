@@ -31,7 +31,7 @@ from bayeshaptic.inference import least_squares, sample
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import build_model
-from bayeshaptic.models.response.remainder import alias_sums
+from bayeshaptic.models.response.aliases import alias_sums
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.study_file import read_study

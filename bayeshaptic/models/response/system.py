@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayeshaptic.models.response.aliases import sampled_remainder
 from bayeshaptic.models.response.dynamic_link import DynamicLink, Index
 from bayeshaptic.models.response.filters import Filter, filtered
 from bayeshaptic.models.response.mechanism import Mechanism
 from bayeshaptic.models.response.poles import poles_and_residues
 from bayeshaptic.models.response.rational import RationalArrays, rational_form, sampled_response
-from bayeshaptic.models.response.remainder import Remainder, remainder_of, sampled_remainder
+from bayeshaptic.models.response.remainder import Remainder, remainder_of
 from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate
 from bayeshaptic.types import Complexes, Floats
 

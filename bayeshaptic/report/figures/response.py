@@ -75,7 +75,7 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
         _before(gain, phase, result, modelled)
         if further:
             _difference(further.pop(0), etfe, band, 20 / np.log(10) * error)
-    style.legend(gain, loc="lower left")
+    style.legend(gain)
     if further:
         coherence = style.panel(further[0], y="coherence")
         coherence.plot(etfe.frequency_hz, etfe.coherence, ".", color=style.DATA, markersize=2.5)

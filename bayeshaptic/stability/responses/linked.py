@@ -10,13 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.models.response.remainder import (
-    Aliases,
-    Remainder,
-    alias_sums,
-    aliases,
-    smooth_aliases,
-)
+from bayeshaptic.models.response.aliases import Aliases, alias_sums, aliases, smooth_aliases
+from bayeshaptic.models.response.remainder import Remainder
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.stability.responses.evaluated import ends, held_at_rest
 from bayeshaptic.stability.responses.grid import in_chunks, search_grid

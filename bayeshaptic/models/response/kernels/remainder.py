@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayeshaptic.compiled import kernel
 from bayeshaptic.numerics.cos_sin import cos_sin
@@ -90,6 +91,59 @@ def return_difference(
             k, kj = stiffness[line, b, 0], stiffness[line, b, 1]
             out[line, b, 0] = 1.0 + k * ratio - kj * ratio_j
             out[line, b, 1] = k * ratio_j + kj * ratio
+
+
+@kernel
+def add_links(
+    omega: Floats,
+    denominator: Floats,
+    numerators: Floats,
+    stiffness: NDArray[np.complex128],
+    total: NDArray[np.complex128],
+    difference: NDArray[np.complex128],
+) -> None:
+    """Several links, one after the other: what they add over j omega, and 1 + lambda h / d of all.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (L, B)
+    denominator : ndarray, shape (degree + 1, B)
+    numerators : ndarray, shape (pairs, degree + 1, B)
+        Of the compliances between drive (0) and links (from 1 on): 01, 11, 02, 12, 22, 03, ...
+    stiffness : ndarray, shape (links, L, B)
+    total, difference : ndarray, shape (L, B)
+        Become the results.
+    """
+    links, batch = stiffness.shape[0], denominator.shape[1]
+    values, below = np.empty((len(numerators), 2, batch)), np.empty((2, batch))
+    minus = np.empty(batch)
+    h = np.empty((links + 1, links + 1), np.complex128)
+    for line in range(len(omega)):
+        for b in range(batch):
+            minus[b] = -omega[line, b] * omega[line, b]
+        _polynomial(denominator, omega[line], minus, below[0], below[1])
+        for pair in range(len(numerators)):
+            _polynomial(numerators[pair], omega[line], minus, values[pair, 0], values[pair, 1])
+        for b in range(batch):
+            inverse = 1.0 / complex(below[0, b], below[1, b])
+            pair = 0
+            for j in range(1, links + 1):
+                for i in range(j + 1):
+                    h[i, j] = h[j, i] = complex(values[pair, 0, b], values[pair, 1, b]) * inverse
+                    pair += 1
+            added, product = complex(0.0, 0.0), complex(1.0, 0.0)
+            for link in range(1, links + 1):
+                pivot = 1.0 + stiffness[link - 1, line, b] * h[link, link]
+                product *= pivot
+                gain = stiffness[link - 1, line, b] / pivot
+                added -= gain * h[0, link] * h[0, link]
+                for j in range(link + 1, links + 1):
+                    h[0, j] -= gain * h[0, link] * h[link, j]
+                    for i in range(link + 1, j + 1):
+                        h[i, j] -= gain * h[link, i] * h[link, j]
+                        h[j, i] = h[i, j]
+            total[line, b] = added / complex(0.0, omega[line, b])
+            difference[line, b] = product
 
 
 @kernel
