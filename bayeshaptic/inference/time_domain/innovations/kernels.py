@@ -11,6 +11,7 @@ from bayeshaptic.compiled import kernel
 from bayeshaptic.types import Floats, Ints
 
 _CERTAIN = 8.0  # standard deviations of a velocity, beyond which its sign is certain
+_LET_GO = 5.0  # samples of its full force, that friction may let go of a mass earlier or later
 _BEGINS = 3  # samples in which the command of before the recording arrives
 
 
@@ -26,7 +27,7 @@ def gains_of(
     """The filter's gains, shape (N, 2), and its innovations' variances, shape (N,).
 
     A mass that friction holds is no linear filter's: variances are infinite there, and where it
-    begins to move the filter begins anew, with the position as measured and any velocity.
+    begins to move the filter begins anew, with the position as measured and little velocity.
 
     Parameters
     ----------
@@ -57,7 +58,8 @@ def gains_of(
         variances[k] = total
         if resting[k] or (not first and resting[k - 1]):
             total = variances[k] = np.inf
-            xx, xv, vv, since = position_sd**2, 0.0, 0.0, 0
+            xx, xv, vv = position_sd**2, 0.0, (_LET_GO * push[1] * dry) ** 2
+            since = _BEGINS
         of_x, of_v = xx / total, xv / total
         gains[k, 0], gains[k, 1] = of_x + far * of_v, kept * of_v
         vv -= of_v * xv
