@@ -13,7 +13,7 @@ from bayeshaptic.inference.time_domain.follower import Follower, spring_and_damp
 from bayeshaptic.inference.time_domain.innovations.filter import Disturbance, innovations
 from bayeshaptic.inference.time_domain.mass_in_loop import MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way
-from bayeshaptic.inference.time_domain.white_force import in_white_force
+from bayeshaptic.inference.time_domain.white_force import in_white_force, told_apart
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
@@ -30,7 +30,7 @@ def commanded(
     count: float = COUNT,
     along: float = 0.0,
     friction: float = 0.0,
-    smooth: int = 120,
+    smooth: int = 60,
 ) -> Recording:
     """A mass under steps of a PD controller, ten exact steps a sample; a force `along` the way.
 
@@ -43,8 +43,8 @@ def commanded(
     step_s, late = PERIOD_S / fine, round(delay_s / PERIOD_S * fine)
     pushes = force_sd * rng.standard_normal(samples)
     wanted = np.repeat(rng.uniform(-0.03, 0.03, samples // 250 + 1), 250)[:samples]
-    if smooth:
-        wanted = np.convolve(wanted, np.hanning(smooth) / np.sum(np.hanning(smooth)), "same")
+    window = np.hanning(smooth)
+    wanted = np.convolve(wanted, window / np.sum(window), "same")
     kept = np.exp(-damping / mass * step_s)
     x = v = last = 0.0
     force, position = np.zeros(samples), np.zeros(samples)
@@ -179,7 +179,7 @@ def test_where_only_counts_disturb_it_says_much_more() -> None:
     plain = fit_motion(recording)
     found = in_white_force(plain, recording)
     known = [0, 1, 3, 4]
-    assert np.all(found.sd[known] < 0.5 * plain.sd[known])
+    assert np.all(found.sd[known] < 0.3 * plain.sd[known])
     far = (found.values - TRUTH)[known] / found.sd[known]
     assert np.sum(far**2) < 8 / 6 * chi2.isf(1e-4, len(known))
 
@@ -191,7 +191,7 @@ def test_a_force_along_the_way_is_not_white() -> None:
 
 
 def test_a_mass_that_rests_is_fitted_to_its_moves() -> None:
-    recording = commanded(3.0, seed=21, friction=4.0, smooth=60)
+    recording = commanded(3.0, seed=21, friction=4.0)
     plain = fit_motion(recording)
     found = in_white_force(plain, recording)
     assert found.disturbed is not None
@@ -205,6 +205,16 @@ def test_a_mass_that_rests_is_fitted_to_its_moves() -> None:
 
 
 def test_what_a_controller_makes_of_counts_says_no_delay() -> None:
-    recording = commanded(4.0, seed=22, count=2e-5)
+    recording = commanded(4.0, seed=22, count=2e-5)  # innovations are white here, too
     found = fit_motion(recording)
     assert in_white_force(found, recording) is found
+
+
+def test_columns_that_are_nearly_one_tell_no_values_apart() -> None:
+    rng = np.random.default_rng(7)
+    columns = rng.standard_normal((1000, 5))
+    assert told_apart(columns)
+    for share, apart in ((0.2, True), (0.05, False)):  # 26 and 400 times the variance
+        alike = columns.copy()
+        alike[:, 4] = alike[:, 0] + share * columns[:, 4]
+        assert told_apart(alike) is apart

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.descent import descend
@@ -39,7 +40,10 @@ _FEWEST = 300  # samples that show whether a series is white
 # which it is larger 90 % intervals of mass, damping and delay would hold in two thirds.
 _APART = 100.0
 _RARE = 1e-3  # how often chance is told from white noise by a test
-_MOSTLY = 0.5  # of the time it moves, of the power of a command's changes
+_MOSTLY = 0.5  # of the motion, for which the sign of friction must be clear
+# Of the power of a command's changes, that the motion must show.  Of 404 loops with white
+# innovations the 90 % interval of the delay holds in 94 % of those above, in 76 % of those below.
+_SHOWN = 0.5
 
 
 @dataclass(frozen=True)
@@ -175,14 +179,9 @@ def _left(filtered: Innovations, error: Floats, slopes: Floats) -> Floats:
 
 
 def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
-    """Whether innovations are white, and owe nothing to the way, as far as a line says.
+    """Whether innovations tell the values apart, are white, and owe nothing to the way.
 
-    And whether they tell the values apart.  A controller takes a mass from rest to rest in moves
-    that many masses, dampings and delays share: then what little counts differ by would decide.
-
-    Correlations of 20 lags (G. E. P. Box and D. A. Pierce, Journal of the American Statistical
-    Association 65, 1970), where friction is clear, for half of the motion at least; and whether
-    forces along the way explain more than chance does.
+    As far as a line says: where friction is clear, for half of the motion at least.
     """
     from scipy.stats import chi2
 
@@ -196,20 +195,38 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
     scale = np.linalg.norm(columns, axis=0)
     scale[scale == 0] = 1.0
     columns = columns / scale
-    gram = columns[:, : loop.plain].T @ columns[:, : loop.plain]
-    if np.max(np.diag(np.linalg.pinv(gram, hermitian=True))[: len(NAMES)]) > _APART:
+    if not told_apart(columns[:, : loop.plain]):
         return False
     plain, with_waves = (
         error - part @ np.linalg.lstsq(part, error)[0]
         for part in (columns[:, : loop.plain], columns)
     )
     along = moving * (plain @ plain / (with_waves @ with_waves) - 1)
-    noise = np.where(clear, plain, 0.0)
+    correlated = _correlated(plain, clear)
+    return bool(correlated < chi2.isf(_RARE, _LAGS) and along < chi2.isf(_RARE, 2 * WAVES))
+
+
+def told_apart(columns: Floats) -> bool:
+    """Whether slopes over the values (the five of all pieces first) tell these apart; (N, V).
+
+    A controller takes a mass from rest to rest in moves that many masses, dampings and delays
+    share: then what little counts differ by would decide.
+    """
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    inflated = np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True))
+    return bool(np.max(inflated[: len(NAMES)]) < _APART)
+
+
+def _correlated(left: Floats, clear: NDArray[np.bool_]) -> float:
+    """Box and Pierce's sum of squared correlations of `_LAGS` lags, of the clear samples.
+
+    G. E. P. Box and D. A. Pierce, Journal of the American Statistical Association 65, 1970.
+    """
+    noise = np.where(clear, left, 0.0)
     noise /= np.sqrt(np.mean(noise[clear] ** 2))
     known = clear.astype(float)
     lags = range(1, _LAGS + 1)
-    correlated = sum((noise[k:] @ noise[:-k]) ** 2 / (known[k:] @ known[:-k]) for k in lags)
-    return bool(correlated < chi2.isf(_RARE, _LAGS) and along < chi2.isf(_RARE, 2 * WAVES))
+    return float(sum((noise[k:] @ noise[:-k]) ** 2 / (known[k:] @ known[:-k]) for k in lags))
 
 
 def _lost_in_counts(loop: MassInLoop) -> bool:
@@ -232,4 +249,4 @@ def _lost_in_counts(loop: MassInLoop) -> bool:
     line, seen = welch(moved, nperseg=samples)
     _, power = welch(changed, nperseg=samples)
     of_counts = 2 * unit**2 / 12 * np.abs(1 - np.exp(-2j * np.pi * line)) ** 2
-    return bool(np.sum(power[seen < 2 * of_counts]) > _MOSTLY * np.sum(power))
+    return bool(np.sum(power[seen < 2 * of_counts]) > (1 - _SHOWN) * np.sum(power))

@@ -1,4 +1,4 @@
-"""The compiled part of `../remainder.py`."""
+"""The compiled parts of `../remainder.py` and `../aliases.py`."""
 
 from __future__ import annotations
 
