@@ -11,7 +11,9 @@ from bayeshaptic.compiled import kernel
 from bayeshaptic.types import Floats, Ints
 
 _CERTAIN = 8.0  # standard deviations of a velocity, beyond which its sign is certain
-_LET_GO = 5.0  # samples of its full force, that friction may let go of a mass earlier or later
+# Samples of its full force, that friction may let go of a mass earlier or later. With 1 and with 15
+# widths and coverage of 100 loops are the same to two digits.
+_LET_GO = 5.0
 _BEGINS = 3  # samples in which the command of before the recording arrives
 
 
