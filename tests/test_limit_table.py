@@ -13,7 +13,7 @@ import bayeshaptic as bh
 from bayeshaptic.models import build_model
 from bayeshaptic.report.figures.style import drawn
 from bayeshaptic.report.figures.walls import kb
-from bayeshaptic.report.numbers.rules import rules_of
+from bayeshaptic.report.numbers.rules import least_damped
 from bayeshaptic.report.walls.section import limits_section
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Backward, LowPass
@@ -136,9 +136,9 @@ def test_loops_that_are_never_stable_have_limits_of_zero(one):
     assert limits_section(found).html
 
 
-def test_rules_of_the_case_with_the_least_damping(one):
+def test_least_damped_the_case_with_the_least_damping(one):
     bare = case("free", label="nobody holds it", group="free", draws=100)
-    rules = rules_of([one, bare], friction=0.01, resolution=1e-6)
+    rules = least_damped([one, bare], friction=0.01, resolution=1e-6)
     assert (
         rules.label == "nobody holds it"
     )  # 6.9 N s/m to the ground; held 4.1, and 18.3 of the hand
@@ -146,8 +146,8 @@ def test_rules_of_the_case_with_the_least_damping(one):
 
 @pytest.mark.filterwarnings("error")
 def test_a_rule_far_above_the_walls_leaves_the_figure_its_size(one, table):
-    rules = rules_of([one], friction=0.5, resolution=1e-7)
-    above = replace(rules, damping=10 * rules.damping)  # eight times the highest wall
+    rules = least_damped([one], friction=0.5, resolution=1e-7)
+    above = replace(rules, dampings=10 * rules.dampings)  # eight times the highest wall
     assert drawn(kb.draw(table, above), "limits_kb").png
 
 

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.result import families_of
+from bayeshaptic.report.numbers.rules import rules_of
+from bayeshaptic.types import Floats
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 RISKS = (0.05, 0.01, 0.001)
-RULE_DRAWS = 4000
 _OURS = "model, with its uncertainty"
 
 
@@ -136,18 +136,14 @@ def _rules(analysis: Analysis) -> tuple[Witness, ...]:
     They know a rigid device only: how far they are off is not in the posterior, so that an interval
     of theirs would only mislead.
     """
-    from bayeshaptic.stability.rules import ground_damping, passivity_limit, rigid_limit
+    rules = rules_of(analysis.model, analysis.posterior.draws)
 
-    draws = analysis.posterior.draws
-    system = analysis.model.system(draws[:: max(len(draws) // RULE_DRAWS, 1)])
-    damping, period = ground_damping(system), analysis.etfe.period_s
-
-    def rule(key: str, label: str, remark: str, values: NDArray[Any]) -> Witness:
-        return Witness(key, label, remark, finite(np.median(values)))
+    def rule(key: str, label: str, remark: str, limit: Floats) -> Witness:
+        return Witness(key, label, remark, finite(float(limit)))
 
     diaz = "a rigid device, Diaz and Gil (2010), equation (19)"
     colgate = "a rigid device without delay, Colgate and Schenkel (1997)"
     return (
-        rule("rigid_rule", "rule b/(T/2 + td)", diaz, rigid_limit(damping, system.delay_s, period)),
-        rule("passivity", "passivity 2b/T", colgate, passivity_limit(damping, period)),
+        rule("rigid_rule", "rule b/(T/2 + td)", diaz, rules.rigid()),
+        rule("passivity", "passivity 2b/T", colgate, rules.passive()),
     )

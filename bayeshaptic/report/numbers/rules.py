@@ -1,35 +1,41 @@
-"""The classical rules as curves over a wall's damping, for one case of a device."""
+"""The classical rules beside a limit, and as curves over a wall's damping."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from bayeshaptic.report.numbers.estimates import RULE_DRAWS
 from bayeshaptic.stability.rules import (
     ground_damping,
     passivity_limit,
     quantisation_limit,
     rigid_limit,
 )
+from bayeshaptic.types import Floats
 
 if TYPE_CHECKING:
+    from bayeshaptic.models.model import Model
     from bayeshaptic.stability.cases import Case
+
+
+RULE_DRAWS = 4000
 
 
 @dataclass(frozen=True)
 class Rules:
-    """What the rules need to know of a device, at the medians of one case.
+    """What the rules need to know of a device, for one case; rules are medians over its draws.
 
     Attributes
     ----------
     label : str
-        The case: the one with the least damping to the ground.
-    damping, delay_s, period_s : float
+        The case.
+    dampings, delays_s : ndarray, shape (D,)
+        Draws of the damping to the ground and of the delay.
+    period_s : float
     friction : float or None
         Coulomb friction, where it is known.
     resolution : float or None
@@ -37,18 +43,25 @@ class Rules:
     """
 
     label: str
-    damping: float
-    delay_s: float
+    dampings: Floats = field(repr=False)
+    delays_s: Floats = field(repr=False)
     period_s: float
     friction: float | None = None
     resolution: float | None = None
 
-    def rigid(self, virtual: NDArray[Any]) -> NDArray[Any]:
-        """Stability of a rigid device with virtual damping."""
-        return rigid_limit(self.damping, self.delay_s, self.period_s, virtual)
+    @property
+    def damping(self) -> float:
+        """The median of the damping to the ground."""
+        return float(np.median(self.dampings))
 
-    def passive(self, virtual: NDArray[Any]) -> NDArray[Any]:
-        """Colgate and Schenkel's passivity with virtual damping."""
+    def rigid(self, virtual: ArrayLike = 0.0) -> Floats:
+        """Stability of a rigid device with virtual damping, in its shape."""
+        beside = np.asarray(virtual, float)[..., None]
+        every = rigid_limit(self.dampings, self.delays_s, self.period_s, beside)
+        return np.asarray(np.median(every, axis=-1))
+
+    def passive(self, virtual: ArrayLike = 0.0) -> Floats:
+        """Colgate and Schenkel's passivity with virtual damping, in its shape."""
         return passivity_limit(self.damping, self.period_s, virtual)
 
     @property
@@ -60,15 +73,17 @@ class Rules:
         return float(limit)
 
 
-def rules_of(
+def rules_of(model: Model, draws: Floats, label: str = "") -> Rules:
+    """The rules for draws (D, P) of a model whose period is known."""
+    assert model.period_s is not None
+    system = model.system(draws[:: max(len(draws) // RULE_DRAWS, 1)])
+    return Rules(label, ground_damping(system), np.asarray(system.delay_s), model.period_s)
+
+
+def least_damped(
     cases: Sequence[Case], friction: float | None = None, resolution: float | None = None
 ) -> Rules:
     """The rules for the case with the least damping, which they ask the smallest stiffness of."""
-    found = []
-    for case in cases:
-        system = case.model.system(case.draws[:: max(len(case.draws) // RULE_DRAWS, 1)])
-        middle = float(np.median(ground_damping(system)))
-        assert case.model.period_s is not None
-        delay = float(np.median(system.delay_s))
-        found.append(Rules(case.label, middle, delay, case.model.period_s, friction, resolution))
-    return min(found, key=lambda rules: rules.damping)
+    every = (rules_of(case.model, case.draws, case.label) for case in cases)
+    least = min(every, key=lambda rules: rules.damping)
+    return replace(least, friction=friction, resolution=resolution)

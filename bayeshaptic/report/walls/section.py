@@ -9,7 +9,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.report.figures.walls import curve as limits_curve, kb as limits_kb
-from bayeshaptic.report.numbers.rules import rules_of
+from bayeshaptic.report.numbers.rules import least_damped
 from bayeshaptic.report.page.section import Section, section
 from bayeshaptic.report.walls.words import rule_rows, width_rows, words
 from bayeshaptic.stability.cases import FREE, HELD, Case, DeviceLimit
@@ -39,7 +39,7 @@ def limits_section(
     friction, resolution : float, optional
         Coulomb friction and one encoder count, for Abbott and Okamura's rule.
     """
-    rules = rules_of(table.cases, friction, resolution)
+    rules = least_damped(table.cases, friction, resolution)
     figures = {
         "limits_curve": (limits_curve.draw(table), "Probability of being stable over stiffness"),
         "limits_kb": (limits_kb.draw(table, rules), "Stable walls by stiffness and damping"),

@@ -81,7 +81,7 @@ def width_rows(table: LimitTable) -> tuple[tuple[str, ...], ...]:
 
 def rule_rows(table: LimitTable, rules: Rules) -> tuple[tuple[str, ...], ...]:
     """The rules at no damping: name, stiffness, what it says."""
-    rigid, passive = (float(rule(0.0)) for rule in (rules.rigid, rules.passive))  # type: ignore[arg-type]
+    rigid, passive = (float(rule()) for rule in (rules.rigid, rules.passive))
     rows = [
         (
             "(b + B)/(T/2 + td)",
