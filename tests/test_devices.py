@@ -99,6 +99,7 @@ WRONG = {
     "kind = 'rotational'\nperiod_s = 0": "period_s must be a number above 0, not 0",
     "kind = 'rotational'\nperiod_s = true": "period_s must be a number above 0, not True",
     "kind = 'rotational'\ndelay_s = '1e-3'": "delay_s must be a number of at least 0, not '1e-3'",
+    "kind = 'rotational'\nperiod_s = 1e-3\nband_hz = [1, 600]": "band_hz ends above 500 Hz",
     "kind = 'rotational'\ndelay_sd_s = 1e-5": "delay_sd_s without delay_s",
     "kind = 'rotational'\nlever_m = inf": "lever_m must be a number above 0, not inf",
     "kind = 'rotational'\nband_hz = [9, 1]": "band_hz must be two frequencies",

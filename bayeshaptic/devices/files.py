@@ -122,6 +122,9 @@ def device_from_table(
     device = replace(base, **{key: value for key, value in facts.items() if value is not None})
     if device.delay_sd_s is not None and device.delay_s is None:
         raise InputError(f"{where}: delay_sd_s without delay_s; give both, or neither")
+    if device.band_hz and device.period_s and device.band_hz[1] > 0.5 / device.period_s:
+        half = f"half the rate of period_s = {device.period_s:g}"
+        raise InputError(f"{where}: band_hz ends above {0.5 / device.period_s:g} Hz, {half}")
     return device
 
 

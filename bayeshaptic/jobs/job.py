@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from bayeshaptic.arguments import check_fields
@@ -94,5 +94,9 @@ def refuse_file(folder: Path) -> None:
     nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not nearest.is_dir():
         raise InputError(f"{nearest} is a file; name a folder for the report with -o")
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise InputError(f"{nearest}: no permission to write there; name another folder with -o")
+    try:
+        # Permissions do not tell: a root user has all of them on /proc, and cannot write there.
+        TemporaryFile(dir=nearest).close()
+    except OSError as error:
+        where = f"{nearest}: cannot write there ({error.strerror or error})"
+        raise InputError(f"{where}; name another folder with -o") from None
