@@ -33,6 +33,18 @@ def test_stamps_that_were_rounded_are_even(digits: int) -> None:
     assert timing.jitter == 0
 
 
+@pytest.mark.parametrize("coarse_s", [0.015625, 0.1, 1.0])
+@pytest.mark.parametrize("seconds", [3, 10])
+def test_stamps_that_many_rows_share_say_the_period(coarse_s: float, seconds: int) -> None:
+    # Whole seconds of a spreadsheet, the ticks of Windows; the first and last stair are cut off.
+    for first in (0.0, 0.3, 0.7):
+        stamps = np.floor((first + 1e-3 * np.arange(1000 * seconds)) / coarse_s) * coarse_s
+        timing = sampling_period(stamps)
+        # A stair begins within a row, and the outermost are two seconds apart at least.
+        assert timing.period_s == pytest.approx(1e-3, rel=1e-3)
+        assert timing.jitter == 0
+
+
 @pytest.mark.parametrize("jitter", [0.002, 0.02])
 def test_jitter_is_measured(jitter: float) -> None:
     stamps = EVEN + 1e-3 * jitter / np.sqrt(2) * RNG.normal(size=N)
@@ -73,6 +85,7 @@ WRONG = {
     "4 rows have the time of the row before them, the first is row 9 .*twice": np.sort(
         np.append(EVEN, EVEN[[7, 50, 51, 300]])
     ),
+    "most rows have the time .* too coarse .*--period-s": np.floor(EVEN[:1200] + 0.7),
     "the time in row 4 is nan": replaced(3, np.nan),
     "not even: they vary by 58 %": np.cumsum(1e-3 * RNG.uniform(1e-3, 2, size=N)),
     "they vary by 20 %": np.cumsum(1e-3 + 2e-4 * np.clip(RNG.normal(size=N), -4, 4)),
