@@ -85,6 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; never a traceback unless asked for."""
     one_thread_from_the_start()
     collect_garbage_rarely()
+    _open_what_is_closed()
     _write_what_can_be()
     parser = build_parser()
     arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
@@ -112,6 +113,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             "the output of the same command and --debug"
         )
         return 1
+
+
+def _open_what_is_closed() -> None:
+    """Give a process that was started without streams, as by a scheduler, ones that lead nowhere.
+
+    Their numbers would go to the next files that are opened, and what a library prints into those.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
 
 
 def _write_what_can_be() -> None:

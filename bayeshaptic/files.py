@@ -48,7 +48,16 @@ def whole_file(path: Path) -> Iterator[Path]:
 def write_whole(path: Path, text: str) -> None:
     """Write a text file; it is complete, or what was there before."""
     with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+        write_text(partial, text)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write UTF-8, the same on every system.
+
+    A byte of a file's name that is no UTF-8, which Python holds as half of a pair of surrogates,
+    is written as ``\\udce9``: in JSON that is what it stands for, and is read back as it.
+    """
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def is_of_a_report(path: Path) -> bool | None:

@@ -703,6 +703,33 @@ def test_simulate_from_a_posterior_and_from_its_priors(run: Run, tmp_path: Path)
     assert status == 2 and "--from-prior is for a posterior.nc" in only_line(err)
 
 
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names are Unicode there")
+def test_names_that_are_no_utf_8(run: Run, phantom: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    path = folder / os.fsdecode(b"caf\xe9.csv")
+    path.write_bytes(phantom.read_bytes())
+    status, _, err = run("batch", folder, "-o", "out", "--workers", "1", "--quiet", *RIGID)
+    assert status == 0, err
+    made = tmp_path / "out" / path.stem
+    summary = json.loads((made / "summary.json").read_text(encoding="utf-8"))
+    assert summary["recording"]["file"] == str(path)
+    assert r"caf\udce9" in (made / "report.html").read_text(encoding="utf-8")
+    # Done and unchanged, by the manifest.
+    assert run("status", "out")[0] == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX closes streams")
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_streams_change_nothing(phantom: Path, tmp_path: Path, closed: str) -> None:
+    """As schedulers and services start programs."""
+    program = [sys.executable, "-m", "bayeshaptic", "inspect", phantom, "--write", "study.toml"]
+    line = f"{shlex.join(map(str, program))} {closed}"
+    done = subprocess.run(["sh", "-c", line], cwd=tmp_path, capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "study.toml").read_text(encoding="utf-8").startswith("# A study")
+
+
 def test_effects_are_parsed() -> None:
     assert parse_effect("reflex") == ("reflex", {})
     assert parse_effect("a=x:1.5,y:-2e-3") == ("a", {"x": 1.5, "y": -2e-3})

@@ -9,6 +9,7 @@ from typing import Any
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.files import write_text
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.pictures import (
     FORCE_PICTURES,
@@ -91,8 +92,8 @@ def _write_all(result: Result, folder: Path, origin: Mapping[str, Any] | None) -
     if analysis.sampled:
         analysis.stated.save(folder / "posterior.nc")
     page = render(result, pictures, [section.html for section in sections], origin)
-    (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
-    (folder / _LAST).write_text(summary_json(result, origin), encoding="utf-8", newline="\n")
+    write_text(folder / "report.html", page)
+    write_text(folder / _LAST, summary_json(result, origin))
 
 
 def _sections(result: Result, folder: Path) -> tuple[Section, ...]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bayeshaptic.arguments import at_the_door
+from bayeshaptic.files import write_text
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
 from bayeshaptic.report.guidance.section import FIGURES as ADVICE, guidance_section
@@ -81,8 +82,8 @@ def _write_all(study: StudyAnalysis, folder: Path, links: Mapping[str, str], wal
         for name, drawn in shown.items():
             (folder / f"{name}.png").write_bytes(drawn.png)
     page = render_study(study, pictures, links, [part.html for part in sections])
-    (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
-    (folder / _LAST).write_text(population_json(study), encoding="utf-8", newline="\n")
+    write_text(folder / "report.html", page)
+    write_text(folder / _LAST, population_json(study))
 
 
 def _sections(study: StudyAnalysis, folder: Path) -> list[Section]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.arguments import at_the_door
+from bayeshaptic.files import write_text
 from bayeshaptic.quantities import percent, rounded_down
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit, device_limit
@@ -144,7 +145,7 @@ class LimitTable(Shown):
             ("limits.csv", self.as_csv()),
             ("limits.json", self.as_json(device, status, recommended)),
         ):
-            (Path(folder) / name).write_text(text, encoding="utf-8", newline="\n")
+            write_text(Path(folder) / name, text)
 
     def _by_risk(self, values: Sequence[float | None]) -> dict[str, float | None]:
         stated = values if self.reason is None else [None] * len(values)
