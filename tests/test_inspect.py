@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shlex
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -296,6 +298,41 @@ def test_a_guess_is_called_so_and_a_clock_asked_for(tmp_path: Path) -> None:
         read_recording(path, found.mapping)
     np.savetxt(path, columns, header="t (millisec),u,x", comments="", delimiter=",")
     assert read_recording(path, overview(path).mapping).period_s == pytest.approx(0.1)
+
+
+def test_one_row_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.csv").write_text("time_s,force_n,position_m\n1,2,3\n", encoding="utf-8")
+    assert cli.main(["inspect", str(tmp_path / "a.csv")]) == 2
+    assert "no column has more than one number" in capsys.readouterr().err
+
+
+def test_the_recording_is_never_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path / "a.csv", "t,u,y,v")
+    before = path.read_bytes()
+    for option in ("--write", "--png"):
+        assert cli.main(["inspect", str(path), option, str(path), "--force"]) == 2
+        assert "is the recording itself" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+def test_a_study_names_files_of_any_letters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """JSON writes a sign beyond 16 bits as two surrogates, which TOML does not know."""
+    study = tmp_path / "study.toml"
+    assert cli.main(["inspect", str(write(tmp_path / "\U0001f600.csv", "t,u,y,v"))]) == 0
+    path = tmp_path / "\U0001f600.csv"
+    assert cli.main(["inspect", str(path), "--write", str(study)]) == 0
+    (recording,) = read_study(study).read_all()
+    assert recording.samples == N
+    if os.name == "nt" or sys.platform == "darwin":
+        return  # where a name is never other than Unicode
+    path = path.rename(tmp_path / os.fsdecode(b"caf\xe9.csv"))
+    assert cli.main(["inspect", str(path), "--write", str(tmp_path / "b.toml")]) == 2
+    assert "caf?.csv: a study cannot name what is no UTF-8" in capsys.readouterr().err
+    assert not (tmp_path / "b.toml").exists()
 
 
 def test_a_second_header_is_named(tmp_path: Path) -> None:

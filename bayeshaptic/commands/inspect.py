@@ -45,7 +45,11 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.recordings.overview.overview import overview
 
     for path in (arguments.png, arguments.write):
-        if path is not None and path.exists() and not arguments.force:
+        if path is None or not path.exists():
+            continue
+        if path.samefile(arguments.recording):
+            raise InputError(f"{path} is the recording itself; name another file to write")
+        if not arguments.force:
             raise InputError(f"{path} exists; name another file, or overwrite it with --force")
     found = overview(arguments.recording)
     for line in lines(found):
@@ -175,7 +179,7 @@ def study_text(found: Overview, path: Path, mapping: str | None) -> str:
         kind, other = other, kind
     columns = f"""\
 # A guess: check the names, and write factors and units, as in position=enc*3.14e-6[m].
-columns = {json.dumps(mapping or "time=...,force=...,position=...")}"""
+columns = {_toml(mapping or "time=...,force=...,position=...")}"""
     if found.of_a_response:
         columns = "period_s = 1e-3                 # of the loop: a table does not say it"
     file = os.path.relpath(found.path.resolve(), path.resolve().parent).replace(os.sep, "/")
@@ -189,9 +193,18 @@ kind = {f'"{kind}"':24} # or "{other}"
 {columns}
 
 [[recording]]
-file = {json.dumps(file)}
+file = {_toml(file)}
 # user = "Anna"                 # nobody holds the device where there is no user
 """
+
+
+def _toml(text: str) -> str:
+    """Text in quotes; TOML has no name for bytes that are no UTF-8."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{text}: a study cannot name what is no UTF-8; rename it") from None
+    return json.dumps(text, ensure_ascii=False)
 
 
 def draw(found: Overview, path: Path) -> None:

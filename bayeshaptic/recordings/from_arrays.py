@@ -135,7 +135,7 @@ def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
     if signal.ndim != 1 or signal.size == 0:
         shape = np.shape(values)
         raise InputError(
-            f"{where}: {what} must be one row of samples, not an array of shape {shape}"
+            f"{where}: {what} must be one row of two samples or more, not an array of shape {shape}"
         )
     bad = np.flatnonzero(~np.isfinite(signal))
     if len(bad):

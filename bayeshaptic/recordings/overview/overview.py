@@ -78,9 +78,11 @@ def overview(path: Path) -> Overview:
     Raises
     ------
     InputError
-        See `read_arrays`.
+        See `read_arrays`; also where no column has more than one number.
     """
     arrays = read_arrays(path)
+    if all(len(values) < 2 for values in arrays.values()):
+        raise InputError(f"{path}: no column has more than one number; record more than a sample")
     seen: dict[int, str] = {}
     for name, values in arrays.items():
         # Of several names the last is the signal's own, where it can be written in a mapping.
