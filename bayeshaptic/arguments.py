@@ -140,7 +140,8 @@ def shown(value: Any) -> str:
     if isinstance(value, str | Real | None) or isinstance(value, tuple | list) and len(value) < 4:
         text = " ".join(repr(value).split())
         return text if len(text) <= 60 else f"{text[:57]}..."
-    return f"of type {type(value).__name__}"
+    dtype = getattr(value, "dtype", None)  # of an array it is what it holds that is wrong
+    return f"of type {type(value).__name__}{f' of {dtype}' if dtype is not None else ''}"
 
 
 def _check(name: str, value: Any, annotation: str, names: Names) -> None:

@@ -133,6 +133,10 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
         (lambda: REGION.quantile(0.05, [np.nan]), "damping is [nan]; give numbers other than NaN"),
         (lambda: FREE_MODEL.prior("zz"), "no parameter zz in the free model; it has m1, b1"),
         (lambda: FREE_MODEL.unit("zz"), "no parameter zz in the free model"),
+        (
+            lambda: bh.recording_from_arrays(np.array(["1"] * 9), np.ones(9), 1e-3),
+            "force is of type ndarray of <U1; give numbers",
+        ),
         (lambda: FREE_MODEL.response({"m1": 1}, [1.0]), "theta is of type dict; give numbers"),
         (lambda: FREE_MODEL.with_effect("reflex"), "effect is 'reflex'; give an effect"),
         (lambda: bh.elasticities(3), "source is 3; give a Model, Fit, Posterior"),
