@@ -298,6 +298,9 @@ DIALECTS = {
     "21.11.2026 0:00:00,-2.5,3\n21.11.2026 0:00:00.001,1e1,4\n",
     "12 h": "time_s;force_n;position_m\n12:59:59,999 PM;1,5;2\n1:00:00,000 PM;-2,5;3\n"
     "1:00:00,001 PM;10;4\n",
+    "hour": "time_s,force_n,position_m\n59:59.999,1.5,2\n00:00.000,-2.5,3\n00:00.001,1e1,4\n",
+    "durations": "Time,Force,Position (m)\n0 sec,1.5 N,2\n0.001 sec,-2.5 N,3\n0.002 sec,10 N,4\n",
+    "empty row": "Time;Force;Position\nms;N;mm\n;;\n0;1,5;2000\n1;-2,5;3000\n2;1e1;4000\n",
     "waveform": "waveform,[0],[1]\ndelta t,0.001,0.001\n\ntime_s,force_n,position_m\n"
     "2026-11-20T10:11:12.100Z,1.5,2\n2026-11-20T10:11:12.101Z,-2.5,3\n"
     "2026-11-20T10:11:12.102Z,1e1,4\n",
@@ -383,6 +386,16 @@ def test_arrays_of_no_real_numbers_are_named(tmp_path: Path) -> None:
     np.savez(path, o=np.array(list(FORCE), dtype=object))
     with pytest.raises(InputError, match="no vectors of numbers"):
         read_recording(path)
+
+
+def test_dates_and_durations_of_numpy_are_seconds(tmp_path: Path) -> None:
+    """As pandas has them."""
+    path = tmp_path / "a.npz"
+    since = np.round(1e9 * TIME).astype("timedelta64[ns]")
+    for clock in (since, np.datetime64("2026-11-20T23:59:59.9") + since):
+        np.savez(path, t=clock, u=FORCE, q=POSITION)
+        recording = read_recording(path, "time=t,force=u[N],position=q[m]")
+        assert recording.period_s == pytest.approx(TIME[1] - TIME[0], rel=1e-6)
 
 
 def test_columns_without_a_header(tmp_path: Path) -> None:

@@ -19,15 +19,20 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.readers.layout import NUMBER, find_layout
 from bayeshaptic.recordings.readers.numbers import THOUSANDS
 from bayeshaptic.recordings.readers.reader import MOST_TEXT, Arrays, Reader
+from bayeshaptic.recordings.units import is_unit
 from bayeshaptic.types import Floats
 
 Lines = list[tuple[int, str]]
 
 # Where a field was left empty, or something was written for nothing.
 _MISSING = ("", "-", "--", "na", "n/a", "#n/a", "null", "none")
+# Without hours, as spreadsheets show short times, the seconds have a fraction: 12:34 may be hours.
 _CLOCK = re.compile(
-    r".*?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d*)?)\s*(?:[ap]\.?m\.?|z|[-+]\d\d:?\d\d)?", re.I
+    r".*?(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d*)?)|(\d{1,2}):(\d\d[.,]\d+))"
+    r"\s*(?:[ap]\.?m\.?|z|[-+]\d\d:?\d\d)?",
+    re.I,
 )
+_WITH_UNIT = re.compile(rf"(?P<number>{NUMBER.pattern})\s*(?P<unit>[^\W\d]\S*)", re.I)
 _POINT = re.compile(r"[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?")
 _DECLARED = re.compile(r'"?sep=(?P<separator>[^"])"?', re.I)
 
@@ -187,7 +192,8 @@ def _counted(fields: list[str]) -> str:
 def typed_columns(names: list[str], rows: list[list[str]]) -> Arrays:
     """Columns of text as numbers where all of a column are, with a decimal point or comma.
 
-    What is left empty among numbers is NaN, and clock times are seconds.
+    What is left empty among numbers is NaN, and clock times are seconds. A unit behind each number
+    of a column, as in MATLAB's durations (0.001 sec), goes with the name.
     """
     columns: Arrays = {}
     commas = _comma_is_decimal(rows, any("." in field for row in rows for field in row))
@@ -195,6 +201,9 @@ def typed_columns(names: list[str], rows: list[list[str]]) -> Arrays:
         text = np.array(column)
         missing = np.isin(np.char.lower(text), _MISSING)
         numbers = _numbers_of(text[~missing], commas)
+        if numbers is None and (unit := _unit_of_each(text[~missing])):
+            bare = np.array([_WITH_UNIT.sub(r"\g<number>", one) for one in text[~missing]])
+            numbers, name = _numbers_of(bare, commas), f"{name} ({unit})"
         if numbers is None:
             columns[name] = text
         else:
@@ -249,14 +258,23 @@ def _numbers_of(text: NDArray[np.str_], commas: bool) -> Floats | None:
     return _seconds(text)
 
 
+def _unit_of_each(text: NDArray[np.str_]) -> str | None:
+    """The unit that stands behind every number, where it is one and the same."""
+    found = list(map(_WITH_UNIT.fullmatch, text))
+    units = {one["unit"] if one else "" for one in found}
+    return next(iter(units)) if len(units) == 1 and all(map(is_unit, units)) else None
+
+
 def _seconds(text: NDArray[np.str_]) -> Floats | None:
     """Times of the day, with any date before them, in seconds since the first one's midnight."""
     found = [one for one in map(_CLOCK.fullmatch, text) if one]
     if len(found) < len(text):
         return None
-    clock = np.array([[float(part.replace(",", ".")) for part in one.groups()] for one in found])
-    # Twelve hours and twenty-four begin anew; a recording takes less than half of either.
-    return np.unwrap(clock @ [3600.0, 60.0, 1.0], period=12 * 3600.0)
+    parts = [[part.replace(",", ".") for part in one.groups("0")] for one in found]
+    clock = np.array(parts, dtype=float) @ [3600.0, 60.0, 1.0, 60.0, 1.0]
+    # Twelve hours and twenty-four begin anew, and so does the one where none is shown; a recording
+    # takes less than half of it.
+    return np.unwrap(clock, period=12 * 3600.0 if found[0][1] else 3600.0)
 
 
 _SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz", ".dat", ".asc", ".lvm")

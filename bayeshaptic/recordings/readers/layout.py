@@ -108,9 +108,11 @@ def _names(
             fields = fields[:-1]
         return fields if len(fields) in widths and not any(map(_is_number, fields)) else None
 
-    above = header(first - 1)
+    # Between header and numbers there may be a row of nothing but separators.
+    last = next((row for row in reversed(range(first)) if any(fields_of(row))), -1)
+    above = header(last)
     if above is not None:
-        higher = header(first - 2)
+        higher = header(last - 1)
         units = [field.strip("[]()- ") for field in above]
         if higher is not None and any(units) and all(not u or is_unit(u) for u in units):
             pairs = zip_longest(higher, units[:width], fillvalue="")

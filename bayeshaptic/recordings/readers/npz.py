@@ -48,12 +48,14 @@ def _read(file: IO[Any], path: Path, name: str) -> Arrays:
     shape, by_columns, dtype = read_header(file)
     if dtype.kind in "Oc":
         return {name: np.array([NO_NUMBERS])}
-    if dtype.kind not in "iufb" or not is_signal(shape):
+    if dtype.kind not in "iufbmM" or not is_signal(shape):
         return {}
     refuse_size(shape, f"{path}: '{name}'")
     count = int(np.prod(shape, dtype=np.int64))
     content = file.read(count * dtype.itemsize)
     values = np.frombuffer(content, dtype, count).reshape(shape, order="F" if by_columns else "C")
+    if dtype.kind in "mM":  # dates and durations, in seconds since the first
+        values = (values - values.flat[0]) / np.timedelta64(1, "s")
     return vectors(name, values)
 
 
