@@ -11,7 +11,8 @@ from csv_signals import FORCE, MAPPING, POSITION, SIGNALS, write_csv
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import read_recording
-from bayeshaptic.recordings.columns import parse_columns
+from bayeshaptic.recordings.columns import name_and_unit, parse_columns
+from bayeshaptic.recordings.units import is_assumed
 
 
 def test_a_force_that_is_called_volts(tmp_path: Path) -> None:
@@ -139,12 +140,51 @@ def test_a_name_that_ends_in_a_unit_is_read_in_it(
 def test_the_note_says_that_a_unit_is_by_the_name(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     write_csv(path, "t,u,theta_deg")
-    (note,) = read_recording(path, "time=t,force=u,position=theta_deg").notices
+    assumed, note = read_recording(path, "time=t,force=u,position=theta_deg").notices
     assert "the position 'theta_deg' in deg" in note.text
-    assert "the force, which is taken to be in Nm" in note.text
+    assert "The force's unit is not given: it is taken to be in Nm" in assumed.text
     assert not read_recording(path, "time=t,force=u[Nm],position=theta_deg[deg]").notices
     with pytest.raises(InputError, match=r"multiplied by 2; .* position=...\*2\[deg\]"):
         read_recording(path, "time=t,force=u,position=theta_deg*2")
+
+
+@pytest.mark.parametrize(
+    ("force", "position", "assumed"),
+    [
+        ("u", "q", ("force", "position")),
+        ("u", "q[m]", ("force",)),
+        ("u[N]", "q", ("position",)),
+        ("u[A]", "q", ("position",)),
+        ("u[N]", "q[mm]", ()),
+    ],
+)
+def test_whatever_unit_nobody_said_is_noted(
+    tmp_path: Path, force: str, position: str, assumed: tuple[str, ...]
+) -> None:
+    """A force in N beside millimetres that were taken for metres: nothing told."""
+    write_csv(tmp_path / "a.csv", "t,u,q")
+    recording = read_recording(tmp_path / "a.csv", f"time=t,force={force},position={position}")
+    said = [what for what in ("force", "position") if is_assumed(what, recording.notices)]
+    assert tuple(said) == assumed
+    units = {"force": recording.force_unit, "position": recording.position_unit}
+    if len(assumed) == 1:
+        text = f"The {assumed[0]}'s unit is not given: it is taken to be in {units[assumed[0]]}."
+        assert recording.notices[0].text.startswith(text)
+
+
+def test_a_unit_in_the_middle_of_a_name(tmp_path: Path) -> None:
+    header = "t [ms] rel,Force (kN) command,Position [mm] - axis 1"
+    write_csv(tmp_path / "a.csv", header)
+    time, force, position = header.split(",")
+    for mapping in (
+        f"time={time},force={force},position={position}",
+        "time=t rel,force=Force command,position=Position - axis 1",
+    ):
+        recording = read_recording(tmp_path / "a.csv", mapping)
+        assert recording.period_s == pytest.approx(1e-3 * (SIGNALS["t"][1] - SIGNALS["t"][0]))
+        np.testing.assert_allclose(recording.force, 1e3 * FORCE)
+        np.testing.assert_allclose(recording.position, 1e-3 * POSITION)
+    assert name_and_unit("group/Position (mm)/time") == ("group/Position (mm)/time", None)
 
 
 def test_units_in_headers(tmp_path: Path) -> None:

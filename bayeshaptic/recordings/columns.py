@@ -46,7 +46,8 @@ _PLAIN_HEADERS = {
 
 _MOST_LISTED = 20  # arrays of a file in a message, which is one line
 _EXAMPLE = "time=t,force=u,position=q"
-_WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*[(\[](?P<unit>[^()\[\]]+)[)\]]")
+# In the last part of a name: that of group/channel (mm)/time says nothing of the time.
+_IN_BRACKETS = re.compile(r"\s*[(\[](?P<unit>[^()\[\]]+)[)\]](?=[^/.]*$)")
 _EXPRESSION = re.compile(
     r"(?P<name>.+?)"
     r"(?:\s*(?P<sign>[*/])\s*(?P<factor>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?))?"
@@ -150,11 +151,12 @@ def played_by(roles: tuple[str, ...], mapping: Mapping[str, Column], path: Path)
 
 
 def name_and_unit(name: str) -> tuple[str, str | None]:
-    """``Position (mm)`` as the name and the unit in brackets; None where that is no unit."""
-    match = _WITH_UNIT.fullmatch(name)
-    if match is None or not is_unit(match["unit"]):
-        return name, None
-    return match["name"], match["unit"]
+    """``Position (mm)`` or ``Position [mm] axis 1`` as the name and the unit; None without one."""
+    for match in reversed(list(_IN_BRACKETS.finditer(name))):
+        rest = (name[: match.start()] + name[match.end() :]).strip()
+        if rest and is_unit(match["unit"]):
+            return rest, match["unit"]
+    return name, None
 
 
 def default_unit(role: str, name: str) -> tuple[bool, str | None]:

@@ -16,7 +16,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.runs import written_each
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped
-from bayeshaptic.recordings.units import choose_units
+from bayeshaptic.recordings.units import assumed_units, choose_units
 from bayeshaptic.types import Floats
 
 
@@ -89,12 +89,7 @@ def recording_from_arrays(
         followed = None if followed is None else followed[first % often :: often]
         timing = replace(timing, period_s=often * timing.period_s)
         notices += (_written_each(often, timing.period_s),)
-    if force_unit is None and position_unit is None:
-        text = (
-            f"No units were given: the force is taken to be in {unit_of_force}, the position in "
-            f"{unit_of_position}. Say otherwise with --columns, as in position=q[mm]."
-        )
-        notices += (Notice("note", "units", text, ("force", "position")),)
+    notices += assumed_units(force_unit, position_unit, unit_of_force, unit_of_position)
     return Recording(
         force=force,
         position=position,

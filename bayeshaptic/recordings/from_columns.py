@@ -98,7 +98,7 @@ def recorded(path: Path, arrays: Arrays, said: Said) -> Recording:
     )
     recording = as_command_and_position(recording, force, position)
     bare = {role: mapping[role].names[-1] for role in mapping if mapping[role].unit is None}
-    notices = said_by_names(bare, written, recording.force_unit)
+    notices = said_by_names(bare, written)
     if units[force] is None and force in mapping:
         notices = (*notices, *_of_volts(force, mapping[force], recording.force_unit))
     return replace(recording, notices=recording.notices + notices)

@@ -80,7 +80,6 @@ _CURES = {
     "position": "; multiply counts by the size of one, as in position=counts*3.1e-6[m]",
 }
 _VOLTS = re.compile(r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$")
-_OUTPUTS = ("position", "velocity", "acceleration")
 _BY_ROLE = {
     "time": _TIME,
     "force": _FORCE,
@@ -163,26 +162,34 @@ def unit_in_name(role: str, name: str) -> str | None:
     return None
 
 
-def said_by_names(
-    names: Mapping[str, str], units: Mapping[str, str | None], force_unit: str
-) -> tuple[Notice, ...]:
-    """A note of which `units` the ends of `names` say, by their roles, and of a force's if none.
-
-    Where none is said of anything there is a note already.
-    """
+def said_by_names(names: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:
+    """A note of which `units` the ends of `names` say, by their roles."""
     said = [role for role in names if units.get(role) == (unit_in_name(role, names[role]) or ...)]
-    nobody = any("force" in role and unit is None for role, unit in units.items())
-    text = ", ".join(f"the {role} '{names[role]}' in {units[role]}" for role in said)
-    assumed = f"nothing says that of the force, which is taken to be in {force_unit}"
-    if said:
-        text = f"By its name is {text}{f'; {assumed}' if nobody else ''}."
-    elif nobody and any(units.get(role) is not None for role in _OUTPUTS):
-        text = f"The force's unit is not given: it is taken to be in {force_unit}."
-    else:
+    if not said:
         return ()
-    example = said[0] if said else "force"
-    text += f" Say otherwise with --columns, as in {example}=NAME[UNIT]."
-    return (Notice("note", "units", text, ("force",) if nobody else ()),)
+    text = ", ".join(f"the {role} '{names[role]}' in {units[role]}" for role in said)
+    text = f"By its name is {text}. Say otherwise with --columns, as in {said[0]}=NAME[UNIT]."
+    return (Notice("note", "units", text),)
+
+
+def assumed_units(
+    force_unit: str | None, position_unit: str | None, force_in: str, position_in: str
+) -> tuple[Notice, ...]:
+    """A note of what nobody said the unit of, and which one was taken (`choose_units`)."""
+    said, taken = (force_unit, position_unit), {"force": force_in, "position": position_in}
+    assumed = tuple(what for what, unit in zip(taken, said, strict=True) if unit is None)
+    if not assumed:
+        return ()
+    text = (
+        f"The {assumed[0]}'s unit is not given: it is taken to be in {taken[assumed[0]]}. Say "
+        f"otherwise with --columns, as in {assumed[0]}=NAME[UNIT]."
+    )
+    if len(assumed) == 2:
+        text = (
+            f"No units were given: the force is taken to be in {force_in}, the position in "
+            f"{position_in}. Say otherwise with --columns, as in position=q[mm]."
+        )
+    return (Notice("note", "units", text, assumed),)
 
 
 def is_assumed(quantity: str, notices: Iterable[Notice]) -> bool:
