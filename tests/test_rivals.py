@@ -61,6 +61,8 @@ def test_one_delay_and_one_lag_share_the_probability(etfe: Etfe) -> None:
     before = limit_of(late.state.fit, np.random.default_rng(0))
     limit, traced = with_rivals(before, traced_as(late, lag))
     (own,) = traced.state.accepted
+    (told,) = traced.table({})["effects"]  # as in summary.json
+    assert told["probabilities"] == own.probabilities
     assert own.limit_log_sd == 0 and set(own.probabilities) == {"extra_delay", "actuator_lag"}
     # Alike in the band but for what a lag takes off the gain: the likelihoods say how far.
     apart = late.state.fit.log_likelihood - lag.state.fit.log_likelihood

@@ -138,6 +138,7 @@ def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dic
         "parameters": parameters,
         "evidence": effect.evidence,
         "ties": list(effect.ties),
+        "probabilities": dict(effect.probabilities),
     }
 
 
