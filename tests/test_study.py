@@ -207,7 +207,7 @@ def test_no_study(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_study(tmp_path / "none.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="cannot be read as text"):
+    with pytest.raises(InputError, match="cannot be read as text .*save it as UTF-8"):
         read_study(tmp_path / "binary.toml")
 
 

@@ -40,7 +40,11 @@ def read_toml(path: Path) -> dict[str, Any]:
         text = content.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: cannot be read as text ({error}); save it as UTF-8, as TOML is"
+        ) from None
+    except OSError as error:
         raise InputError(f"{path}: cannot be read as text ({error})") from None
     # The time that the parser takes grows with the square of what stands in one line.
     if len(content) > MOST_BYTES or max(map(len, text.splitlines()), default=0) > LONGEST_LINE:
