@@ -730,6 +730,37 @@ def test_closed_streams_change_nothing(phantom: Path, tmp_path: Path, closed: st
     assert (tmp_path / "study.toml").read_text(encoding="utf-8").startswith("# A study")
 
 
+WRITING = {
+    "recording": "simulate('phantom', '-o', 'a.h5')",
+    "posterior": "write({'posterior': Group({'x': Variable(('d',), np.ones(99999))}, {})}, path)",
+}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a limit of POSIX, which stands for a full disk")
+@pytest.mark.parametrize("what", WRITING)
+def test_a_full_disk_is_an_error_and_no_crash(tmp_path: Path, what: str) -> None:
+    """The HDF5 library crashes the process where a file that it writes cannot grow."""
+    script = f"""
+import resource, sys
+from pathlib import Path
+import numpy as np
+from bayeshaptic.cli import main
+from bayeshaptic.inference.saved.netcdf import Group, Variable, write
+resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+path = Path("a.nc")
+simulate = lambda *words: sys.exit(main(["simulate", *words]))
+try:
+    {WRITING[what]}
+except OSError as error:
+    sys.exit(2)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, timeout=120
+    )
+    assert done.returncode == 2, done.stderr
+    assert b"Traceback" not in done.stderr and not list(tmp_path.iterdir())
+
+
 def test_effects_are_parsed() -> None:
     assert parse_effect("reflex") == ("reflex", {})
     assert parse_effect("a=x:1.5,y:-2e-3") == ("a", {"x": 1.5, "y": -2e-3})

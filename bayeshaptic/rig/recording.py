@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -126,9 +127,12 @@ def _write_npz(path: Path, recording: SimulatedRecording) -> None:
 def _write_hdf5(path: Path, recording: SimulatedRecording) -> None:
     import h5py
 
-    with h5py.File(path, "w") as file:
+    # In memory first: the HDF5 library does not survive a disk or a quota that is full.
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
         for name, values in recording.columns.items():
             file.create_dataset(name, data=values, compression="gzip")
+    path.write_bytes(content.getbuffer())
 
 
 def _write_mat(path: Path, recording: SimulatedRecording) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import errno
-import os
-import shutil
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,12 +46,6 @@ class Group:
     coordinates: Mapping[str, Variable]
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
-    def nbytes(self) -> int:
-        """Size of the arrays."""
-        every = (*self.variables.values(), *self.coordinates.values())
-        return sum(variable.values.nbytes for variable in every)
-
 
 def dataset(group: Group) -> Any:
     """`group` as an xarray.Dataset."""
@@ -73,17 +65,17 @@ def write(groups: Mapping[str, Group], path: Path) -> None:
     Raises
     ------
     OSError
-        If the disk has no room for it: the HDF5 library does not survive one that fills up.
+        If the disk, or what of it is the user's, has no room for it.
     """
     import h5netcdf
 
-    room = 1 << 20  # bytes, beside the arrays
-    needed = sum(group.nbytes for group in groups.values()) + room
-    if shutil.disk_usage(path.absolute().parent).free < needed:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    with whole_file(path) as partial, h5netcdf.File(partial, "w") as file:
+    # In memory first: the HDF5 library does not survive a disk or a quota that is full.
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
         for name, group in groups.items():
             _write_group(file.create_group(name), group)
+    with whole_file(path) as partial:
+        partial.write_bytes(content.getbuffer())
 
 
 def _write_group(into: Any, group: Group) -> None:
