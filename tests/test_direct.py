@@ -8,10 +8,14 @@ from scipy.signal import lfilter
 
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals.causal import scores
+from bayeshaptic.inference.least_squares import least_squares, likeliest
+from bayeshaptic.models import grasped
+from bayeshaptic.models.start import informed, starting_points
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
+from benchmarks.strangers.any_loop import make
 
 
 def loop(seed, held=False, friction=0.0, seconds=8.0, lacking=None, known=False):
@@ -126,3 +130,18 @@ def test_a_device_that_is_declared_to_be_one_mass_is_followed_in_time():
     bench, _, recording = loop(8)
     closed = close_loop(recording, "rigid", hidden=False, delay_s=bench.delay_s)
     assert not closed.analysis.etfe.direct
+
+
+def test_a_held_device_in_a_loop_is_fitted_from_more_than_one_set_of_starting_points():
+    """What a fit leaves is the noise, so that one in the wrong valley does not look like it."""
+    case = make(1221, clean=True)
+    assert case is not None
+    etfe = estimate_by_direct_method(case.recording)
+    model = grasped(period_s=case.recording.period_s, delay_s=case.told["delay_s"])
+    model = informed(model, etfe)
+    starts = starting_points(model, etfe, np.random.default_rng([7, 0]))
+    wrong = least_squares(model, etfe, start=starts)
+    found = least_squares(model, etfe)
+    assert wrong.reduced_chi_square == found.reduced_chi_square == 1.0
+    assert found.log_likelihood > wrong.log_likelihood + 100
+    assert likeliest(wrong, etfe).log_likelihood == pytest.approx(found.log_likelihood, abs=0.1)

@@ -26,6 +26,7 @@ from bayeshaptic.types import Floats
 SETS = 6
 # In closed loop: of 70 simulated ones most settle in four, some short ones not in twenty.
 _REWEIGHINGS, _SETTLED = 20, 0.02
+_SAME_VALLEY = 1.0  # log likelihood, within which two fits are one
 
 
 @at_the_door
@@ -43,8 +44,8 @@ def least_squares(
     The residual of every window is weighted by the noise that the window itself shows; priors only
     bound the search (at six standard deviations).  The windows are compressed anew around each
     fit, because only the ratio to a good first fit is smooth beside a resonance.  Where the model
-    misfits, more sets of starting points follow; some of these have a mode above half the sampling
-    rate.  Of a chain one mode after the other is looked for elsewhere.
+    misfits, and in closed loop, more sets of starting points follow; some of these have a mode
+    above half the sampling rate.  Of a chain one mode after the other is looked for elsewhere.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def least_squares(
         For a chain: what its starting points grow from, where that was fitted before; with whatever
         priors, which only bound a search.
     most_sets : int
-        Sets of starting points for a model that misfits.
+        Sets of starting points for a model that misfits, and in closed loop.
 
     Returns
     -------
@@ -78,9 +79,41 @@ def least_squares(
     fit = _followed(model, etfe, first)
     if shorter_chain(model) is not None:
         fit = _with_modes_moved(fit, etfe, most_sets - 1)
+    elif etfe.direct:
+        fit = likeliest(fit, etfe, seed, most_sets - 1)
     elif fit.misfits:
         fit = _from_other_sets(fit, first, etfe, seed, most_sets - 1)
     return replace(fit, etfe=etfe)
+
+
+def likeliest(fit: Fit, etfe: Etfe, seed: int = 0, most: int = SETS) -> Fit:
+    """The fit in closed loop, or a likelier one that other sets of starting points lead to.
+
+    What a fit leaves is its noise there, so that none says that it misfits: of 13 held devices five
+    ended 4 to 92 in log likelihood short of the likeliest valley, of eight free ones none.  No more
+    sets are taken once that has been found twice.
+
+    Parameters
+    ----------
+    fit : Fit
+    etfe : Etfe
+        Of the direct method.
+    seed : int
+        For the starting points.
+    most : int
+        Sets of them.
+    """
+    found = [fit]
+    for another in range(1, most + 1):
+        nearly = max(one.log_likelihood for one in found) - _SAME_VALLEY
+        if sum(one.log_likelihood > nearly for one in found) > 1:
+            break
+        rng = np.random.default_rng([seed, another])
+        found.append(_fit(fit.model, etfe, starting_points(fit.model, etfe, rng)))
+    best = max(found, key=lambda one: one.log_likelihood)
+    near = [part for one in found for part in one.alike]
+    near += [one.theta for one in found if one is not best]
+    return replace(best, alike=np.reshape(near, (-1, fit.model.size)), etfe=etfe)
 
 
 def _from_other_sets(fit: Fit, first: Optimum, etfe: Etfe, seed: int, most: int) -> Fit:
