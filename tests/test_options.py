@@ -66,6 +66,8 @@ def test_a_delay_of_milliseconds_in_seconds_is_refused(function, options) -> Non
         function(RECORDING, **options)
     with pytest.raises(bh.InputError, match="a loop delay of 2 s is 2,000 sampling periods"):
         function(RECORDING, bh.free("phantom", delay_s=2.0))
+    with pytest.raises(bh.InputError, match="a delay_sd_s says nothing without delay_s"):
+        function(RECORDING, delay_sd_s=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -132,6 +132,8 @@ def _refuse_delay(
     if device is not None:
         delay_s = device.delay_s if delay_s is None else delay_s
         sd_s = device.delay_sd_s if sd_s is None else sd_s
+    if delay_s is None and sd_s is not None:
+        raise InputError("a delay_sd_s says nothing without delay_s; give both, or neither")
     named = (("loop delay", delay_s), ("standard deviation of the loop delay", sd_s))
     for what, value in named:
         if value is not None and MOST_PERIODS * period_s < value < math.inf:
