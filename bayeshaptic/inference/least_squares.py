@@ -117,9 +117,8 @@ def likeliest(fit: Fit, etfe: Etfe, seed: int = 0, most: int = SETS) -> Fit:
 def _log_density(fit: Fit) -> float:
     """Log posterior density, in the coordinates of the search, up to a constant."""
     here, _, _ = search_box(fit.model)
-    prior = fit.model.log_prior(fit.theta[None]) + here.log_jacobian(
-        here.coordinate(fit.theta[None])
-    )
+    theta = fit.theta[None]
+    prior = fit.model.log_prior(theta) + here.log_jacobian(here.coordinate(theta))
     return fit.log_likelihood + float(prior[0])
 
 
