@@ -13,7 +13,7 @@ import bayeshaptic as bh
 from bayeshaptic.models import build_model
 from bayeshaptic.report.figures.style import drawn
 from bayeshaptic.report.figures.walls import kb
-from bayeshaptic.report.numbers.rules import least_damped
+from bayeshaptic.report.numbers.rules import least_damped, rules_of
 from bayeshaptic.report.walls.section import limits_section
 from bayeshaptic.stability.cases import Case
 from bayeshaptic.stability.walls.damping import Backward, LowPass
@@ -142,6 +142,15 @@ def test_least_damped_the_case_with_the_least_damping(one):
     assert (
         rules.label == "nobody holds it"
     )  # 6.9 N s/m to the ground; held 4.1, and 18.3 of the hand
+
+
+def test_rules_are_the_same_in_whatever_order_the_draws_come():
+    """A page tells them twice, from the same draws in two orders."""
+    many = case("free", "phantom", draws=10_500, spread=0.05)
+    shuffled = np.random.default_rng(0).permutation(many.draws)
+    one, other = (rules_of(many.model, draws) for draws in (many.draws, shuffled))
+    assert one.rigid() == pytest.approx(other.rigid())
+    assert one.passive() == pytest.approx(other.passive())
 
 
 @pytest.mark.filterwarnings("error")

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
 
 
-RULE_DRAWS = 4000
-
-
 @dataclass(frozen=True)
 class Rules:
     """What the rules need to know of a device, for one case; rules are medians over its draws.
@@ -76,7 +73,7 @@ class Rules:
 def rules_of(model: Model, draws: Floats, label: str = "") -> Rules:
     """The rules for draws (D, P) of a model whose period is known."""
     assert model.period_s is not None
-    system = model.system(draws[:: max(len(draws) // RULE_DRAWS, 1)])
+    system = model.system(draws)
     return Rules(label, ground_damping(system), np.asarray(system.delay_s), model.period_s)
 
 
