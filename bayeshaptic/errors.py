@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import difflib
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,6 +72,18 @@ def refuse_place(path: Path, example: str) -> None:
         raise InputError(f"{path} is a folder; name a file, such as {path / example}")
     if not path.absolute().parent.is_dir():
         raise InputError(f"{path.parent}: no such folder; make it first")
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """`` (did you mean 'x'?)`` where something known is close to `word`, otherwise nothing."""
+    by_lower_case = {name.lower(): name for name in known}
+    found = difflib.get_close_matches(word.lower(), by_lower_case, n=1, cutoff=0.6)
+    return f" (did you mean '{by_lower_case[found[0]]}'?)" if found else ""
+
+
+def nearest_or_all(word: str, known: Collection[str]) -> str:
+    """`nearest`, or all that is known where nothing is close."""
+    return nearest(word, known) or f"; there are {', '.join(known)}"
 
 
 def printable(text: str) -> str:

@@ -327,7 +327,7 @@ def test_probabilities_of_a_study(tmp_path: Path) -> None:
     file.write_text(text.format(p=1.5) + '[[recording]]\nfile = "a.csv"\n')
     with pytest.raises(InputError, match="extra_delay.*probability"):
         read_study(file)
-    with pytest.raises(InputError, match="did you mean extra_delay"):
+    with pytest.raises(InputError, match="did you mean 'extra_delay'"):
         HiddenPrior.from_table({"extra_dela": 0.1})
 
 

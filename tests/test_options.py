@@ -23,7 +23,7 @@ RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.cs
     [
         (("grasped", "a recording"), {}, "no such file"),
         ((3.0,), {}, "not float; see bayeshaptic.read_recording"),
-        (("a.csv",), {"dealy_s": 0.0}, "no option 'dealy_s'; did you mean delay_s?"),
+        (("a.csv",), {"dealy_s": 0.0}, "no option 'dealy_s' .did you mean 'delay_s'"),
         (("a.csv",), {"zzz": 1}, "no option 'zzz'; there are device, delay_s"),
         (("a.csv", "free"), {"device": "nothing"}, "nothing"),
     ],
@@ -39,9 +39,9 @@ def test_what_cannot_be_is_said_in_one_line(arguments, options, words) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"prior": {"kcc": bh.LogNormal(5e4, 1.0)}}, "no model has a parameter 'kcc'.*mean kc?"),
+        ({"prior": {"kcc": bh.LogNormal(5e4, 1.0)}}, "no model has a parameter 'kcc'.*mean 'kc'"),
         ({"prior": {"zzz": bh.LogNormal(5e4, 1.0)}}, "'zzz'; there are m, b, .*, delay_s"),
-        ({"effects": {"backlsh": 0.1}}, "no effect 'backlsh'; did you mean backlash?"),
+        ({"effects": {"backlsh": 0.1}}, "no effect 'backlsh' .did you mean 'backlash'"),
     ],
 )
 def test_a_name_that_would_do_nothing_is_refused(function, options, words) -> None:
@@ -73,8 +73,8 @@ def test_a_delay_of_milliseconds_in_seconds_is_refused(function, options) -> Non
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ("[prior]\nkcc = {median = 5e4, log_sd = 1.0}\n", "'kcc'; did you mean kc?"),
-        ("[effects]\nbacklsh = 0.1\n", "'backlsh'; did you mean backlash?"),
+        ("[prior]\nkcc = {median = 5e4, log_sd = 1.0}\n", "'kcc' .did you mean 'kc'"),
+        ("[effects]\nbacklsh = 0.1\n", "'backlsh' .did you mean 'backlash'"),
     ],
 )
 def test_a_study_is_refused_before_a_recording_is_read(tmp_path: Path, table, words) -> None:

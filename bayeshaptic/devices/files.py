@@ -10,8 +10,8 @@ from typing import Any
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices.device import KINDS, STRUCTURES, Device
-from bayeshaptic.devices.table import Table, nearest, read_toml
-from bayeshaptic.errors import InputError
+from bayeshaptic.devices.table import Table, read_toml
+from bayeshaptic.errors import InputError, nearest
 
 FACTS = (
     "name",

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, nearest
 
 # A study of a thousand recordings has 100 kB; nothing in one is nested deeper than a mapping of
 # columns in a recording.
 MOST_BYTES = 1_000_000
 LONGEST_LINE = 10_000
 DEEPEST = 8
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """`` (did you mean 'x'?)`` where something known is close to `word`, otherwise nothing."""
-    by_lower_case = {name.lower(): name for name in known}
-    found = difflib.get_close_matches(word.lower(), by_lower_case, n=1, cutoff=0.6)
-    return f" (did you mean '{by_lower_case[found[0]]}'?)" if found else ""
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -6,7 +6,6 @@ of the class.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from bayeshaptic.arguments import check_fields, instance, shown
 from bayeshaptic.devices import Device
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, nearest_or_all
 from bayeshaptic.numerics.spending import BUDGET_S
 from bayeshaptic.progress import told
 
@@ -106,9 +105,7 @@ class Options:
         known = [each.name for each in fields(self)]
         for name in changes:
             if name not in known:
-                near = difflib.get_close_matches(name, known, 1)
-                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
-                raise InputError(f"there is no option {name!r}; {hint}")
+                raise InputError(f"there is no option {name!r}{nearest_or_all(name, known)}")
         return replace(self, **changes)
 
     def report(self, share: float, word: str) -> None:

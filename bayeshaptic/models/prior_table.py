@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, nearest_or_all
 from bayeshaptic.models.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 from bayeshaptic.models.prior_of_zero import MaybeZero, NearZero
 from bayeshaptic.models.structures import structure_named
@@ -67,6 +66,6 @@ def refuse_unknown(prior: Iterable[str], models: Iterable[str]) -> None:
     ]
     for name in prior:
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
-            raise InputError(f"prior: no model has a parameter {name!r}; {hint}")
+            raise InputError(
+                f"prior: no model has a parameter {name!r}{nearest_or_all(name, known)}"
+            )

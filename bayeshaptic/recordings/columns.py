@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.devices.table import nearest
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, nearest
 from bayeshaptic.recordings.readers import Arrays
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.units import base_unit, is_unit, unit_in_name

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device, device_from_table, device_names, load_device
-from bayeshaptic.devices.table import Table, nearest, read_toml
-from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.devices.table import Table, read_toml
+from bayeshaptic.errors import InputError, Notice, nearest
 from bayeshaptic.recordings.columns import parse_columns
 from bayeshaptic.recordings.cut import Cut, Span
 from bayeshaptic.recordings.feedback import read_feedback

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from bayeshaptic.effects.library import effects
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, nearest_or_all
 
 # With the dozen effects that a device can have, it has none of them with a probability of a third.
 PROBABILITY = 0.08
@@ -32,9 +31,9 @@ class HiddenPrior:
         known = [effect.name for effect in effects()]
         for name, probability in {**self.named, "every effect": self.each}.items():
             if name not in (*known, "every effect"):
-                near = difflib.get_close_matches(name, known, 1)
-                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
-                raise InputError(f"prior probabilities: there is no effect {name!r}; {hint}")
+                raise InputError(
+                    f"prior probabilities: there is no effect {name!r}{nearest_or_all(name, known)}"
+                )
             if not 0 <= probability < 1:
                 raise InputError(
                     f"prior probability of {name}: {probability:g} must be at least 0 and below 1."
