@@ -109,7 +109,7 @@ def likeliest(fit: Fit, etfe: Etfe, seed: int = 0, most: int = SETS) -> Fit:
     found = [fit]
     for another in range(1, most + 1):
         nearly = max(one.log_likelihood for one in found) - _SAME_VALLEY
-        if sum(one.log_likelihood > nearly for one in found) == _AGREEING:
+        if sum(one.log_likelihood > nearly for one in found) >= _AGREEING:
             break
         rng = np.random.default_rng([seed, another])
         found.append(_fit(fit.model, etfe, starting_points(fit.model, etfe, rng)))

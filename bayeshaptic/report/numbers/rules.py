@@ -53,9 +53,11 @@ class Rules:
 
     def rigid(self, virtual: ArrayLike = 0.0) -> Floats:
         """Stability of a rigid device with virtual damping, in its shape."""
-        beside = np.asarray(virtual, float)[..., None]
-        every = rigid_limit(self.dampings, self.delays_s, self.period_s, beside)
-        return np.asarray(np.median(every, axis=-1))
+        beside = np.asarray(virtual, float)
+        device = self.dampings, self.delays_s, self.period_s
+        # One after the other: all at once are a hundred megabytes.
+        medians = [np.median(rigid_limit(*device, one)) for one in beside.ravel()]
+        return np.reshape(medians, beside.shape)
 
     def passive(self, virtual: ArrayLike = 0.0) -> Floats:
         """Colgate and Schenkel's passivity with virtual damping, in its shape."""
