@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import Recording, recording_from_arrays
+from bayeshaptic.recordings.signals.loop_period import doubts_the_loop, without_doubt
+from bayeshaptic.recordings.signals.runs import held_for
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.types import Floats, Ints
 
@@ -189,5 +192,46 @@ def test_rows_that_are_written_several_times_are_read_once(often: int) -> None:
     assert np.array_equal(found.force[-1990:], force[-1990:])
     assert np.array_equal(found.position[-1990:], position[-1990:])
     assert any(f"stands {often} times" in notice.text for notice in found.notices)
-    held = recording_from_arrays(twice[0], rng.standard_normal(len(twice[0])), period_s=1e-3)
-    assert held.samples == len(twice[0])
+
+
+@pytest.mark.parametrize("rows", [2, 3, 8])
+def test_a_force_that_is_held_leaves_the_period_of_its_loop_open(rows: int) -> None:
+    rng = np.random.default_rng(4)
+    force, position = np.repeat(rng.standard_normal(1000), rows)[1:], rng.standard_normal
+    stamps = 1e-3 * np.arange(len(force))
+    moved = position(len(force))
+
+    def read(period_s: float | None = None, time: Floats | None = stamps) -> Recording:
+        return recording_from_arrays(force, moved, period_s=period_s, time=time)
+
+    open_ = read()
+    assert open_.samples == len(force) and doubts_the_loop(open_.notices)
+    assert f"held for {rows} rows" in open_.notices[0].text
+    # Who says the period has said which loop it is.
+    every_row, changes = read(1e-3), read(1e-3 * rows)
+    assert every_row.samples == len(force) and changes.period_s == pytest.approx(1e-3 * rows)
+    assert np.array_equal(changes.force, force[rows - 1 :: rows])
+    assert np.array_equal(changes.position, moved[rows - 1 :: rows])
+    for told in (every_row, changes):
+        assert not any(notice.topic == "period" for notice in told.notices)
+    # Without stamps nobody can say both; a device's file says that of the loop.
+    unstamped = read(1e-3, None)
+    assert [notice.level for notice in unstamped.notices if notice.topic == "period"] == ["warning"]
+    assert not doubts_the_loop(unstamped.notices)
+    device = load_device("lhifam")
+    assert not without_doubt(open_.notices[:1], 1e-3, device)
+    assert without_doubt(open_.notices[:1], 2e-3, device) == open_.notices[:1]
+
+
+def test_a_clock_that_slips_holds_a_force_all_the_same() -> None:
+    rng = np.random.default_rng(5)
+    force = rng.standard_normal(1000)[(np.arange(8000) / 8.03).astype(int)]
+    assert held_for(force) == 8
+
+
+def test_other_forces_that_stand_are_not_held() -> None:
+    rng = np.random.default_rng(6)
+    smooth = np.cumsum(rng.standard_normal(20_000))
+    holds = np.repeat(rng.standard_normal(4000), rng.integers(1, 12, size=4000))
+    for force in (np.round(smooth), holds, rng.standard_normal(5000)):
+        assert held_for(force) == 1

@@ -32,7 +32,8 @@ class Settings(Options):
         units (N, Nm, A; m, rad), where they are not called as above; for example
         time=t*1e-6,force=u[A],position=q[rad].
     period_s : float or None
-        Sampling period in seconds; by default from the time stamps.
+        Sampling period in seconds; by default from the time stamps. Where a force is held for
+        several rows, it says whether the loop runs at every row or at the changes alone.
     encoder_resolution : float or None
         One encoder count, in m or rad; by default from the device, or from the data.
     rows : (float or None, float or None), or None

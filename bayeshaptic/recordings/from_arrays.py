@@ -13,7 +13,8 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.runs import written_each
+from bayeshaptic.recordings.signals.loop_period import LOOP
+from bayeshaptic.recordings.signals.runs import held_for, written_each
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped
 from bayeshaptic.recordings.units import assumed_units, choose_units
@@ -41,7 +42,8 @@ def recording_from_arrays(
     force, position : array_like, shape (N,)
         Commanded force and measured position; (N, 1) and (1, N) will do.
     period_s : float or None
-        Sampling period in seconds, or:
+        Sampling period in seconds. Beside time stamps it is the loop's: where these show a part of
+        it, and the force is held in between, one row for each force is read. Or:
     time : array_like, shape (N,), or None
         Time stamps in seconds.
     force_unit : {"N", "Nm", "A"} or None
@@ -74,6 +76,12 @@ def recording_from_arrays(
     _refuse_lengths(where, force=force, position=position, reference=followed, time=stamps)
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
+    held = held_for(force)
+    each, first = written_each((force,))
+    if each > 1 and stamps is not None and _is_period(period_s, stamps, each):
+        force, position = force[first::each], position[first::each]
+        stamps, held = stamps[first::each], 1
+        followed = None if followed is None else followed[first::each]
     timing = sampling_period(stamps, period_s, where)
     unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind, where)
     angle = unit_of_position == "rad"
@@ -89,6 +97,8 @@ def recording_from_arrays(
         followed = None if followed is None else followed[first % often :: often]
         timing = replace(timing, period_s=often * timing.period_s)
         notices += (_written_each(often, timing.period_s),)
+    elif held > 1 and (stamps is None or period_s is None):
+        notices += (_held(force, held, timing.period_s, stamps is not None),)
     notices += assumed_units(force_unit, position_unit, unit_of_force, unit_of_position)
     return Recording(
         force=force,
@@ -103,6 +113,34 @@ def recording_from_arrays(
         notices=notices,
         reference=followed,
     )
+
+
+def _is_period(period_s: float | None, stamps: Floats, rows: int) -> bool:
+    """Whether the period that was said is that of so many rows, by their stamps."""
+    if period_s is None:
+        return False
+    told = rows * float(np.median(np.diff(stamps)))
+    return bool(abs(told - period_s) <= 0.01 * period_s)
+
+
+def _held(force: Floats, rows: int, period_s: float, stamped: bool) -> Notice:
+    """A loop of a longer period than the rows have, or an excitation that was held."""
+    slower, each = quantity(rows * period_s, "s"), f"one row in {rows}"
+    levels = len(np.unique(force)) > 2  # two are those of a clock that people choose
+    cure = (
+        f"Say which it is: --period-s {rows * period_s:.6g} for the loop of these changes, of "
+        f"which {each} is then read, or --period-s {period_s:.6g} where the loop runs at every row "
+        "and the excitation alone was held."
+        if stamped
+        else f"If so, keep {each} alone, those at which the force changes, and say the period of "
+        "these."
+    )
+    text = (
+        f"The force is held for {rows} rows, and the position changes in between: as where a drive "
+        f"writes rows faster than its loop commands forces. That loop's period is {slower}, and "
+        f"its limit is lower than that of one of {quantity(period_s, 's')}. {cure}"
+    )
+    return Notice("warning", "period", text, (LOOP,) if levels and stamped else ())
 
 
 def _written_each(often: int, period_s: float) -> Notice:

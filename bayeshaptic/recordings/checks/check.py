@@ -13,6 +13,7 @@ from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.signals.loop_period import without_doubt
 from bayeshaptic.recordings.signals.rough_response import RoughResponse, rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER, unusual_period
 from bayeshaptic.recordings.units import refuse_mixed_units
@@ -64,7 +65,7 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
     if recording.feedback is None and not has_feedback(driven):
         scales = against_response(scales, recording, device, rough)
     return (
-        *recording.notices,
+        *without_doubt(recording.notices, recording.period_s, device),
         *scales,
         *says_nothing_of_the_actuator(recording),
         *driven,

@@ -8,6 +8,9 @@ import numpy as np
 
 from bayeshaptic.types import Bools, Floats, Ints
 
+_FEWEST_CHANGES = 100
+_MOST_TIMES = 20  # that a row is written
+
 
 def runs(flags: Bools) -> tuple[Ints, Ints]:
     """First index of each run, and the one behind its last; shape (R,) each.
@@ -50,12 +53,38 @@ def written_each(signals: Sequence[Floats]) -> tuple[int, int]:
         (1, 0) where rows differ.
     """
     changes = [1 + np.flatnonzero(np.diff(signal)) for signal in signals]
-    fewest = 100
-    if min(len(at) for at in changes) < fewest:
+    if min(len(at) for at in changes) < _FEWEST_CHANGES:
         return 1, 0
-    most = 20  # times
-    for often in range(most, 1, -1):
+    for often in range(_MOST_TIMES, 1, -1):
         first = int(changes[0][0] % often)
         if all(np.all(at % often == first) for at in changes):
             return often, first
     return 1, 0
+
+
+def held_for(signal: Floats) -> int:
+    """For how many rows a signal is held, as by a clock that is slower than that of the rows.
+
+    Between two of its changes lie that many rows, or a multiple where it comes back to the same
+    value; a row more or fewer of four and more, where the two clocks are not of one oscillator.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (N,)
+
+    Returns
+    -------
+    int
+        1 where it is not.
+    """
+    apart = np.diff(np.flatnonzero(np.diff(signal)))
+    if len(apart) < _FEWEST_CHANGES:
+        return 1
+    rows = int(np.median(apart))
+    if not 1 < rows <= _MOST_TIMES:
+        return 1
+    times = np.rint(apart / rows)
+    slips = 1 if rows >= 4 else 0
+    clocked = (times >= 1) & (np.abs(apart - times * rows) <= slips)
+    mostly = 0.98  # of the changes
+    return rows if np.mean(clocked) >= mostly else 1

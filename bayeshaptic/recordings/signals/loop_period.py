@@ -1,0 +1,29 @@
+"""Which period the loop has, where a force that is held for several rows leaves it open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from bayeshaptic.devices import Device
+from bayeshaptic.errors import Notice
+
+LOOP = "loop"  # what a warning of the topic "period" is about, where it doubts the loop's period
+
+
+def doubts_the_loop(notices: Iterable[Notice]) -> bool:
+    """Whether a warning doubts that the loop has the period of the rows.
+
+    The limit of a loop that is slower is lower, by as many times as its period is longer where
+    delay and damping alone decide.
+    """
+    return any(n.topic == "period" and LOOP in n.about for n in notices)
+
+
+def without_doubt(
+    notices: Iterable[Notice], period_s: float, device: Device | None
+) -> tuple[Notice, ...]:
+    """The same, without that doubt where the device's file has the period of the rows."""
+    said = device.period_s if device is not None else None
+    if not said or abs(period_s / said - 1) > 0.01:
+        return tuple(notices)
+    return tuple(n for n in notices if not (n.topic == "period" and LOOP in n.about))
