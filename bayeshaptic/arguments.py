@@ -18,7 +18,7 @@ from fractions import Fraction
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, nearest
 from bayeshaptic.faq import entry_of
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -76,7 +76,12 @@ def at_the_door(function: F) -> F:
 
     @functools.wraps(function)
     def door(*args: Any, **kwargs: Any) -> Any:
-        bound = signature.bind(*args, **kwargs)
+        try:
+            bound = signature.bind(*args, **kwargs)
+        except TypeError as error:
+            unknown = [name for name in kwargs if name not in signature.parameters]
+            near = nearest(unknown[0], signature.parameters) if unknown else ""
+            raise TypeError(f"{function.__name__}() {error}{near}") from None
         try:
             for name, value in bound.arguments.items():
                 parameter = signature.parameters[name]

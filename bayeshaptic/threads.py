@@ -1,7 +1,7 @@
-"""One BLAS thread for our many small matrix products.
+"""Settings of the whole process while we compute: one BLAS thread, and no errors of underflow.
 
-More threads make them slower, and change the order of summation, so that results would depend on
-the number of cores.
+More threads make our many small matrix products slower, and change the order of summation, so that
+results would depend on the number of cores.
 """
 
 from __future__ import annotations
@@ -26,16 +26,20 @@ _here = threading.local()
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
     """Decorator: `function` runs with one BLAS thread; the setting is put back afterwards.
 
-    Inside another such function it costs nothing.
+    Densities underflow to nothing in it, whatever a caller has `numpy.seterr` do then.  Inside
+    another such function it costs nothing.
     """
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
         if getattr(_here, "limited", False):
             return function(*args, **kwargs)
+        import numpy as np
+
         _here.limited = True
         try:
-            with _libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
+            limit = _libraries(len(sys.modules)).limit(limits=1, user_api="blas")
+            with limit, np.errstate(under="ignore"):
                 return function(*args, **kwargs)
         finally:
             _here.limited = False

@@ -12,6 +12,7 @@ import pytest
 from fake_analysis import CASES, fake_analysis
 
 from bayeshaptic.report.figures import marginals, stiffness
+from bayeshaptic.report.figures.drawing.look import own_look
 from bayeshaptic.report.figures.pairs import correlation, strongest
 from bayeshaptic.report.figures.pictures import PICTURES
 from bayeshaptic.report.figures.sampler import rank_histogram
@@ -133,3 +134,30 @@ def test_figures_are_the_same_in_threads_and_need_no_display() -> None:
         together = list(pool.map(lambda p: drawn(p.draw(analysis), p.name), 2 * few))
     assert alone + alone == together
     assert all(picture.png.startswith(b"\x89PNG") for picture in alone)
+
+
+def test_what_a_user_set_for_figures_of_their_own_stays_outside() -> None:
+    import matplotlib
+
+    def answer() -> bytes:
+        with own_look():
+            return drawn(PICTURES[0].draw(fake_analysis()), "answer").png
+
+    usual = answer()
+    mine = {"text.usetex": True, "axes.facecolor": "black", "font.size": 30.0, "savefig.dpi": 20.0}
+    with matplotlib.rc_context(mine):
+        assert answer() == usual
+        with own_look():
+            with own_look():
+                pass
+            assert not matplotlib.rcParams["text.usetex"]  # another thread still draws
+        assert all(matplotlib.rcParams[name] == value for name, value in mine.items())
+
+
+def test_dollars_in_names_are_no_formula() -> None:
+    from bayeshaptic.report.figures.style import new_figure, panel
+
+    with own_look():
+        figure = new_figure(1.0)
+        panel(figure.add_subplot(), title="user$_{o$")
+        assert "user$_{o$" in (drawn(figure, "a").svg or "")

@@ -83,3 +83,12 @@ def test_threads_are_limited_inside_and_given_back() -> None:
         with pytest.raises(ValueError):
             broken()
         assert most() == before and inner() == 1
+
+
+def test_densities_underflow_whatever_a_caller_set() -> None:
+    import bayeshaptic as bh
+
+    recording = bh.read_recording(ROOT / "data" / "recordings" / "phantom-free.csv.gz")
+    with np.errstate(all="raise"):
+        assert bh.analyse(recording.part(0, 4000)).posterior.converged
+        assert np.geterr()["under"] == "raise"

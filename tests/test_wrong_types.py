@@ -164,3 +164,12 @@ def test_the_line_says_what_to_give(call: Callable[[], Any], words: str) -> None
 )
 def test_numbers_and_lists_of_like_types_are_taken(call: Callable[[], Any]) -> None:
     assert call() is not None
+
+
+def test_a_misspelt_argument_is_named_with_its_function() -> None:
+    function: Any = bh.recording_from_arrays
+    words = r"recording_from_arrays\(\) .*'perod_s' \(did you mean 'period_s'\?\)"
+    with pytest.raises(TypeError, match=words):
+        function([0.0], [0.0], perod_s=1e-3)
+    with pytest.raises(TypeError, match=r"recording_from_arrays\(\) missing .*'position'$"):
+        function([0.0])

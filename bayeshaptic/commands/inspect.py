@@ -14,6 +14,8 @@ from bayeshaptic.errors import InputError, printable
 from bayeshaptic.files import whole_file, write_whole
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from bayeshaptic.recordings.overview.overview import Overview
     from bayeshaptic.recordings.overview.roles import ColumnFacts
 
@@ -209,6 +211,13 @@ def _toml(text: str) -> str:
 
 def draw(found: Overview, path: Path) -> None:
     """The columns one above the other, as a PNG."""
+    from bayeshaptic.report.figures.drawing.look import own_look
+
+    with own_look(), whole_file(path) as partial:
+        _drawn(found).savefig(partial, format="png")
+
+
+def _drawn(found: Overview) -> Figure:
     from bayeshaptic.report.figures.style import new_figure, panel
 
     numbers = [one for one in found.columns if one.samples > 2 and one.roughness > 0]
@@ -223,12 +232,9 @@ def draw(found: Overview, path: Path) -> None:
         axes = figure.add_subplot(len(shown), 1, number)
         values = found.arrays[one.name]
         over = clock if clock is not None and len(clock) == len(values) else range(len(values))
-        panel(
-            axes, unit if number == len(shown) else "", title=printable(one.name).replace("$", "S")
-        )
+        panel(axes, unit if number == len(shown) else "", title=printable(one.name))
         axes.plot(over, values, linewidth=0.5)
-    with whole_file(path) as partial:
-        figure.savefig(partial, format="png")
+    return figure
 
 
 def _clock(found: Overview) -> tuple[Any, str]:

@@ -11,6 +11,7 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.files import write_text
 from bayeshaptic.report.draft import report_in
+from bayeshaptic.report.figures.drawing.look import own_look
 from bayeshaptic.report.figures.pictures import (
     FORCE_PICTURES,
     LOOP_PICTURES,
@@ -77,7 +78,7 @@ def write_report(
     recording = result.analysis.recording
     of = (None if recording is None else recording.source, (origin or {}).get("file"))
     sources = [path for path in of if path is not None]
-    with report_in(out_dir, _LAST, _MAY_BE_MISSING, sources) as folder:
+    with report_in(out_dir, _LAST, _MAY_BE_MISSING, sources) as folder, own_look():
         _write_all(result, folder, origin)
     return Path(out_dir).resolve() / "report.html"
 

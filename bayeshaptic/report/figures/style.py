@@ -1,8 +1,8 @@
 """One look for all figures: readable on paper, in grey, and by the colour-blind.
 
-Everything is set on the figure and never in matplotlib's global state, so that reports can be
-drawn in several threads. Colours are Okabe and Ito's; what differs in colour also differs in line
-style or marker.
+Everything is set on the figure and not in matplotlib's global state, so that reports can be drawn
+in several threads; what a user has set there stays outside (`drawing/look.py`). Colours are Okabe
+and Ito's; what differs in colour also differs in line style or marker.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.files import write_text
 from bayeshaptic.report.draft import report_in
+from bayeshaptic.report.figures.drawing.look import own_look
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
 from bayeshaptic.report.guidance.section import FIGURES as ADVICE, guidance_section
 from bayeshaptic.report.study.headline import study_headline
@@ -70,7 +71,7 @@ def write_study_report(
     """
     out = Path(out_dir).resolve()
     links = {name: _link(Path(page), out) for name, page in (pages or {}).items()}
-    with report_in(out_dir, _LAST, _MAY_BE_MISSING, study.study.files) as folder:
+    with report_in(out_dir, _LAST, _MAY_BE_MISSING, study.study.files) as folder, own_look():
         _write_all(study, folder, links, walls)
     return out / "report.html"
 
