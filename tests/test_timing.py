@@ -233,5 +233,6 @@ def test_other_forces_that_stand_are_not_held() -> None:
     rng = np.random.default_rng(6)
     smooth = np.cumsum(rng.standard_normal(20_000))
     holds = np.repeat(rng.standard_normal(4000), rng.integers(1, 12, size=4000))
-    for force in (np.round(smooth), holds, rng.standard_normal(5000)):
+    square = np.sign(np.sin(np.arange(5000) * np.pi / 13 + 0.1))
+    for force in (np.round(smooth), holds, square, rng.standard_normal(5000)):
         assert held_for(force) == 1

@@ -66,7 +66,8 @@ def held_for(signal: Floats) -> int:
     """For how many rows a signal is held, as by a clock that is slower than that of the rows.
 
     Between two of its changes lie that many rows, or a multiple where it comes back to the same
-    value; a row more or fewer of four and more, where the two clocks are not of one oscillator.
+    value; a row more or fewer of four and more, where the two clocks are not of one oscillator.  A
+    square wave, as a relay's, that has two levels in turns is none.
 
     Parameters
     ----------
@@ -86,5 +87,6 @@ def held_for(signal: Floats) -> int:
     times = np.rint(apart / rows)
     slips = 1 if rows >= 4 else 0
     clocked = (times >= 1) & (np.abs(apart - times * rows) <= slips)
-    mostly = 0.98  # of the changes
-    return rows if np.mean(clocked) >= mostly else 1
+    mostly, rarely = 0.98, 0.1  # of the changes
+    square = len(np.unique(signal)) == 2 and np.mean(times > 1) < rarely
+    return rows if np.mean(clocked) >= mostly and not square else 1
