@@ -661,15 +661,34 @@ def test_a_counter_that_begins_again_is_counted_on(encoder_resolution: float | N
     assert any("a counter of 16 bits" in notice.text for notice in read.notices)
 
 
-def test_a_position_that_jumps_elsewhere_is_as_it_was() -> None:
-    """A new zero, a reading that falls out, and an encoder with as few counts as a step has."""
+def test_a_position_with_a_new_zero_is_counted_on() -> None:
+    """Its response "hardly answered to the force"."""
+    rng = np.random.default_rng(8)
+    force = rng.normal(size=4000)
+    smooth = np.cumsum(np.cumsum(force - np.mean(force))) / 500
+    for count in (0.0, 1e-4):
+        way = count * np.round(smooth / count) if count else smooth
+        jumps = way.copy()
+        jumps[900:] += 5.0
+        jumps[2500:] -= 60.0
+        read = recording_from_arrays(force, jumps, period_s=1e-3, position_unit="m")
+        (told,) = [notice for notice in read.notices if notice.topic == "jumps"]
+        assert "jumps 2 times, the first time at row 901" in told.text
+        assert "--rows 901:2500" in told.text
+        # A step of each is not known: what the motion did beside it stands in its place.
+        assert np.abs(read.position - way).max() < 2 * np.abs(np.diff(way, 2)).max() + 2 * count
+
+
+def test_a_position_that_does_not_jump_is_as_it_was() -> None:
+    """A reading that falls out, few counts, a device that is struck, and one that often rests."""
     rng = np.random.default_rng(8)
     force, way = rng.normal(size=2000), np.cumsum(rng.normal(size=2000))
-    new_zero, fallen = way.copy(), way.copy()
-    new_zero[900:] += 5 * np.ptp(way)
+    fallen, rows = way.copy(), np.arange(2000)
     fallen[700] = -9 * np.ptp(way)
-    few = np.round(np.sin(np.arange(2000) / 50))
-    for kept in (new_zero, fallen, few):
+    few = np.round(np.sin(rows / 50))
+    struck = np.cumsum(0.01 * rng.normal(size=2000) + 5.0 * (rows > 800) * np.exp(-rows / 300))
+    rests = np.cumsum((rows % 40 == 0) * rng.normal(size=2000))
+    for kept in (fallen, few, struck, rests):
         read = recording_from_arrays(force, kept, period_s=1e-3, position_unit="m")
         np.testing.assert_array_equal(read.position, kept)
 
@@ -680,7 +699,7 @@ def test_an_angle_that_does_not_begin_again_is_as_it_was() -> None:
     force, angle = rng.normal(size=2000), 5 + 0.001 * np.cumsum(rng.normal(size=2000))
     fallen = angle.copy()
     fallen[700] = 0.0
-    far = np.concatenate([angle, angle + 4 * np.pi])
-    for kept, drive in ((angle, force), (fallen, force), (far, np.tile(force, 2))):
-        read = recording_from_arrays(drive, kept, period_s=1e-3, position_unit="rad")
+    far = angle + 0.01 * np.arange(2000)
+    for kept in (angle, fallen, far):
+        read = recording_from_arrays(force, kept, period_s=1e-3, position_unit="rad")
         np.testing.assert_array_equal(read.position, kept)

@@ -118,7 +118,7 @@ def test_of_several_set_points_the_stretch_with_the_most_switches_is_read():
     force, position = sine(40.0, 30.0)
     whole = measure_relay(recording_from_arrays(force, position, 1e-3))
     assert whole.set_point == pytest.approx(0.0, abs=1e-4)
-    set_point = np.where(np.arange(len(force)) < 8000, -0.01, 0.02)
+    set_point = np.interp(np.arange(len(force)), [7990, 8010], [-0.01, 0.02])
     measured = measure_relay(recording_from_arrays(force, position + set_point, 1e-3))
     assert measured.set_point == pytest.approx(0.02, abs=2e-4)
     assert measured.steady_s[0] >= 7.9 and measured.steady_s[1] == pytest.approx(30, abs=0.1)

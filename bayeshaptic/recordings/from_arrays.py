@@ -16,7 +16,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.loop_period import LOOP
 from bayeshaptic.recordings.signals.runs import held_for, written_each
 from bayeshaptic.recordings.signals.timing import sampling_period
-from bayeshaptic.recordings.signals.turns import unwrapped
+from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
 from bayeshaptic.recordings.units import assumed_units, choose_units
 from bayeshaptic.types import Floats
 
@@ -90,7 +90,8 @@ def recording_from_arrays(
         from bayeshaptic.recordings.signals.gaps import put_back
 
         force, position, followed = put_back(force, position, followed, timing.rows, where)
-    notices += timing.notices
+    position, jumps = without_jumps(position)
+    notices += (*timing.notices, *jumps)
     often, first = written_each((force, position))
     if often > 1:
         force, position = (signal[first % often :: often] for signal in (force, position))

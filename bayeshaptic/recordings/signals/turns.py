@@ -1,10 +1,11 @@
-"""Positions that begin again: angles after a turn, and counters after their last count."""
+"""Positions that begin again: angles after a turn, counters after their last count, new zeros."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
@@ -17,6 +18,10 @@ _OF_RANGE = 0.02  # five such steps are less than this share of the range
 _FEWEST_BITS = 6  # of a counter
 _FEWEST_STEPS = 100  # that tell what usual ones are
 _FEWEST_JUMPS = 3  # fewer may lead from one place of work to another
+_FARTHER = 8.0  # goes a jump to anywhere than any step around it,
+_AROUND = 10  # rows before and after it,
+_COUNTS = 20  # and than so many counts, which an encoder at rest does not flicker by
+_MOST_OFTEN = 1e-3  # of all rows: what moves so more often is how it moves
 
 
 def unwrapped(
@@ -58,6 +63,45 @@ def unwrapped(
         "beyond",
         topic="columns",
     )
+
+
+def without_jumps(position: Floats) -> tuple[Floats, tuple[Notice, ...]]:
+    """The position without jumps to anywhere, and a warning of them.
+
+    No mass goes in one period eight times as far as in any of the ten before and after: an encoder
+    was set to zero or missed counts, or what stands on both sides was not recorded in one go.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N,)
+    """
+    steps = np.diff(position)
+    size = np.abs(steps)
+    if np.count_nonzero(steps) < _FEWEST_STEPS:
+        return position, ()
+    count = increment_unit(position) or 0.0
+    # The most of ten steps: those before step k begin at its own place, those after ten further on.
+    most = sliding_window_view(np.pad(size, _AROUND), _AROUND).max(axis=1)
+    around = np.maximum(most[: len(steps)], most[_AROUND + 1 :])
+    jumps = size > np.maximum(_FARTHER * around, max(_most(steps), _COUNTS * count))
+    if not 0 < np.mean(jumps) <= _MOST_OFTEN:
+        return position, ()
+    beside = np.pad(steps, 1)
+    off = np.where(jumps, steps - (beside[:-2] + beside[2:]) / 2, 0.0)
+    if count:
+        off = count * np.round(off / count)
+    edges = np.concatenate([[0], np.flatnonzero(jumps) + 1, [len(position)]])
+    longest = int(np.argmax(np.diff(edges)))
+    text = (
+        f"The position jumps {_times(jumps)}, the first time at {_first(jumps)} by "
+        f"{steps[jumps][0]:.4g}, farther than in any step around it: an encoder was set to zero or "
+        "missed counts, rows were lost, or two recordings stand in one file. It was counted on "
+        "across; what moved in between is not known. Record again without, or read what has none, "
+        f"--rows {edges[longest] + 1}:{edges[longest + 1]}."
+    )
+    mended = position - np.concatenate([[0.0], np.cumsum(off)])
+    mended.setflags(write=False)
+    return mended, (Notice("warning", "jumps", text),)
 
 
 def _bits(counts: float, most: float) -> int:
