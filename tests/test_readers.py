@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from csv_signals import FORCE, MAPPING, POSITION, SIGNALS, TIME, N, write_csv
+from scipy.signal import lfilter
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import (
@@ -677,6 +678,30 @@ def test_a_position_with_a_new_zero_is_counted_on() -> None:
         assert "--rows 901:2500" in told.text
         # A step of each is not known: what the motion did beside it stands in its place.
         assert np.abs(read.position - way).max() < 2 * np.abs(np.diff(way, 2)).max() + 2 * count
+
+
+@pytest.mark.parametrize("flickers", [False, True])
+def test_a_standstill_while_the_force_goes_on_is_left_out(flickers: bool) -> None:
+    """It was taken for feedback: the past of the position tells much of its answer."""
+    rng = np.random.default_rng(9)
+    force = rng.normal(size=9000)
+    moves = force * (np.arange(9000) >= 1000) * (np.arange(9000) < 8500)
+    velocity = lfilter([1e-5], [1, -0.9], moves)
+    velocity[8500:] = 0.0
+    position = 1e-6 * (np.round(np.cumsum(velocity) / 1e-6))
+    if flickers:
+        position[:1000] += 1e-6 * (rng.random(1000) < 0.02)
+    read = recording_from_arrays(force, position, period_s=1e-3, position_unit="m")
+    (told,) = [notice for notice in read.notices if notice.topic == "standstill"]
+    assert abs(read.samples - 7500) < 10
+    assert "rows 1 to 100" in told.text and " to 9000 while" in told.text
+    begin = int(np.flatnonzero(force == read.force[0])[0])
+    assert np.array_equal(read.position, position[begin : begin + read.samples])
+    # Without force, or where it rests elsewhere, too, a device merely rests.
+    rests = np.where((np.arange(9000) // 1500) % 2 == 0, 0.0, position)
+    for drive, kept in ((moves, position), (force, rests)):
+        read = recording_from_arrays(drive, kept, period_s=1e-3, position_unit="m")
+        assert read.samples == 9000
 
 
 def test_a_position_that_does_not_jump_is_as_it_was() -> None:

@@ -14,7 +14,8 @@ from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.loop_period import LOOP
-from bayeshaptic.recordings.signals.runs import held_for, written_each
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.runs import held_for, moving_part, written_each
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
 from bayeshaptic.recordings.units import assumed_units, choose_units
@@ -92,6 +93,11 @@ def recording_from_arrays(
         force, position, followed = put_back(force, position, followed, timing.rows, where)
     position, jumps = without_jumps(position)
     notices += (*timing.notices, *jumps)
+    start, stop = moving_part(force, position, increment_unit(position) or 0.0)
+    if (start, stop) != (0, len(force)):
+        notices += (_at_rest(start, stop, len(force)),)
+        force, position = force[start:stop], position[start:stop]
+        followed = None if followed is None else followed[start:stop]
     often, first = written_each((force, position))
     if often > 1:
         force, position = (signal[first % often :: often] for signal in (force, position))
@@ -142,6 +148,16 @@ def _held(force: Floats, rows: int, period_s: float, stamped: bool) -> Notice:
         f"its limit is lower than that of one of {quantity(period_s, 's')}. {cure}"
     )
     return Notice("warning", "period", text, (LOOP,) if levels and stamped else ())
+
+
+def _at_rest(start: int, stop: int, samples: int) -> Notice:
+    ends = [f"{a + 1} to {b}" for a, b in ((0, start), (stop, samples)) if b > a]
+    text = (
+        f"The position stands still in rows {' and '.join(ends)} while the force goes on, as "
+        "before an amplifier is switched on, after it is switched off, or behind a brake: these "
+        "rows were left out."
+    )
+    return Notice("warning", "standstill", text)
 
 
 def _written_each(often: int, period_s: float) -> Notice:

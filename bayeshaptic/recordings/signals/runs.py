@@ -9,6 +9,8 @@ import numpy as np
 from bayeshaptic.types import Bools, Floats, Ints
 
 _FEWEST_CHANGES = 100
+_FEWEST_AT_REST = 100  # rows of a standstill
+_AS_STRONG = 0.5  # of the force's usual deviation: under less a device may just rest
 _MOST_TIMES = 20  # that a row is written
 
 
@@ -90,3 +92,33 @@ def held_for(signal: Floats) -> int:
     mostly, rarely = 0.98, 0.1  # of the changes
     square = len(np.unique(signal)) == 2 and np.mean(times > 1) < rarely
     return rows if np.mean(clocked) >= mostly and not square else 1
+
+
+def moving_part(force: Floats, position: Floats, count: float) -> tuple[int, int]:
+    """First row, and the one behind the last, without a standstill at either end.
+
+    The position stays within a count and a half while the force goes on as elsewhere, for longer
+    than anywhere else: as before an amplifier is switched on, and after it is switched off.
+
+    Parameters
+    ----------
+    force, position : ndarray, shape (N,)
+    count : float
+        Of the encoder; 0 where it is not known.
+    """
+    samples = len(position)
+    away = [np.flatnonzero(np.abs(position - end) > 1.5 * count) for end in position[[0, -1]]]
+    if not all(map(len, away)):
+        return 0, samples
+    first, stop = int(away[0][0]), int(away[1][-1]) + 1
+    usual = force[first:stop].std()
+
+    def is_one(rows: Floats) -> bool:
+        length = len(rows)
+        parts = (stop - first) // max(length, 1)
+        if length < _FEWEST_AT_REST or parts < 2 or rows.std() < _AS_STRONG * usual:
+            return False
+        elsewhere = position[first : first + parts * length].reshape(parts, length)
+        return bool(np.ptp(elsewhere, axis=1).min() > 3 * count)
+
+    return (first if is_one(force[:first]) else 0, stop if is_one(force[stop:]) else samples)
