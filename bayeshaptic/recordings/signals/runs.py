@@ -9,8 +9,8 @@ import numpy as np
 from bayeshaptic.types import Bools, Floats, Ints
 
 _FEWEST_CHANGES = 100
-_FEWEST_AT_REST = 100  # rows of a standstill
-_AS_STRONG = 0.5  # of the force's usual deviation: under less a device may just rest
+_FEWEST_AT_REST, _LEAST_AT_REST = 100, 0.02  # rows of a standstill, and their share
+_AS_FAR = 0.5  # as a force pushes a mass where it moves; under less a device may just rest
 _MOST_TIMES = 20  # that a row is written
 
 
@@ -97,8 +97,10 @@ def held_for(signal: Floats) -> int:
 def moving_part(force: Floats, position: Floats, count: float) -> tuple[int, int]:
     """First row, and the one behind the last, without a standstill at either end.
 
-    The position stays within a count and a half while the force goes on as elsewhere, for longer
-    than anywhere else: as before an amplifier is switched on, and after it is switched off.
+    The position stays within a count and a half for longer than anywhere else, while the force goes
+    on: as before an amplifier is switched on, and after it is switched off.  In each other part as
+    long the device moves, under a force that pushes a mass hardly farther (the fast end of a sweep
+    pushes it less far).
 
     Parameters
     ----------
@@ -111,14 +113,22 @@ def moving_part(force: Floats, position: Floats, count: float) -> tuple[int, int
     if not all(map(len, away)):
         return 0, samples
     first, stop = int(away[0][0]), int(away[1][-1]) + 1
-    usual = force[first:stop].std()
 
     def is_one(rows: Floats) -> bool:
         length = len(rows)
         parts = (stop - first) // max(length, 1)
-        if length < _FEWEST_AT_REST or parts < 2 or rows.std() < _AS_STRONG * usual:
+        if length < max(_FEWEST_AT_REST, _LEAST_AT_REST * samples) or parts < 2:
             return False
-        elsewhere = position[first : first + parts * length].reshape(parts, length)
-        return bool(np.ptp(elsewhere, axis=1).min() > 3 * count)
+        moving = slice(first, first + parts * length)
+        ways = np.ptp(position[moving].reshape(parts, length), axis=1)
+        pushes = _pushes(force[moving].reshape(parts, length))
+        return bool(ways.min() > 3 * count and _pushes(rows) > _AS_FAR * np.median(pushes))
 
     return (first if is_one(force[:first]) else 0, stop if is_one(force[stop:]) else samples)
+
+
+def _pushes(force: Floats) -> Floats:
+    """How far each part of a force, along the last axis, moves a mass back and forth."""
+    for _ in range(2):
+        force = np.cumsum(force - force.mean(axis=-1, keepdims=True), axis=-1)
+    return np.ptp(force, axis=-1)
