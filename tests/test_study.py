@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -186,6 +187,16 @@ def test_wrong_studies_say_where(folder: Path, content: str) -> None:
         read_study(path)
     assert str(folder) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_copy_of_a_recording_is_no_second_person(folder: Path) -> None:
+    named = [f"[[recording]]\nfile='{name}.csv'\nuser='{name}'\n" for name in ("a", "of-a", "b")]
+    shutil.copy(folder / "a.csv", folder / "of-a.csv")
+    with pytest.raises(InputError, match=r"of-a\.csv is a copy of a\.csv, recording 1"):
+        read_study(write(folder, DEVICE + "".join(named)))
+    parts = f"{named[0]}rows=[1, 9]\n{named[1]}rows=[10, 20]\n"
+    assert len(read_study(write(folder, DEVICE + parts)).users) == 2
+    assert len(read_study(write(folder, DEVICE + named[0] + named[2])).users) == 2
 
 
 def test_parts_of_one_file_are_recordings_of_their_own(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import math
 import os
 from collections.abc import Sequence
@@ -61,8 +62,8 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
     Raises
     ------
     InputError
-        For a missing file or one outside the folder, samples that are listed twice, unknown keys
-        (with the nearest known one), wrong types and impossible values.
+        For a missing file or one outside the folder, samples that are listed twice (in a copy of
+        a file, too), unknown keys (with the nearest known one), wrong types and impossible values.
     """
     path = Path(path)
     table = Table(read_toml(path), str(path), known=STUDY_KEYS)
@@ -104,21 +105,40 @@ def _pool(table: Table) -> bool | None:
 
 
 def _refuse_twice(entries: Sequence[StudyEntry], columns: Columns, path: Path) -> None:
-    """Refuse samples that are listed twice: they would count as twice the data."""
+    """Refuse samples that are listed twice: they would count as twice the data.
+
+    A copy of a file under another name is that file.
+    """
     known: dict[Path, list[tuple[int, StudyEntry]]] = {}
     for number, entry in enumerate(entries, start=1):
-        others = known.setdefault(entry.path.resolve(), [])
+        file = entry.path.resolve()
+        of_one = next((one for one in known if one == file or _copies(one, file)), file)
+        others = known.setdefault(of_one, [])
         for other, earlier in others:
             alike = parse_columns(entry.columns or columns) == parse_columns(
                 earlier.columns or columns
             )
             if alike and _overlap(entry, earlier):
+                is_one = (
+                    f"is recording {other} already"
+                    if file == earlier.path.resolve()
+                    else f"is a copy of {earlier.path.name}, recording {other}"
+                )
                 raise InputError(
-                    f"{path}, recording {number}: {entry.path.name} is recording {other} already, "
+                    f"{path}, recording {number}: {entry.path.name} {is_one}, "
                     "and would count as twice the data; leave one out, or give each rows or "
                     "seconds of its own"
                 )
         others.append((number, entry))
+
+
+def _copies(one: Path, other: Path) -> bool:
+    """Whether two files have the same content; not said of what is empty or cannot be read."""
+    try:
+        size = one.stat().st_size
+        return 0 < size == other.stat().st_size and filecmp.cmp(one, other, shallow=False)
+    except OSError:
+        return False
 
 
 def _overlap(one: StudyEntry, other: StudyEntry) -> bool:
