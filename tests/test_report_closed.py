@@ -240,6 +240,11 @@ def test_assumptions_say_what_was_added_and_widened() -> None:
     assert "widened" not in " ".join(assumptions(closed.analysis))
 
 
+def test_assumptions_say_that_a_force_in_no_column_belongs_to_the_device() -> None:
+    text = " ".join(assumptions(fake_closed().analysis))
+    assert "without virtual damping the limit may be far lower" in text
+
+
 def test_assumptions_say_that_a_sweep_hides_what_changes() -> None:
     analysis = fake_closed().analysis
     recording = analysis.etfe.recording

@@ -236,3 +236,20 @@ def test_other_forces_that_stand_are_not_held() -> None:
     square = np.sign(np.sin(np.arange(5000) * np.pi / 13 + 0.1))
     for force in (np.round(smooth), holds, square, rng.standard_normal(5000)):
         assert held_for(force) == 1
+
+
+@pytest.mark.parametrize("rows", [2, 4, 8])
+def test_a_position_that_is_read_more_slowly_than_the_force_changes_is_warned_of(rows: int) -> None:
+    rng = np.random.default_rng(7)
+    moved = 1e-5 * np.round(np.cumsum(rng.standard_normal(6000)))
+    force = rng.standard_normal(len(moved))
+
+    def warnings(position: Floats) -> list[str]:
+        read = recording_from_arrays(force, position, period_s=1e-3)
+        return [one.text for one in read.notices if one.topic == "held position"]
+
+    (text,) = warnings(np.repeat(moved[::rows], rows))
+    assert f"held for {rows} rows, {rows}.00 ms" in text
+    # Counts that are seldom passed are no clock.
+    for position in (moved, 1e-4 * np.round(moved / 1e-4)):
+        assert not warnings(position)

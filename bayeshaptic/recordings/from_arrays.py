@@ -106,6 +106,8 @@ def recording_from_arrays(
         notices += (_written_each(often, timing.period_s),)
     elif held > 1 and (stamps is None or period_s is None):
         notices += (_held(force, held, timing.period_s, stamps is not None),)
+    elif (late := held_for(position)) > 1:
+        notices += (_read_late(late, timing.period_s),)
     notices += assumed_units(force_unit, position_unit, unit_of_force, unit_of_position)
     return Recording(
         force=force,
@@ -148,6 +150,16 @@ def _held(force: Floats, rows: int, period_s: float, stamped: bool) -> Notice:
         f"its limit is lower than that of one of {quantity(period_s, 's')}. {cure}"
     )
     return Notice("warning", "period", text, (LOOP,) if levels and stamped else ())
+
+
+def _read_late(rows: int, period_s: float) -> Notice:
+    text = (
+        f"The position is held for {rows} rows, {quantity(rows * period_s, 's')}, while the force "
+        "changes in between: as where it is read more slowly than forces are commanded. The limit "
+        "is that of a loop that sees it so late. If the loop sees a new position at every row, "
+        "record that one: then the limit is higher."
+    )
+    return Notice("warning", "held position", text)
 
 
 def _at_rest(start: int, stop: int, samples: int) -> Notice:

@@ -24,6 +24,10 @@ def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, 
     return (
         "The device, its configuration and the way it is held are those of the recording: another "
         "person, posture or configuration has another limit.",
+        "Whatever moved or held the device beside the force that was recorded was there, too: the "
+        "limit is that of the device with it. Virtual damping, a compensation of friction or "
+        "gravity or another controller, whose forces are not in the command's column, must then "
+        "stay switched on beside the wall; without virtual damping the limit may be far lower.",
         "The wall is a pure stiffness: the commanded force is −K times the sampled position, "
         f"every {quantity(etfe.period_s, 's')}, without virtual damping.",
         "The commanded force is held between samples (zero-order hold). Hold and delay, also a "
