@@ -10,6 +10,8 @@ _PREFIXES = {-9: "n", -6: "\N{MICRO SIGN}", -3: "m", 0: "", 3: "k", 6: "M", 9: "
 _GRAMS = {-9: "\N{MICRO SIGN}g", -6: "mg", -3: "g", 0: "kg"}
 _PREFIXABLE = ("N", "A", "s", "m", "Hz")
 _NOTHING = "\N{EN DASH}"
+_LONGEST = 12  # characters of a number: nine digits, a point, a sign and a zero
+_FAR_APART = 1e4  # ends of an interval under one prefix
 
 
 @dataclass(frozen=True)
@@ -32,13 +34,15 @@ class Scale:
     ) -> str:
         """The number alone: two digits of `sd` where that is known, else `digits` digits.
 
-        `least` digits of the number itself are written, however large its `sd` is.
+        `least` digits of the number itself are written, however large its `sd` is.  With a power of
+        ten only where it would be longer than nine digits.
         """
         if value is None or not math.isfinite(value):
             return _NOTHING
         scaled = value * self.factor
         decimals = _decimals(scaled, None if sd is None else sd * self.factor, digits, least)
-        return minus(f"{round(scaled, decimals) + 0.0:.{max(decimals, 0)}f}")
+        text = f"{round(scaled, decimals) + 0.0:.{max(decimals, 0)}f}"
+        return minus(text if len(text) <= _LONGEST else f"{scaled:.1e}")
 
     def with_error(self, value: float | None, sd: float | None) -> str:
         """A number and its error with as many decimals: ``"0.590 ± 0.020"``; alone without one."""
@@ -93,9 +97,14 @@ def quantity(value: float | None, unit: str, sd: float | None = None, digits: in
 
 
 def interval(low: float | None, high: float | None, unit: str, sd: float | None = None) -> str:
-    """Two ends of an interval with one unit, for example ``"21.9 to 22.4 kN/m"``."""
+    """Two ends of an interval with one unit, for example ``"21.9 to 22.4 kN/m"``.
+
+    Ends that are decades apart have a prefix each.
+    """
     if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
         return _NOTHING
+    if _far_apart(low, high):
+        return f"{quantity(low, unit, digits=2)} to {quantity(high, unit, digits=2)}"
     row = scale((low, high), unit)
     spread = spread_of(low, high) if sd is None else sd
     return f"{row.number(low, spread)} to {row.number(high, spread)} {row.unit}".rstrip()
@@ -111,6 +120,8 @@ def spread_of(low: float, high: float) -> float:
 
 def estimate(middle: float, low: float, high: float, unit: str) -> str:
     """A value and its interval with the same digits: ``"22.3 (21.9 to 22.7) kN/m"``."""
+    if _far_apart(low, high):
+        return f"{quantity(middle, unit, digits=2)} ({interval(low, high, unit)})"
     row = scale((low, middle, high), unit)
     spread = spread_of(low, high)
     numbers = [row.number(value, spread) for value in (middle, low, high)]
@@ -188,6 +199,11 @@ def percents(probabilities: Sequence[float]) -> str:
     """Probabilities that share one row: ``"5 % to 0.1 %"``."""
     ends = (percent(probabilities[0]), percent(probabilities[-1]))
     return " to ".join(dict.fromkeys(ends))
+
+
+def _far_apart(low: float, high: float) -> bool:
+    """Whether one prefix would write one of two ends with a row of zeros."""
+    return math.inf > high > _FAR_APART * low > 0
 
 
 def _first_symbol(unit: str) -> tuple[str, str]:

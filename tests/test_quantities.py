@@ -38,6 +38,14 @@ def test_an_interval_has_one_unit_and_no_more_digits_than_it_can_bear() -> None:
     assert interval(None, 1.0, "N/m") == "–"
 
 
+def test_an_interval_of_many_decades_stays_short() -> None:
+    """What leaves everything open: one prefix wrote 23 zeros, for which a figure had no room."""
+    assert estimate(13_950.0, 1e-3, 4e8, "N/m") == "14 kN/m (1.0 mN/m to 400 MN/m)"
+    assert interval(1e-22, 4e15, "N/m") == "1.0e−13 nN/m to 4000000 GN/m"
+    assert estimate(14_000.0, 12e3, float("inf"), "N/m") == "14.0 (12.0 to –) kN/m"
+    assert scale(4e15, "N/m").number(1e-13, 4e15) == "1.0e−22"
+
+
 def test_percentages_are_never_rounded_to_certainty() -> None:
     assert [percent(p) for p in (0.05, 0.01, 0.001, 0.34, 0.9996, 1e-5)] == [
         "5 %",
