@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fake_analysis import fake_closed
+from fake_study import fake_study
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
@@ -12,6 +15,7 @@ from bayeshaptic.models import build_model
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability.cases import FREE, HELD, Case, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.study.recorded_cases import contradictions
 from bayeshaptic.types import Floats
 
 MODEL = build_model("free", "phantom")
@@ -149,3 +153,16 @@ def test_free_or_held_whichever_is_worse(device: str, apart_db: float) -> None:
     else:  # a toss: neither is safe to leave out
         assert abs(apart) < 0.5
         assert found.safe(0.05) <= min(free.limit.safe(0.05), held.limit.safe(0.05))
+
+
+def test_recordings_of_two_devices_contradict_each_other() -> None:
+    """One of another device had been a third of the draws of "nobody holds it", without a word."""
+    first, other, third = fake_study(people=0, free=3).recordings
+    assert not contradictions((first, other, third))
+    analysis = other.analysis
+    analysis.limit = replace(analysis.limit, samples=0.1 * analysis.limit.samples)
+    (warning,) = contradictions((first, other, third))
+    assert (warning.level, warning.topic) == ("warning", "contradiction")
+    assert "nobody holds it" in warning.text and f"by {other.name} " in warning.text
+    elsewhere = replace(other, entry=replace(other.entry, configuration="folded"))
+    assert not contradictions((first, elsewhere, third))

@@ -20,6 +20,7 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.study.configuration_limits import ConfigurationLimits, configuration_limits
 from bayeshaptic.study.recorded_cases import (
+    contradictions,
     period_s,
     place_of,
     posterior,
@@ -78,7 +79,7 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
     free = [one for one in good if one.entry.user is None]
     notes = _Notes()
     like, odd = _alike(held)
-    notes.notices += _periods(good) + _odd_notice(odd, like)
+    notes.notices += [*_periods(good), *contradictions(free), *_odd_notice(odd, like)]
     population, new_person, users = _people(like, seed, report, notes)
     ways: list[ConfigurationLimits] = []
     covered: list[Analysed] = []

@@ -8,12 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.errors import Notice
 from bayeshaptic.inference.posterior import Posterior
+from bayeshaptic.quantities import interval
 from bayeshaptic.stability.cases import FREE, Case
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.draws import draws_of
 from bayeshaptic.study.analysed import Analysed
 from bayeshaptic.types import Floats
+
+_CONTRADICT = 1.5  # times between the intervals of two limits of one device
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,50 @@ def place_of(configuration: float | str | None) -> str:
         return ""
     name = configuration if isinstance(configuration, str) else f"{configuration:g}"
     return f", configuration {name}"
+
+
+def contradictions(free: Sequence[Analysed]) -> tuple[Notice, ...]:
+    """Recordings that nobody holds, in one configuration, whose limits are far apart.
+
+    No hand differs between them, so that of one device they would agree.
+
+    Parameters
+    ----------
+    free : sequence of Analysed
+        Those that did not fail.
+    """
+    found: dict[str, list[Analysed]] = {}
+    for one in free:
+        found.setdefault("nobody holds it" + place_of(one.entry.configuration), []).append(one)
+    return tuple(
+        Notice("warning", "contradiction", _contradict(label, low, high))
+        for label, some in found.items()
+        for low, high in ((min(some, key=_upper), max(some, key=_lower)),)
+        if _lower(high) > _CONTRADICT * _upper(low)
+    )
+
+
+def _contradict(label: str, low: Analysed, high: Analysed) -> str:
+    ends = " and ".join(
+        f"{one.name} {interval(_lower(one), _upper(one), _limit(one).unit)}" for one in (low, high)
+    )
+    return (
+        f"Recordings of one case ({label}) contradict each other: the limit by {ends}. Are both of "
+        "one device, in one configuration and in the same units? The case has the draws of both."
+    )
+
+
+def _limit(one: Analysed) -> CriticalStiffness:
+    assert one.analysis is not None
+    return one.analysis.limit
+
+
+def _lower(one: Analysed) -> float:
+    return float(_limit(one).quantile(0.05))
+
+
+def _upper(one: Analysed) -> float:
+    return float(_limit(one).quantile(0.95))
 
 
 def recorded(some: Sequence[Analysed], group: str, beside: Sequence[Case] = ()) -> tuple[Case, ...]:
