@@ -15,6 +15,7 @@ from bayeshaptic.models import build_model
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability.cases import FREE, HELD, Case, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.study.cases import _two_names
 from bayeshaptic.study.recorded_cases import contradictions
 from bayeshaptic.types import Floats
 
@@ -166,3 +167,18 @@ def test_recordings_of_two_devices_contradict_each_other() -> None:
     assert "nobody holds it" in warning.text and f"by {other.name} " in warning.text
     elsewhere = replace(other, entry=replace(other.entry, configuration="folded"))
     assert not contradictions((first, elsewhere, third))
+
+
+def test_a_user_with_two_names_is_asked_about() -> None:
+    people = fake_study(people=3, free=1).recordings
+    assert not _two_names(people)
+
+    def named(user: str | None, configuration: str | None) -> list[str]:
+        last = people[-1]
+        entry = replace(last.entry, user=user, configuration=configuration)
+        return [one.text for one in _two_names((*people, replace(last, entry=entry)))]
+
+    (text,) = named("Anna ", None)
+    assert "The users 'anna' and 'Anna ' differ in capitals or spaces alone" in text
+    assert not named("anna", "Folded")
+    assert not named(None, None)

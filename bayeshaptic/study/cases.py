@@ -79,7 +79,8 @@ def study_cases(recordings: Sequence[Analysed], seed: int, report: Progress) -> 
     free = [one for one in good if one.entry.user is None]
     notes = _Notes()
     like, odd = _alike(held)
-    notes.notices += [*_periods(good), *contradictions(free), *_odd_notice(odd, like)]
+    notes.notices += [*_two_names(good), *_periods(good), *contradictions(free)]
+    notes.notices += _odd_notice(odd, like)
     population, new_person, users = _people(like, seed, report, notes)
     ways: list[ConfigurationLimits] = []
     covered: list[Analysed] = []
@@ -162,6 +163,26 @@ def _odd_notice(odd: Sequence[Analysed], like: Sequence[Analysed]) -> list[Notic
         f"Left out, and cases of their own: {others}."
     )
     return [Notice("warning", "population", text)]
+
+
+def _two_names(some: Sequence[Analysed]) -> list[Notice]:
+    """That a user or a configuration has two names, which differ in capitals and spaces alone."""
+    found: dict[tuple[str, str], dict[str, None]] = {}
+    for one in some:
+        for what, name in (("user", one.entry.user), ("configuration", one.entry.configuration)):
+            if isinstance(name, str):
+                found.setdefault((what, " ".join(name.casefold().split())), {})[name] = None
+    return [
+        Notice(
+            "warning",
+            "two names",
+            f"The {what}s {' and '.join(map(repr, names))} differ in capitals or spaces "
+            f"alone, and count as {len(names)}. If they are one, give all of its recordings one "
+            "name.",
+        )
+        for (what, _), names in found.items()
+        if len(names) > 1
+    ]
 
 
 def _periods(some: Sequence[Analysed]) -> list[Notice]:
