@@ -8,6 +8,7 @@ import pytest
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import Recording, recording_from_arrays
+from bayeshaptic.recordings.checks.two_clocks import two_clocks
 from bayeshaptic.recordings.signals.loop_period import doubts_the_loop, without_doubt
 from bayeshaptic.recordings.signals.runs import held_for
 from bayeshaptic.recordings.signals.timing import sampling_period
@@ -253,3 +254,25 @@ def test_a_position_that_is_read_more_slowly_than_the_force_changes_is_warned_of
     # Counts that are seldom passed are no clock.
     for position in (moved, 1e-4 * np.round(moved / 1e-4)):
         assert not warnings(position)
+
+
+def test_two_clocks_are_warned_of_and_a_device_that_changes_is_none() -> None:
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import lfilter
+
+    rng = np.random.default_rng(8)
+    rows = np.arange(18_000)
+    force = lfilter([0.3], [1, -0.7], rng.standard_normal(len(rows) + 20))
+    soft, firm = (1e-4 * lfilter([0, 0, 1], [1, -1.9, stiff], force) for stiff in (0.905, 0.93))
+
+    def warned(position: Floats) -> list[str]:
+        moved = position[: len(rows)] + 1e-6 * rng.standard_normal(len(rows))
+        read = recording_from_arrays(force[: len(rows)], moved, period_s=1e-3)
+        return [one.text for one in two_clocks(read)]
+
+    for rate in (1e-4, -1e-4):
+        (text,) = warned(CubicSpline(np.arange(len(soft)), soft)(rows * (1 + rate)))
+        assert ("earlier and earlier" if rate > 0 else "later and later") in text
+        assert float(text.split(" millionths")[0].split()[-1]) == pytest.approx(100, rel=0.05)
+    for position in (soft, np.where(np.arange(len(soft)) < 9000, soft, firm)):
+        assert not warned(position)

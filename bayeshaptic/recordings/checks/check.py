@@ -8,6 +8,7 @@ from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.against_device import against_response, compare_resolution
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
+from bayeshaptic.recordings.checks.two_clocks import two_clocks
 from bayeshaptic.recordings.checks.units_in_doubt import degrees, whole_numbers
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.feedback import has_feedback
@@ -37,8 +38,8 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
     -------
     tuple of Notice
         Those of the recording itself, then by topic: "units", "time stamps", "resolution",
-        "coherence", "two levels", "alignment", and "feedback" where the force was computed from
-        the motion.
+        "two clocks", "coherence", "two levels", "alignment", and "feedback" where the force was
+        computed from the motion.
 
     Raises
     ------
@@ -67,6 +68,7 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
     return (
         *without_doubt(recording.notices, recording.period_s, device),
         *scales,
+        *two_clocks(recording),
         *says_nothing_of_the_actuator(recording),
         *driven,
     )
