@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -356,6 +357,16 @@ def test_zero_weighs_no_more_than_there_is_room_for(light, monkeypatch):
     room = whole / np.sqrt(12) / np.sqrt(1 - 2 / np.pi)
     seen = [found.model.prior(fit.model.names[index]).seen for index in both]
     assert seen == pytest.approx([room, room], rel=0.06)
+
+
+def test_a_corner_that_every_axis_leads_out_of_leaves_the_errors(monkeypatch):
+    """Nothing could be drawn beside it: zero had no width, and the report ended in a prior's."""
+    axes = np.array([[2.0, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3  # each has both signs
+    slope = np.diag([1.0, 10.0, 100.0]) @ axes
+    monkeypatch.setattr(near_zero, "_slope", lambda *_: slope)
+    here = SimpleNamespace(log=np.zeros(3, bool), low=np.zeros(3), scale=np.ones(3))
+    room = near_zero._room(here, SimpleNamespace(theta=np.zeros(3)))
+    assert room == pytest.approx(np.linalg.norm(near_zero.root_of_covariance(slope), axis=1))
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,8 @@ def _room(here: Coordinates, fit: Fit) -> Floats:
 
     Of two dampers whose sum alone is known each may be anything up to that, and no more.  What
     walls leave is the deviation of the normal distribution that they cut off, in those of half a
-    normal: that is what is left of one beside its own wall.
+    normal: that is what is left of one beside its own wall.  Where every axis leads out of a corner
+    of walls, nothing is drawn beside the corner, and the deviations stand.
     """
     root = root_of_covariance(_slope(here, fit))
     errors = np.linalg.norm(root, axis=1)
@@ -126,7 +127,7 @@ def _room(here: Coordinates, fit: Fit) -> Floats:
         values, draws = fit.theta[walled] / here.scale[walled], 1000
         left = spread_above(here.low[walled], values, root[walled], draws)
         half = np.sqrt(1 - 2 / np.pi)
-        errors[walled] = np.minimum(errors[walled], left / half)
+        errors[walled] = np.where(left > 0, np.minimum(errors[walled], left / half), errors[walled])
     return np.asarray(errors)
 
 
