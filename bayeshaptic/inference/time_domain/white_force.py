@@ -1,9 +1,12 @@
-"""The motion of one mass fitted to its innovations, where a white force is all that disturbs it.
+"""The motion of one mass fitted more sharply, where a white force is all that disturbs it.
 
 Equal weights (`bayeshaptic.inference.time_domain.fit`) are right on average whatever force remains,
 and several times as far from the truth as need be where that is white.  Which of the two it is the
 innovations show: a force that depends on the position or the direction does not leave them white.
-What they do not show is that a controller makes its command of counts; that is asked for first.
+
+It is fitted to its counts where a white force moves it enough (`counts`), and else to innovations:
+of several pieces, under further laws, or where counts are all that disturb it.  What innovations do
+not show is that a controller makes its command of counts; that is asked for first.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.inference.time_domain.counts.fit import by_counts
 from bayeshaptic.inference.time_domain.descent import descend
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.innovations.filter import (
@@ -75,10 +79,10 @@ class WhitenedLoop(MassInLoop):
 
 
 def in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
-    """The motion fitted to its innovations where these are white, else as it was.
+    """The motion fitted to its counts or innovations where these are white, else as it was.
 
-    Where it is fitted anew, values and covariances are those that the innovations give; the errors
-    and the force along the way remain those of equal weights.
+    Where it is fitted anew, values and covariances are those that these give; the errors and the
+    force along the way remain those of equal weights.
 
     Parameters
     ----------
@@ -86,13 +90,16 @@ def in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
         Of the recording, with equal weights.
     recording : Recording
     """
+    counted = by_counts(motion, recording)
+    if counted is not None:
+        return counted
     try:
-        return _in_white_force(motion, recording)
+        return _by_innovations(motion, recording)
     except (InputError, np.linalg.LinAlgError):  # no motion stays near, or two columns are one
         return motion
 
 
-def _in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
+def _by_innovations(motion: MotionFit, recording: Recording) -> MotionFit:
     loop = motion.loop(recording)
     if _lost_in_counts(loop):
         return motion

@@ -125,8 +125,8 @@ def motion(analysis: Analysis) -> str:
     if (disturbed := found.motion.disturbed) is not None:
         text += (
             f" What is left looks like a white force of {quantity(disturbed.force_sd, force)} rms "
-            f"and noise of {quantity(disturbed.position_sd, unit)} rms in the position; every "
-            "sample is weighed accordingly (by the innovations of a Kalman filter)."
+            f"and noise of {quantity(disturbed.position_sd, unit)} rms in the position; each "
+            "sample counts for what those before it leave open of it."
         )
     elif found.motion.uneven_rms > worth_naming * rms:
         text += (

@@ -1,0 +1,140 @@
+"""The motion of one mass fitted count by count, where a white force is all that disturbs it.
+
+That it is white, innovations show: a force that depends on the position or the direction does not
+leave them so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bayeshaptic.inference.time_domain.counts.filter import Counts
+from bayeshaptic.inference.time_domain.counts.likeliest import (
+    ROUGH,
+    VALUES,
+    Likeliest,
+    about,
+    after,
+    exactly,
+    slopes_of,
+)
+from bayeshaptic.inference.time_domain.fit import MotionFit
+from bayeshaptic.inference.time_domain.innovations.filter import Disturbance
+from bayeshaptic.inference.time_domain.mass_forces import COULOMB
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
+from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
+from bayeshaptic.inference.time_domain.widths import SURELY
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.types import Floats
+
+_LAGS = 20  # samples
+_RARE = 1e-3  # how often chance is told from white noise by a test
+# Times that, with few cells, from which on more of them do not make it white.
+_HOPELESS = 10.0
+# Of a count, that the white force must move the mass by within a sample.  With less nearly every
+# count is certain, and what is fitted is the few that are not.
+_LEAST = 1e-3
+_SLIGHT = 3e-3  # of the white force, over which slopes over a further force are taken
+_FEWEST, _MOST = 300, 60_000  # samples: those that show whether a series is white; a minute's work
+
+
+def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
+    """The motion fitted count by count; None where that does not describe it.
+
+    Values and covariances are those that the counts give; the errors and the force along the way
+    remain those of equal weights.
+
+    Parameters
+    ----------
+    motion : MotionFit
+        Of the recording, with equal weights.
+    recording : Recording
+    """
+    unit = increment_unit(recording.position)
+    plain = motion.forces == COULOMB and not motion.hums and not recording.joints
+    if unit is None or not plain or not _FEWEST <= len(recording.position) <= _MOST:
+        return None
+    signals = np.array(recording.force), np.array(recording.position)
+    counts = Counts(*signals, recording.period_s, unit, ROUGH)
+    try:
+        near = about(counts, motion.inside)
+        if _in_counts(near) < _LEAST or _correlated(near) > _HOPELESS * _by_chance(_LAGS):
+            return None
+        found = exactly(near, float(motion.inside[4]), float(motion.sd[4]))
+    except np.linalg.LinAlgError:  # two values that nothing tells apart
+        return None
+    if found is None or not found.settled or _none_has(found) or not _like_noise(found):
+        return None
+    spread = found.covariance[:VALUES, :VALUES]
+    rest = motion.whole[VALUES:], motion.whole_sd[VALUES:]
+    return replace(
+        motion,
+        values=found.point[:VALUES],
+        inside=found.point[:VALUES],
+        covariance=spread,
+        whole=np.append(found.point[:VALUES], rest[0]),
+        whole_sd=np.append(np.sqrt(np.diag(spread)), rest[1]),
+        disturbed=Disturbance(found.force_sd, unit / np.sqrt(12)),
+    )
+
+
+def _none_has(found: Likeliest) -> bool:
+    """Whether mass, damping or delay would be below zero, as none is: others can say so."""
+    known = [NAMES.index(name) for name in ("m", "b", "delay_s")]
+    return bool(np.any(found.past[known] > SURELY))
+
+
+def _by_chance(freedom: int) -> float:
+    from scipy.stats import chi2
+
+    return float(chi2.isf(_RARE, freedom))
+
+
+def _in_counts(found: Likeliest) -> float:
+    """Of a count, what the white force moves the mass by within a sample."""
+    counts = found.counts
+    return found.force_sd * counts.period_s**2 / float(found.point[0]) / counts.unit
+
+
+def _like_noise(found: Likeliest) -> bool:
+    """Whether innovations are white, and owe nothing to the way."""
+    return _correlated(found) < _by_chance(_LAGS) and _along(found) < _by_chance(2 * WAVES)
+
+
+def _correlated(found: Likeliest) -> float:
+    """Sum of squared correlations of `_LAGS` lags, each over what its own products vary by.
+
+    So their sizes may differ, as where the mass rests (R. S. Deo, Journal of Econometrics 99,
+    2000, of the test of Box and Pierce).
+    """
+    new = after(found.counts, found.point).innovations
+    products = (new[k:] * new[:-k] for k in range(1, _LAGS + 1))
+    return float(sum(np.sum(one) ** 2 / np.maximum(one @ one, 1e-300) for one in products))
+
+
+def _along(found: Likeliest) -> float:
+    """Lagrange multiplier statistic of forces along the way, forward and backward: chi-square.
+
+    By regressing one on the slopes (L. G. Godfrey and M. R. Wickens, "Testing linear and log-linear
+    regressions for functional form", Review of Economic Studies 48, 1981).
+    """
+    counts = replace(found.counts, cells=ROUGH)
+    own = slopes_of(counts, found.point, np.sqrt(np.diag(found.covariance)))
+    shapes = waves(counts.position, Way.of(counts.position))
+    forward = after(counts, found.point).velocity > 0
+    further = []
+    for force in (_SLIGHT * found.force_sd) * np.concatenate([shapes * forward, shapes * ~forward]):
+        ends = [after(counts, found.point, side * force).likely for side in (1, -1)]
+        further.append(ends[0] - ends[1])
+    return _share(np.column_stack([own, *further])) - _share(own)
+
+
+def _share(slopes: Floats) -> float:
+    """Of ones, what slopes explain: squared length of the projection."""
+    scale = np.linalg.norm(slopes, axis=0)
+    scaled = slopes[:, scale > 0] / scale[scale > 0]
+    along = scaled.sum(axis=0)
+    return float(along @ np.linalg.pinv(scaled.T @ scaled, hermitian=True) @ along)
