@@ -34,11 +34,14 @@ class Followed:
         average whatever came before.
     velocity : ndarray, shape (N,)
         Expected.
+    work : ndarray, shape (N,)
+        How many normals were added.
     """
 
     likely: Floats
     innovations: Floats
     velocity: Floats
+    work: Floats
 
 
 @dataclass(frozen=True)

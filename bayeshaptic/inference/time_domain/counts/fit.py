@@ -38,7 +38,7 @@ _HOPELESS = 10.0
 # count is certain, and what is fitted is the few that are not.
 _LEAST = 1e-3
 _SLIGHT = 3e-3  # of the white force, over which slopes over a further force are taken
-_FEWEST, _MOST = 300, 60_000  # samples: those that show whether a series is white; a minute's work
+_FEWEST = 300  # samples that show whether a series is white
 
 
 def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
@@ -55,7 +55,7 @@ def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
     """
     unit = increment_unit(recording.position)
     plain = motion.forces == COULOMB and not motion.hums and not recording.joints
-    if unit is None or not plain or not _FEWEST <= len(recording.position) <= _MOST:
+    if unit is None or not plain or len(recording.position) < _FEWEST:
         return None
     signals = np.array(recording.force), np.array(recording.position)
     counts = Counts(*signals, recording.period_s, unit, ROUGH)

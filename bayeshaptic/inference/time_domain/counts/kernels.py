@@ -100,11 +100,12 @@ def _later(
 
 
 @kernel(inline=True)
-def _seen(
-    cases: Floats, into: Floats, low: float, unit: float, reach: float, beyond: float
-) -> None:
-    """All cases as the count says, which begins at `low`; those `beyond` to `reach` sd from it."""
-    cells = len(cases) // 3
+def _seen(cases: Floats, into: Floats, low: float, unit: float, reach: float, beyond: float) -> int:
+    """All cases as the count says, which begins at `low`; those `beyond` to `reach` sd from it.
+
+    How many normals were added is returned.
+    """
+    cells, added = len(cases) // 3, 0
     cell, new = unit / cells, np.empty(10)
     for i in range(len(cases)):
         if cases[i, 0] <= SLIGHT:
@@ -142,6 +143,8 @@ def _seen(
             new[8] -= by_v * by_f * lost
             new[9] = max(new[9] - by_f * by_f * lost, 0.0)
             add(into[i - i % cells + (j if sign > 0 else cells - 1 - j)], new)
+            added += 1
+    return added
 
 
 @kernel
@@ -154,7 +157,7 @@ def followed(
     unit: float,
     cells: int,
 ) -> Floats:
-    """Logarithms of probabilities, innovations over their size, velocities; shape (3, N).
+    """Logarithms of probabilities, innovations over their size, velocities, work; shape (4, N).
 
     Parameters
     ----------
@@ -174,7 +177,7 @@ def followed(
     """
     dry, offset, force_sd, whole, late_s, period_s = loads
     cases, other = np.zeros((3 * cells, 10)), np.zeros((3 * cells, 10))
-    out = np.zeros((3, len(position)))
+    out = np.zeros((4, len(position)))
     unknown = (3 * np.std(np.diff(position)) + 10 * unit) / period_s
     cell = unit / cells
     for k in range(len(position)):
@@ -183,10 +186,10 @@ def followed(
         if k > 0:
             before, spread, _ = middle(cases)
             other[:, 0] = 0.0
-            _seen(cases, other, low, unit, _NEAR, -np.inf)
+            out[3, k] = _seen(cases, other, low, unit, _NEAR, -np.inf)
             likely = np.sum(other[:, 0])
             if likely < SLIGHT:
-                _seen(cases, other, low, unit, FAR, _NEAR)
+                out[3, k] += _seen(cases, other, low, unit, FAR, _NEAR)
                 likely = np.sum(other[:, 0])
         if likely > _SMALLEST:
             other[:, 0] /= likely

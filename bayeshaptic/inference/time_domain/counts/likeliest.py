@@ -13,8 +13,9 @@ VALUES = 5  # mass, damping, dry friction, constant force, delay; then log of th
 ROUGH = 4  # cells of a count, with which values are looked for at first
 _FINER = (8, 16, 32)  # cells, where fewer are not enough
 # Squared changes of the samples' log likelihoods with twice the cells, added: with less than this
-# likelihoods are as smooth with fewer.  Twice the cells change a quarter of that, or less.
-_ENOUGH = 1.0
+# likelihoods are as smooth with fewer.
+_ENOUGH = 4.0
+_WORK = 5e6  # normals that are added in one of some 150 passes: half a minute in all
 _LOWEST = np.array([1e-12, 0.0, 0.0, -np.inf, 0.0, -np.inf])
 _SIZES = 10.0 ** np.arange(-4.0, 0.6, 0.25)  # of the command, that a white force may have
 _STEPS, _TRIALS = 30, 8
@@ -73,7 +74,8 @@ def exactly(near: Likeliest, delay_s: float, delay_sd: float) -> Likeliest | Non
 
     A delay may be likeliest in more than one place: others are tried, up to two `delay_sd` from
     `delay_s`.  None where no cells are enough: little but counts disturbs the mass then, and where
-    in a count it is lies between edges that no few normals describe.
+    in a count it is lies between edges that no few normals describe.  None, too, where it would
+    take minutes.
     """
     other = _elsewhere(near, delay_s, delay_sd)
     near = near if other is None or other.likely < near.likely else other
@@ -119,14 +121,15 @@ def _likely(counts: Counts, point: Floats) -> float:
 
 def _enough(near: Likeliest) -> int | None:
     """As many cells as it takes for likelihoods to be the same with more; None where none do."""
-    cells, known, change = near.counts.cells, after(near.counts, near.point).likely, np.inf
+    cells, known = near.counts.cells, after(near.counts, near.point)
     for finer in _FINER:
-        other = after(replace(near.counts, cells=finer), near.point).likely
-        change = float(np.sum((other - known) ** 2))
-        if change < _ENOUGH:
+        other = after(replace(near.counts, cells=finer), near.point)
+        if np.sum(known.work) > _WORK:
+            return None
+        if np.sum((other.likely - known.likely) ** 2) < _ENOUGH:
             return cells
         cells, known = finer, other
-    return cells if change < 4 * _ENOUGH else None
+    return None
 
 
 def _inverse(slopes: Floats) -> Floats:
