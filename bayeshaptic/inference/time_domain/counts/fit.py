@@ -34,9 +34,11 @@ _LAGS = 20  # samples
 _RARE = 1e-3  # how often chance is told from white noise by a test
 # Times that, with few cells, from which on more of them do not make it white.
 _HOPELESS = 10.0
-# Of a count, that the white force must move the mass by within a sample.  With less nearly every
-# count is certain, and what is fitted is the few that are not.
-_LEAST = 1e-3
+# Of a count, that the white force moves the mass by within a sample.  With less nearly every count
+# is certain, and what is fitted is the few that are not; with more a velocity that is cut at zero
+# describes what friction does worse than a linear filter.  Of 124 loops between both 87 to 94 % of
+# the 90 % intervals hold, of the 12 below 62 to 88 %, of the 10 above 50 to 100 %.
+_LEAST, _MOST = 0.005, 0.5
 _SLIGHT = 3e-3  # of the white force, over which slopes over a further force are taken
 _FEWEST = 300  # samples that show whether a series is white
 
@@ -61,7 +63,9 @@ def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
     counts = Counts(*signals, recording.period_s, unit, ROUGH)
     try:
         near = about(counts, motion.inside)
-        if _in_counts(near) < _LEAST or _correlated(near) > _HOPELESS * _by_chance(_LAGS):
+        if not _LEAST < _in_counts(near) < _MOST:
+            return None
+        if _correlated(near) > _HOPELESS * _by_chance(_LAGS):
             return None
         found = exactly(near, float(motion.inside[4]), float(motion.sd[4]))
     except np.linalg.LinAlgError:  # two values that nothing tells apart
