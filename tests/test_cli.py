@@ -486,7 +486,8 @@ class TestReport:
         """A study of which one recording is bad and two have the same name."""
         (tmp_path / "bad.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
         (tmp_path / "again").mkdir()
-        (tmp_path / "again" / phantom.name).write_bytes(phantom.read_bytes())
+        # One that was written anew: a copy of a file would be refused.
+        (tmp_path / "again" / phantom.name).write_bytes(phantom.read_bytes() + b"\n")
         (tmp_path / "study.toml").write_text(
             f"""
             [device]

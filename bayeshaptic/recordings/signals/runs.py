@@ -122,7 +122,9 @@ def moving_part(force: Floats, position: Floats, count: float) -> tuple[int, int
         moving = slice(first, first + parts * length)
         ways = np.ptp(position[moving].reshape(parts, length), axis=1)
         pushes = _pushes(force[moving].reshape(parts, length))
-        return bool(ways.min() > 3 * count and _pushes(rows) > _AS_FAR * np.median(pushes))
+        # What acts in its last tenth alone may be what ends it: a pulse after a rest.
+        acts = np.std(rows[: length - length // 10]) > _AS_FAR * np.std(force[moving])
+        return bool(acts and ways.min() > 3 * count and _pushes(rows) > _AS_FAR * np.median(pushes))
 
     return (first if is_one(force[:first]) else 0, stop if is_one(force[stop:]) else samples)
 
