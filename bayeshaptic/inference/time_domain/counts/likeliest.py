@@ -239,26 +239,46 @@ def _elsewhere(found: Likeliest, delay_s: float, delay_sd: float) -> Likeliest |
 
 
 def _fallen(found: Likeliest) -> tuple[Floats, Floats]:
-    """The covariance, no less along its axes than the likelihood falls by; the likeliest point met.
+    """The covariance, no less than the likelihood falls by; the likeliest point met.
 
-    Where few samples say most of a value, the likelihood is rough, and its slopes are steeper than
-    it falls.
+    Along its axes, and along each value alone.  Where few samples say most of a value the
+    likelihood is rough, and its slopes are steeper than it falls; next to a whole number of periods
+    those of a delay are.
     """
     scale = 1 / np.sqrt(np.diag(found.covariance))
     power, axes = np.linalg.eigh(found.covariance * np.outer(scale, scale))
     axes = axes * np.sqrt(np.maximum(power, 0.0)) / scale[:, None]
-    highest, most = found.point, found.likely
+    best = found.point, found.likely
     for axis in axes.T:
-        for _ in range(_TRIALS):
-            ends = [found.point + side * _AWAY * axis for side in (-1, 1)]
-            ends = [end for end in ends if np.all(end >= _LOWEST)]
-            if not ends:
-                break
-            likely = [_likely(found.counts, end) for end in ends]
-            if max(likely) > most:
-                highest, most = ends[int(np.argmax(likely))], max(likely)
-            fell = (found.likely - float(np.mean(likely))) / (0.5 * _AWAY**2)
-            if fell > 0.9:
-                break
-            axis *= min(1 / np.sqrt(max(fell, 0.1)), 3.0)
-    return axes @ axes.T, highest
+        times, best = _wider(found, axis, best)
+        axis *= times
+    covariance = np.asarray(axes @ axes.T)
+    alone = np.diag(1 / np.sqrt(np.diag(np.linalg.inv(covariance * np.outer(scale, scale)))))
+    for i, axis in enumerate(alone / scale):
+        times, best = _wider(found, axis, best)
+        covariance[i] *= times
+        covariance[:, i] *= times
+    return covariance, best[0]
+
+
+def _wider(
+    found: Likeliest, axis: Floats, best: tuple[Floats, float]
+) -> tuple[float, tuple[Floats, float]]:
+    """By how much the likelihood falls less along an axis of one standard deviation than it should.
+
+    `best` is the likeliest point met before, with its likelihood; it is handed on.
+    """
+    times = 1.0
+    for _ in range(_TRIALS):
+        ends = [found.point + side * _AWAY * times * axis for side in (-1, 1)]
+        ends = [end for end in ends if np.all(end >= _LOWEST)]
+        if not ends:
+            break
+        likely = [_likely(found.counts, end) for end in ends]
+        if max(likely) > best[1]:
+            best = ends[int(np.argmax(likely))], max(likely)
+        fell = (found.likely - float(np.mean(likely))) / (0.5 * _AWAY**2)
+        if fell > 0.9:
+            break
+        times *= min(1 / np.sqrt(max(fell, 0.1)), 3.0)
+    return times, best
