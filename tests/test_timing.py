@@ -8,8 +8,8 @@ import pytest
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import Recording, recording_from_arrays
+from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop, without_doubt
 from bayeshaptic.recordings.checks.two_clocks import two_clocks
-from bayeshaptic.recordings.signals.loop_period import doubts_the_loop, without_doubt
 from bayeshaptic.recordings.signals.runs import held_for
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.types import Floats, Ints
@@ -206,7 +206,7 @@ def test_a_force_that_is_held_leaves_the_period_of_its_loop_open(rows: int) -> N
         return recording_from_arrays(force, moved, period_s=period_s, time=time)
 
     open_ = read()
-    assert open_.samples == len(force) and doubts_the_loop(open_.notices)
+    assert open_.samples == len(force) and doubts_of_the_loop(open_.notices)
     assert f"held for {rows} rows" in open_.notices[0].text
     # Who says the period has said which loop it is.
     every_row, changes = read(1e-3), read(1e-3 * rows)
@@ -218,7 +218,7 @@ def test_a_force_that_is_held_leaves_the_period_of_its_loop_open(rows: int) -> N
     # Without stamps nobody can say both; a device's file says that of the loop.
     unstamped = read(1e-3, None)
     assert [notice.level for notice in unstamped.notices if notice.topic == "period"] == ["warning"]
-    assert not doubts_the_loop(unstamped.notices)
+    assert not doubts_of_the_loop(unstamped.notices)
     device = load_device("lhifam")
     assert not without_doubt(open_.notices[:1], 1e-3, device)
     assert without_doubt(open_.notices[:1], 2e-3, device) == open_.notices[:1]

@@ -13,10 +13,9 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.loop_period import LOOP
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.runs import held_for, moving_part, written_each
-from bayeshaptic.recordings.signals.timing import sampling_period
+from bayeshaptic.recordings.signals.timing import LOOP, sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
 from bayeshaptic.recordings.units import assumed_units, choose_units
 from bayeshaptic.types import Floats

@@ -13,10 +13,10 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
+from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
-from bayeshaptic.recordings.signals.loop_period import doubts_the_loop
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.beyond_band import beyond_band
@@ -139,11 +139,7 @@ def _of_the_misfit(analysis: Analysis, verdict: str | None) -> list[str]:
 def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -> list[str]:
     found = []
     found += _of_the_units(analysis)
-    if doubts_the_loop(analysis.notices):
-        found.append(
-            "the force is held for several rows, so that the loop's period may be longer than that "
-            "of a row and the limit lower: say the loop's period with --period-s"
-        )
+    found += doubts_of_the_loop(analysis.notices)
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
     if has_feedback(analysis.notices) and analysis.in_loop is None:

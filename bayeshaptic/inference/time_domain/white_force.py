@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.counts.fit import by_counts
+from bayeshaptic.inference.time_domain.counts.fit import FEWEST, LAGS, RARE, by_counts
 from bayeshaptic.inference.time_domain.descent import descend
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.innovations.filter import (
@@ -37,13 +37,10 @@ _SIZES = 10.0 ** np.arange(-6.0, 0.1, 0.4)  # of the command, that a white force
 # large the disturbance is in these.
 _CLOSER = (0.2, 0.05, 0.012, 0.003)
 _ROUNDS = 2  # fits, each with the filter of the last
-_LAGS = 20  # samples
 _WINDOW = 512  # samples of the spectra that show where a position is no more than counts
-_FEWEST = 300  # samples that show whether a series is white
 # Variance over that with all other values known (variance inflation).  Of 22 series of steps in
 # which it is larger 90 % intervals of mass, damping and delay would hold in two thirds.
 _APART = 100.0
-_RARE = 1e-3  # how often chance is told from white noise by a test
 _MOSTLY = 0.5  # of the motion, for which the sign of friction must be clear
 # Of the power of a command's changes, that the motion must show.  Of 404 loops with white
 # innovations the 90 % interval of the delay holds in 94 % of those above, in 76 % of those below.
@@ -194,7 +191,7 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
 
     assert loop.filtered is not None
     clear, moving = loop.filtered.clear, np.count_nonzero(loop.filtered.moving)
-    if np.count_nonzero(clear) < max(_MOSTLY * moving, _FEWEST):
+    if np.count_nonzero(clear) < max(_MOSTLY * moving, FEWEST):
         return False
     waves = np.zeros(2 * WAVES)
     error = loop.error(values, waves)
@@ -210,7 +207,7 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
     )
     along = moving * (plain @ plain / (with_waves @ with_waves) - 1)
     correlated = _correlated(plain, clear)
-    return bool(correlated < chi2.isf(_RARE, _LAGS) and along < chi2.isf(_RARE, 2 * WAVES))
+    return bool(correlated < chi2.isf(RARE, LAGS) and along < chi2.isf(RARE, 2 * WAVES))
 
 
 def told_apart(columns: Floats) -> bool:
@@ -225,14 +222,14 @@ def told_apart(columns: Floats) -> bool:
 
 
 def _correlated(left: Floats, clear: NDArray[np.bool_]) -> float:
-    """Box and Pierce's sum of squared correlations of `_LAGS` lags, of the clear samples.
+    """Box and Pierce's sum of squared correlations of `LAGS` lags, of the clear samples.
 
     G. E. P. Box and D. A. Pierce, Journal of the American Statistical Association 65, 1970.
     """
     noise = np.where(clear, left, 0.0)
     noise /= np.sqrt(np.mean(noise[clear] ** 2))
     known = clear.astype(float)
-    lags = range(1, _LAGS + 1)
+    lags = range(1, LAGS + 1)
     return float(sum((noise[k:] @ noise[:-k]) ** 2 / (known[k:] @ known[:-k]) for k in lags))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.against_device import against_response, compare_resolution
+from bayeshaptic.recordings.checks.loop_period import without_doubt
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
 from bayeshaptic.recordings.checks.two_clocks import two_clocks
 from bayeshaptic.recordings.checks.units_in_doubt import degrees, whole_numbers
@@ -14,7 +15,6 @@ from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.signals.loop_period import without_doubt
 from bayeshaptic.recordings.signals.rough_response import RoughResponse, rough_response
 from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER, unusual_period
 from bayeshaptic.recordings.units import refuse_mixed_units

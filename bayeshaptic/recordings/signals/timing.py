@@ -23,6 +23,7 @@ _LATEST = 1e100
 LONGEST_GAP, MOST_MISSING = 8, 0.01
 _WORTH_READING = 1000  # rows, about what a response can be read from
 # From here on the stamps' jitter is worth a warning.
+LOOP = "loop"  # what a warning of the topic "period" is about, where it doubts the loop's period
 NOTABLE_JITTER = 0.005
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayeshaptic.inference.time_domain.innovations.filter import held
 from bayeshaptic.types import Floats
 
 _LEAST = 1e-6  # of a period, that the old command acts in each
@@ -83,22 +84,10 @@ class Counts:
         # A part that vanished would leave out a look at friction: the likelihood would jump there.
         late = min(max(delay_s / self.period_s - whole, _LEAST), 1 - _LEAST)
         late_s = late * self.period_s
-        held = np.array([_held(mass, damping, t) for t in (late_s, self.period_s - late_s)])
+        spans = late_s, self.period_s - late_s
+        moves = (held(mass, damping, span) for span in spans)
+        kept = np.array([(motion[1, 1], motion[0, 1], *push) for motion, push in moves])
         loads = np.array([dry, offset, force_sd, whole, late_s, self.period_s])
         further = np.zeros(len(self.position)) if more is None else more
         signals = further, self.command, self.position
-        return Followed(*followed(held, loads, *signals, self.unit, self.cells))
-
-
-def _held(mass: float, damping: float, span_s: float) -> tuple[float, float, float, float]:
-    """What is kept of a velocity, position over it, position and velocity over a held force."""
-    rate = damping / mass
-    slight = 1e-6  # of a velocity, lost in the time: a series then is exact
-    if rate * span_s > slight:
-        kept = math.exp(-rate * span_s)
-        once = (1 - kept) / rate
-        twice = (span_s - once) / rate
-    else:
-        kept = 1 - rate * span_s
-        once, twice = span_s * (1 - 0.5 * rate * span_s), 0.5 * span_s**2
-    return kept, once, twice / mass, once / mass
+        return Followed(*followed(kept, loads, *signals, self.unit, self.cells))

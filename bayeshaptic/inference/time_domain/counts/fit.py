@@ -30,8 +30,8 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
-_LAGS = 20  # samples
-_RARE = 1e-3  # how often chance is told from white noise by a test
+LAGS = 20  # samples
+RARE = 1e-3  # how often chance is told from white noise by a test
 # Times that, with few cells, from which on more of them do not make it white.
 _HOPELESS = 10.0
 # Of a count, that the white force moves the mass by within a sample.  With less nearly every count
@@ -39,8 +39,8 @@ _HOPELESS = 10.0
 # describes what friction does worse than a linear filter.  Of 124 loops between both 87 to 94 % of
 # the 90 % intervals hold, of the 12 below 62 to 88 %, of the 10 above 50 to 100 %.
 _LEAST, _MOST = 0.005, 0.5
-_SLIGHT = 3e-3  # of the white force, over which slopes over a further force are taken
-_FEWEST = 300  # samples that show whether a series is white
+_NUDGE = 3e-3  # of the white force, over which slopes over a further force are taken
+FEWEST = 300  # samples that show whether a series is white
 
 
 def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
@@ -57,7 +57,7 @@ def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
     """
     unit = increment_unit(recording.position)
     plain = motion.forces == COULOMB and not motion.hums and not recording.joints
-    if unit is None or not plain or len(recording.position) < _FEWEST:
+    if unit is None or not plain or len(recording.position) < FEWEST:
         return None
     signals = np.array(recording.force), np.array(recording.position)
     counts = Counts(*signals, recording.period_s, unit, ROUGH)
@@ -65,7 +65,7 @@ def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
         near = about(counts, motion.inside)
         if not _LEAST < _in_counts(near) < _MOST:
             return None
-        if _correlated(near) > _HOPELESS * _by_chance(_LAGS):
+        if _correlated(near) > _HOPELESS * _by_chance(LAGS):
             return None
         found = exactly(near, float(motion.inside[4]), float(motion.sd[4]))
     except np.linalg.LinAlgError:  # two values that nothing tells apart
@@ -94,7 +94,7 @@ def _none_has(found: Likeliest) -> bool:
 def _by_chance(freedom: int) -> float:
     from scipy.stats import chi2
 
-    return float(chi2.isf(_RARE, freedom))
+    return float(chi2.isf(RARE, freedom))
 
 
 def _in_counts(found: Likeliest) -> float:
@@ -105,17 +105,17 @@ def _in_counts(found: Likeliest) -> float:
 
 def _like_noise(found: Likeliest) -> bool:
     """Whether innovations are white, and owe nothing to the way."""
-    return _correlated(found) < _by_chance(_LAGS) and _along(found) < _by_chance(2 * WAVES)
+    return _correlated(found) < _by_chance(LAGS) and _along(found) < _by_chance(2 * WAVES)
 
 
 def _correlated(found: Likeliest) -> float:
-    """Sum of squared correlations of `_LAGS` lags, each over what its own products vary by.
+    """Sum of squared correlations of `LAGS` lags, each over what its own products vary by.
 
     So their sizes may differ, as where the mass rests (R. S. Deo, Journal of Econometrics 99,
     2000, of the test of Box and Pierce).
     """
     new = after(found.counts, found.point).innovations
-    products = (new[k:] * new[:-k] for k in range(1, _LAGS + 1))
+    products = (new[k:] * new[:-k] for k in range(1, LAGS + 1))
     return float(sum(np.sum(one) ** 2 / np.maximum(one @ one, 1e-300) for one in products))
 
 
@@ -130,7 +130,7 @@ def _along(found: Likeliest) -> float:
     shapes = waves(counts.position, Way.of(counts.position))
     forward = after(counts, found.point).velocity > 0
     further = []
-    for force in (_SLIGHT * found.force_sd) * np.concatenate([shapes * forward, shapes * ~forward]):
+    for force in (_NUDGE * found.force_sd) * np.concatenate([shapes * forward, shapes * ~forward]):
         ends = [after(counts, found.point, side * force).likely for side in (1, -1)]
         further.append(ends[0] - ends[1])
     return _share(np.column_stack([own, *further])) - _share(own)

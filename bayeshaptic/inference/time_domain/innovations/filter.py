@@ -115,7 +115,7 @@ def innovations(
     from bayeshaptic.inference.time_domain.innovations.kernels import gains_of
 
     mass, damping, dry, _, delay_s = values[:5]
-    motion, push = _held(mass, damping, period_s)
+    motion, push = held(mass, damping, period_s)
     unknown = _UNKNOWN * disturbed.position_sd / period_s
     sizes = np.array([disturbed.force_sd, disturbed.position_sd, dry, unknown])
     gains, variances = gains_of(motion, push, sizes, velocity, _rests(velocity), _starts(pieces))
@@ -134,7 +134,7 @@ def _starts(pieces: Sequence[slice]) -> Ints:
     return np.array([piece.start for piece in pieces])
 
 
-def _held(mass: float, damping: float, span_s: float) -> tuple[Floats, Floats]:
+def held(mass: float, damping: float, span_s: float) -> tuple[Floats, Floats]:
     """Position and velocity `span_s` later, (2, 2), and what a held unit force adds, (2,)."""
     rate = damping / mass
     slight = 1e-6  # of a velocity, lost in the time: a series then is exact
@@ -154,9 +154,9 @@ def _position_over_force(
     """Position over a command, held and late: numerator and denominator in powers of 1/z."""
     whole = math.floor(delay_s / period_s)
     late_s = delay_s - whole * period_s
-    motion, _ = _held(mass, damping, period_s)
-    after, now = _held(mass, damping, period_s - late_s)
-    _, before = _held(mass, damping, late_s)
+    motion, _ = held(mass, damping, period_s)
+    after, now = held(mass, damping, period_s - late_s)
+    _, before = held(mass, damping, late_s)
     far, kept = motion[0, 1], motion[1, 1]
     above = np.zeros(whole + 4)
     for first, (moved, faster) in ((whole, now), (whole + 1, after @ before)):

@@ -6,17 +6,21 @@ from collections.abc import Iterable
 
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import Notice
+from bayeshaptic.recordings.signals.timing import LOOP
 
-LOOP = "loop"  # what a warning of the topic "period" is about, where it doubts the loop's period
 
-
-def doubts_the_loop(notices: Iterable[Notice]) -> bool:
-    """Whether a warning doubts that the loop has the period of the rows.
+def doubts_of_the_loop(notices: Iterable[Notice]) -> list[str]:
+    """Why no stiffness follows where a warning doubts that the loop has the period of the rows.
 
     The limit of a loop that is slower is lower, by as many times as its period is longer where
     delay and damping alone decide.
     """
-    return any(n.topic == "period" and LOOP in n.about for n in notices)
+    if not any(n.topic == "period" and LOOP in n.about for n in notices):
+        return []
+    return [
+        "the force is held for several rows, so that the loop's period may be longer than that of "
+        "a row and the limit lower: say the loop's period with --period-s"
+    ]
 
 
 def without_doubt(
