@@ -12,7 +12,7 @@ import pytest
 
 from bayeshaptic.threads import single_threaded
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SCRIPT = """
 import json, sys
 import numpy as np

@@ -11,7 +11,7 @@ import pytest
 
 import bayeshaptic as bh
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
 
 from paper import evidence, hypotheses, identification, margins, relays, residuals, rule_map, tables  # noqa: E402

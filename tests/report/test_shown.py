@@ -14,7 +14,7 @@ from fake_study import fake_study
 import bayeshaptic as bh
 from bayeshaptic.report.walls.section import case_of, table_of
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 RELAY = ROOT / "data" / "recordings" / "phantom-user-relay.csv.gz"
 ANALYSIS = fake_analysis("free", spread=0.01)
 SHOWN: dict[str, Any] = {

@@ -265,7 +265,7 @@ def test_a_file_is_not_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_real_analysis_makes_a_whole_report(tmp_path: Path) -> None:
-    data = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"
+    data = Path(__file__).parents[2] / "data" / "recordings" / "phantom-free.csv.gz"
     recording = bayeshaptic.read_recording(data)
     analysis = bayeshaptic.analyse(recording, model="free", device="phantom", ess=400)
     page = written(analysis, tmp_path / "out")
@@ -319,7 +319,7 @@ def test_every_link_leads_somewhere_and_no_name_is_there_twice(tmp_path: Path) -
 
 
 def test_the_figures_of_interval_coverage_are_those_of_the_benchmarks() -> None:
-    readme = (Path(__file__).parents[1] / "benchmarks" / "README.md").read_text(encoding="utf-8")
+    readme = (Path(__file__).parents[2] / "benchmarks" / "README.md").read_text(encoding="utf-8")
     for row, verdict in (("promised effects", "explained"), ("others", "unexplained")):
         cells = re.search(rf"\| {row} \|(.*)\|", readme)
         assert cells

@@ -17,7 +17,7 @@ from bayeshaptic.inference.saved.checkpoint import Checkpoint, kept_until_done
 from bayeshaptic.jobs import recording as jobs_recording
 from bayeshaptic.jobs.job import Job, Settings
 
-RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"
+RECORDING = Path(__file__).parents[2] / "data" / "recordings" / "phantom-free.csv.gz"
 
 SAMPLE = """
 import hashlib, os, sys

@@ -13,7 +13,7 @@ import pytest
 
 from bayeshaptic.devices import load_device
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "data"
 
 
 def script() -> ModuleType:

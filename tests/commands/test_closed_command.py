@@ -14,7 +14,7 @@ from bayeshaptic import cli
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.jobs import recording as recording_job
 
-RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
+RECORDINGS = Path(__file__).parents[2] / "data" / "recordings"
 FRICTION = {"coulomb_friction", "stribeck_friction", "dahl_friction"}
 
 

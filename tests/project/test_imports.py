@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / "bayeshaptic"
+PACKAGE = Path(__file__).parents[2] / "bayeshaptic"
 
 
 def modules_after(code: str) -> set[str]:

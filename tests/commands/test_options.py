@@ -14,8 +14,8 @@ from bayeshaptic.diagnosis.base.asked import base_model, measurement_of
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.numerics.spending import BUDGET_S
 
-STATISTICS = Path(__file__).parents[1] / "docs" / "statistics.md"
-RECORDING = Path(__file__).parents[1] / "data" / "recordings" / "phantom-free.csv.gz"
+STATISTICS = Path(__file__).parents[2] / "docs" / "statistics.md"
+RECORDING = Path(__file__).parents[2] / "data" / "recordings" / "phantom-free.csv.gz"
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import importlib.util
 import re
 import subprocess
 import sys
@@ -11,20 +10,9 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from example_script import EXAMPLES, load
 
 from bayeshaptic import read_study
-
-EXAMPLES = Path(__file__).parents[1] / "examples"
-
-
-def load(path: Path) -> ModuleType:
-    """A script as a module."""
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")

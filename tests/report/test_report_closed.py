@@ -41,7 +41,7 @@ from bayeshaptic.report.loop.tables import (
 from bayeshaptic.report.loop.words import in_short, lacked, subject, verdict
 from bayeshaptic.report.words import widened
 
-RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
+RECORDINGS = Path(__file__).parents[2] / "data" / "recordings"
 FAMILIES = ("linear", "nonlinear", "time-varying")
 LOOP_FILES = {f"{picture.name}.png" for picture in LOOP_PICTURES}
 

@@ -108,7 +108,7 @@ def test_a_grip_that_gets_firmer_is_limited_by_its_end_where_another_crossing_bi
 
 
 def test_a_drift_needs_three_parts_as_long_as_recordings_are() -> None:
-    recording = read_recording(Path(__file__).parent.parent / "data/recordings/phantom-free.csv.gz")
+    recording = read_recording(Path(__file__).parents[2] / "data/recordings/phantom-free.csv.gz")
     for seconds, there in ((7.4, False), (7.6, True)):
         etfe = estimate_etfe(recording.part(0, round(seconds / recording.period_s)))
         state = State(etfe, least_squares(build_model("free", "phantom"), etfe))

@@ -257,7 +257,7 @@ def test_chains_that_agree_in_a_wrong_valley_have_not_converged(light, monkeypat
 
 def test_what_follows_a_small_damper_leans_on_a_wall_only_where_it_is_there_itself():
     """Its coordinate, what is left beside the small one, may be below zero all the same."""
-    etfe = bh.estimate_etfe(Path(__file__).parent.parent / "data/recordings/lhifam-free.csv.gz")
+    etfe = bh.estimate_etfe(Path(__file__).parents[2] / "data/recordings/lhifam-free.csv.gz")
     fit = bh.least_squares(bh.free(), etfe)
     here = with_near_zero(sampling_coordinates(fit.model, fit.theta, fit.sd), fit)
     index = fit.model.names.index("delay_s")

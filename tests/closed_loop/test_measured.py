@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_examples import EXAMPLES, load
+from example_script import EXAMPLES, load
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.battery import is_periodic, periodic_tests

@@ -22,7 +22,7 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.signals.rough_response import rough_response
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
 
-RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
+RECORDINGS = Path(__file__).parents[2] / "data" / "recordings"
 BENCH = Bench.from_device("phantom")
 
 

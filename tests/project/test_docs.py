@@ -16,7 +16,7 @@ from bayeshaptic.cli import build_parser, main
 from bayeshaptic.diagnosis.base.alignment import MOVED
 from bayeshaptic.faq import entries, entry
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGES = sorted(
     {
         *ROOT.glob("*.md"),
