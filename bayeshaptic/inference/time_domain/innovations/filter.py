@@ -46,17 +46,16 @@ class Innovations:
         Infinite while the mass rests.
     follower : Follower
         That led the motion; what it did to the position is added to the error.
-    answer : Follower
-        Position over a command: numerator and denominator in powers of 1/z.
     pieces : tuple of slice
+    period_s : float
     """
 
     motion: Floats
     gains: Floats = field(repr=False)
     variances: Floats = field(repr=False)
     follower: Follower
-    answer: Follower
     pieces: tuple[slice, ...]
+    period_s: float
 
     @property
     def moving(self) -> NDArray[np.bool_]:
@@ -72,18 +71,29 @@ class Innovations:
             known[piece.start : piece.start + _FORGOTTEN] = False
         return known
 
-    def __call__(self, error: Floats) -> Floats:
-        """Of errors that were led, shape (N,)."""
+    def __call__(self, error: Floats, values: Floats) -> Floats:
+        """Of errors that were led, shape (N,).
+
+        What the follower did to the position goes with the values: taken from others, the motion
+        would answer to the follower's force, which is made of the noise, as it does to the command.
+
+        Parameters
+        ----------
+        error : ndarray, shape (N,)
+        values : ndarray
+            With which the motion was led: mass, viscous damping, dry friction, constant force,
+            delay, and others.
+        """
         from scipy.signal import lfilter
 
         from bayeshaptic.inference.time_domain.innovations.kernels import innovations_of
 
         led = self.follower
         force = np.concatenate([lfilter(led.above, led.below, error[one]) for one in self.pieces])
+        mass, damping, _, _, delay_s = values[:5]
+        answer = _position_over_force(mass, damping, delay_s, self.period_s)
         beside = self.motion, self.gains, self.variances, _starts(self.pieces)
-        return np.asarray(
-            innovations_of(*beside, self.answer.above, self.answer.below, force, error)
-        )
+        return np.asarray(innovations_of(*beside, *answer, force, error))
 
 
 def innovations(
@@ -114,13 +124,12 @@ def innovations(
     """
     from bayeshaptic.inference.time_domain.innovations.kernels import gains_of
 
-    mass, damping, dry, _, delay_s = values[:5]
+    mass, damping, dry = values[:3]
     motion, push = held(mass, damping, period_s)
     unknown = _UNKNOWN * disturbed.position_sd / period_s
     sizes = np.array([disturbed.force_sd, disturbed.position_sd, dry, unknown])
     gains, variances = gains_of(motion, push, sizes, velocity, _rests(velocity), _starts(pieces))
-    answer = Follower(*_position_over_force(mass, damping, delay_s, period_s))
-    return Innovations(motion, gains, variances, follower, answer, tuple(pieces))
+    return Innovations(motion, gains, variances, follower, tuple(pieces), period_s)
 
 
 def _rests(velocity: Floats) -> NDArray[np.bool_]:
