@@ -27,7 +27,7 @@ _TOLD = ("m", "m1", "m2", "kc")  # masses and springs of the device: dampers are
 def file_in_doubt(
     etfe: Etfe, fits: Mapping[str, Fit], device: Device | None, options: Options
 ) -> tuple[Notice, ...]:
-    """A warning where a model leaves noise without the file's values and not with them.
+    """A warning where a model leaves noise without the file's values, and none does with them.
 
     The prior of a value that is wrong by a thousand lies so far away that fits end in between,
     where nothing explains the recording; effects are then found that make up for it.
@@ -41,6 +41,9 @@ def file_in_doubt(
     options : Options
     """
     if device is None:
+        return ()
+    tried = [fits[name] for name in device.parameters if name in fits]
+    if any(not fit.misfits for fit in tried):  # the others' values are of a device held otherwise
         return ()
     for name, given in device.parameters.items():
         if name not in fits or not fits[name].misfits:
