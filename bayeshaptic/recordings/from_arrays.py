@@ -17,7 +17,7 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.runs import held_for, moving_part, written_each
 from bayeshaptic.recordings.signals.timing import LOOP, sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
-from bayeshaptic.recordings.units import assumed_units, choose_units
+from bayeshaptic.recordings.units import assumed_units, base_unit, choose_units
 from bayeshaptic.types import Floats
 
 
@@ -46,13 +46,15 @@ def recording_from_arrays(
         it, and the force is held in between, one row for each force is read. Or:
     time : array_like, shape (N,), or None
         Time stamps in seconds.
-    force_unit : {"N", "Nm", "A"} or None
-    position_unit : {"m", "rad"} or None
+    force_unit : str or None
+        "N", "Nm" or "A", or any that ``--columns`` takes, such as "mN m".
+    position_unit : str or None
+        "m" or "rad", or any that ``--columns`` takes, such as "mm" or "deg".
     kind : {"translational", "rotational"} or None
         Decides where the units are None; otherwise N and m.
     name : str
     encoder_resolution : float or None
-        One encoder count, in the position's unit.
+        One encoder count, in `position_unit`.
     source : Path or None
         The file, for messages and reports.
     reference : array_like, shape (N,), or None
@@ -76,6 +78,11 @@ def recording_from_arrays(
     _refuse_lengths(where, force=force, position=position, reference=followed, time=stamps)
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
+    if time is None and period_s is None and source is None:
+        raise InputError(f"{where}: no time and no period; give period_s in seconds, or time")
+    force, force_unit, _ = _in_base_unit(force, "force", force_unit, where)
+    position, position_unit, factor = _in_base_unit(position, "position", position_unit, where)
+    encoder_resolution = None if encoder_resolution is None else factor * encoder_resolution
     held = held_for(force)
     each, first = written_each((force,))
     if each > 1 and stamps is not None and _is_period(period_s, stamps, each):
@@ -121,6 +128,22 @@ def recording_from_arrays(
         notices=notices,
         reference=followed,
     )
+
+
+def _in_base_unit(
+    signal: Floats, role: str, unit: str | None, where: str
+) -> tuple[Floats, str | None, float]:
+    """A signal in its role's base unit, that unit, and the factor between them."""
+    if unit is None:
+        return signal, None, 1.0
+    try:
+        base, factor = base_unit(role, unit)
+    except InputError as error:
+        raise InputError(f"{where}: {role}_unit: {error}", topic="units") from None
+    if factor != 1.0:
+        signal = factor * signal
+        signal.setflags(write=False)
+    return signal, base, factor
 
 
 def _is_period(period_s: float | None, stamps: Floats, rows: int) -> bool:

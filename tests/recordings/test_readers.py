@@ -503,6 +503,19 @@ def test_the_measured_servo(measured: Callable[[str], Path]) -> None:
     assert recording.force[0] == pytest.approx(35.15 * 2.53862809)
 
 
+def test_arrays_in_other_units() -> None:
+    degrees, counts = np.degrees(POSITION), np.degrees(1e-3)
+    recording = recording_from_arrays(
+        1e3 * FORCE, degrees, 1e-3, None, "mN m", "deg", encoder_resolution=counts
+    )
+    np.testing.assert_allclose(recording.force, FORCE, rtol=1e-14)
+    np.testing.assert_allclose(recording.position, POSITION, rtol=1e-14)
+    assert (recording.force_unit, recording.position_unit) == ("Nm", "rad")
+    assert recording.encoder_resolution == pytest.approx(1e-3)
+    with pytest.raises(ValueError, match="read-only"):
+        recording.position[0] = 1.0
+
+
 def test_arrays_in_memory() -> None:
     recording = recording_from_arrays(FORCE[:, None], POSITION[None, :], period_s=2e-3)
     np.testing.assert_array_equal(recording.force, FORCE)
@@ -516,7 +529,10 @@ def test_arrays_in_memory() -> None:
         ({"force": np.ones((2, N)), "period_s": 1e-3}, r"not an array of shape \(2, 50\)"),
         ({"period_s": 0.0}, "period_s is 0.0; give a number above 0, in seconds"),
         ({}, "no time and no period"),
-        ({"period_s": 1e-3, "force_unit": "lbf"}, "force_unit is 'lbf'; use N, Nm, A"),
+        (
+            {"period_s": 1e-3, "force_unit": "lbf"},
+            "force_unit: 'lbf' is no unit of force: use N, mN",
+        ),
         ({"period_s": 1e-3, "kind": "rotary"}, "kind is 'rotary'; use translational or rotational"),
         (
             {"period_s": 1e-3, "kind": "rotational", "position_unit": "m"},
