@@ -53,7 +53,7 @@ class Device(Shown):
     encoder_resolution: float | None = None
     lever_m: float | None = None
     band_hz: tuple[float, float] | None = None
-    parameters: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    parameters: Mapping[str, Mapping[str, float]] = field(default_factory=dict, hash=False)
     notes: tuple[str, ...] = ()
 
     @property

@@ -72,13 +72,13 @@ class Options:
     delay_s: float | None = None
     delay_sd_s: float | None = None
     band_hz: tuple[float, float] | None = None
-    prior: Mapping[str, Prior] = field(default_factory=dict)
+    prior: Mapping[str, Prior] = field(default_factory=dict, hash=False)
     held: bool | None = None
     modes: int | None = None
     lever_m: float | None = None
     ess: float | None = None
     hidden: bool = True
-    effects: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, float] = field(default_factory=dict, hash=False)
     seed: int = 0
     budget_s: float = BUDGET_S
     checkpoints: str | Path | None = field(default=None, compare=False)

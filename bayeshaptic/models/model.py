@@ -59,9 +59,9 @@ class Model(Shown):
 
     structure: Structure
     parameters: tuple[Parameter, ...]
-    fixed: Mapping[str, float] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict, hash=False)
     period_s: float | None = None
-    reference: Mapping[str, float] = field(default_factory=dict)
+    reference: Mapping[str, float] = field(default_factory=dict, hash=False)
     force_unit: str = "N"
     position_unit: str = "m"
     device: Device | None = None

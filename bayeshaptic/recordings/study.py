@@ -46,7 +46,7 @@ class StudyEntry:
     configuration: float | str | None = None
     trial: int | str | None = None
     level: float | None = None
-    columns: Columns = None
+    columns: Columns = field(default=None, hash=False)
     rows: Span | None = None
     seconds: Span | None = None
     more: tuple[StudyEntry, ...] = ()
@@ -80,9 +80,9 @@ class Study(Shown):
     path: Path
     device: Device
     entries: tuple[StudyEntry, ...]
-    columns: Columns = None
-    prior: Mapping[str, Mapping[str, float | bool]] = field(default_factory=dict)
-    effects: Mapping[str, float] = field(default_factory=dict)
+    columns: Columns = field(default=None, hash=False)
+    prior: Mapping[str, Mapping[str, float | bool]] = field(default_factory=dict, hash=False)
+    effects: Mapping[str, float] = field(default_factory=dict, hash=False)
     notices: tuple[Notice, ...] = ()
     references: tuple[KnownLimit, ...] = ()
     feedback: Feedback | None = None

@@ -57,6 +57,21 @@ def test_a_result_is_equal_to_itself_alone(name: str) -> None:
     assert len({one, other}) == 2
 
 
+@pytest.mark.parametrize(
+    "thing",
+    [
+        bh.grasped(device="phantom"),
+        bh.load_device("lhifam"),
+        bh.Options(prior={"m1": bh.LogNormal(0.2, 0.1)}, effects={"each": 0.1}),
+        bh.Settings(columns="time=t,force=u,position=q"),
+        bh.read_study(Path(__file__).parents[1] / "examples" / "study" / "study.toml"),
+    ],
+    ids=lambda thing: type(thing).__name__,
+)
+def test_what_is_equal_has_one_hash(thing: Any) -> None:
+    assert {thing, copy.deepcopy(thing)} == {thing}
+
+
 def test_numbers_have_units() -> None:
     assert "N/m, median and 90 % interval" in repr(ANALYSIS.limit)
     assert "kg" in repr(ANALYSIS.fit) and "kg" in repr(ANALYSIS.posterior)
