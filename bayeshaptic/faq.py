@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from bayeshaptic.errors import InputError, Notice, describe
+from bayeshaptic.errors import InputError, Notice, describe, nearest_or_all
 
 _ROOT = Path(__file__).parent
 _ENTRY = re.compile(
@@ -69,7 +69,7 @@ def entry(topic: str) -> Entry:
     for one in known.values():
         if topic in one.title.split(", "):
             return one
-    raise InputError(f"no entry {topic!r}; there are {', '.join(known)}")
+    raise InputError(f"no entry {topic!r}{nearest_or_all(word, known)}")
 
 
 def entry_of(error: BaseException) -> Entry | None:

@@ -38,11 +38,26 @@ def whole_file(path: Path) -> Iterator[Path]:
     end = 20  # of a name: long enough for its ending, by which some libraries know what to write
     partial = path.with_name(f".part-{owner()}-{path.name[-end:]}")
     try:
-        yield partial
-        flush(partial)
-        os.replace(partial, path)
+        with known_as(path, partial):
+            yield partial
+            flush(partial)
+            os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def known_as(path: Path, hidden: Path) -> Iterator[None]:
+    """What the system cannot do with a hidden file or folder is told of the name it is to have."""
+    try:
+        yield
+    except OSError as error:
+        for name in ("filename", "filename2"):
+            told = getattr(error, name, None)
+            if told is not None and Path(os.fsdecode(told)).is_relative_to(hidden):
+                known = path / Path(os.fsdecode(told)).relative_to(hidden)
+                setattr(error, name, str(known))
+        raise
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.errors import InputError, printable
+from bayeshaptic.errors import InputError, printable, refuse_place
 from bayeshaptic.files import whole_file, write_whole
 
 if TYPE_CHECKING:
@@ -46,12 +46,15 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the columns; 0."""
     from bayeshaptic.recordings.overview.overview import overview
 
-    for path in (arguments.png, arguments.write):
-        if path is None or not path.exists():
+    for path, example in ((arguments.png, "columns.png"), (arguments.write, "study.toml")):
+        if path is None:
             continue
-        if path.samefile(arguments.recording):
+        refuse_place(path, example)
+        if path.exists() and path.samefile(arguments.recording):
             raise InputError(f"{path} is the recording itself; name another file to write")
-        if not arguments.force:
+        if path.suffix.lower() != Path(example).suffix:
+            raise InputError(f"{path}: give a name that ends in {Path(example).suffix}")
+        if path.exists() and not arguments.force:
             raise InputError(f"{path} exists; name another file, or overwrite it with --force")
     found = overview(arguments.recording)
     for line in lines(found):

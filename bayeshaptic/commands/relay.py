@@ -52,8 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         choices=("rigid", "free", "grasped"),
-        default="grasped",
-        help="which of the device file's models (default: grasped, somebody holds the device)",
+        help="which of the models of --device (default: grasped, somebody holds the device)",
     )
     add_quiet(parser)
 
@@ -68,6 +67,8 @@ def run(arguments: argparse.Namespace) -> int:
     from bayeshaptic.stability.relay.check import check_relay
     from bayeshaptic.stability.relay.measure import measure_relay
 
+    if arguments.model and not arguments.device:
+        raise InputError("--model names a device file's model; give --device, too")
     recording = read_measurement(arguments.recording, arguments.columns, arguments.period_s)
     if not isinstance(recording, Recording):
         raise InputError(
@@ -78,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
         for line in measured_lines(recording.name, measured):
             talk.say(line)
         if arguments.device:
-            model = build_model(arguments.model, arguments.device)
+            model = build_model(arguments.model or "grasped", arguments.device)
             model = model.with_period(recording.period_s)
             for line in check_lines(check_relay(measured, model), measured.unit):
                 talk.say(line)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.files import flush, is_of_a_report, owner, remove_dead_drafts
+from bayeshaptic.files import flush, is_of_a_report, known_as, owner, remove_dead_drafts
 
 
 @contextmanager
@@ -88,7 +88,7 @@ def report_in(
     out = Path(out_dir).resolve()
     if out.exists() and not out.is_dir():
         raise InputError(f"{out_dir}: is a file; name a folder for the report.")
-    with draft_in(out if out.exists() else out.parent) as draft:
+    with draft_in(out if out.exists() else out.parent) as draft, known_as(out, draft):
         yield draft
         refuse_to_replace(out, {*stale, *(path.name for path in draft.iterdir())}, sources)
         for name in stale:

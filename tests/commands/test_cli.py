@@ -277,6 +277,10 @@ def test_units_wrong_by_a_thousand_are_a_warning(
         (["simulate", "phantom", "-o", "a.csv", "--effect", "magic"], "coulomb_friction"),
         (["simulate", "phantom", "-o", "a.csv", "--effect", "extra_delay=x"], "FIELD:VALUE"),
         (["batch", "a/same.csv", "a/same.mat"], "rename one"),
+        (["relay", "{phantom}", "--model", "free"], "give --device, too"),
+        (["inspect", "{phantom}", "--write", "study"], "a name that ends in .toml"),
+        (["inspect", "{phantom}", "--png", "no/such/a.png"], "no/such: no such folder"),
+        (["explain", "feedbck"], "did you mean 'feedback'?"),
     ],
 )
 def test_wrong_input_is_one_line(

@@ -34,6 +34,19 @@ def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
     assert sorted(os.listdir(out)) == ["a", "b", "last", "z"]
 
 
+def test_an_error_names_the_file_and_not_its_draft(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError) as caught:
+        write_whole(tmp_path / "no" / "b.json", "x")
+    assert caught.value.filename == str(tmp_path / "no" / "b.json")
+    with (
+        pytest.raises(FileNotFoundError) as caught,
+        report_in(tmp_path / "out", "b", []) as draft,
+    ):
+        draft.rmdir()
+        (draft / "a").write_text("x")
+    assert caught.value.filename == str(tmp_path.resolve() / "out" / "a")
+
+
 @pytest.mark.parametrize("name", ["limits.csv", "summary.json", "posterior.nc"])
 def test_a_report_does_not_replace_what_it_is_made_from(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("time_s,force_n,position_m\n")
