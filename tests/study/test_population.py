@@ -18,6 +18,7 @@ from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelih
 from bayeshaptic.inference.population.hierarchy import Hierarchy, inverse_and_log_det
 from bayeshaptic.inference.population.hyperparameters import LKJ, Unknowns
 from bayeshaptic.inference.population.infer import (
+    _notices,
     infer_population,
     prior_moments,
     study_coordinates,
@@ -475,3 +476,11 @@ def test_priors_in_the_coordinates_of_a_study() -> None:
     assert at["b2"][1] * at["b2"][2] == pytest.approx(2 * 0.057, rel=0.01)
     assert at["delay_s"][0] * at["delay_s"][2] == pytest.approx(150e-6)
     assert at["delay_s"][1] * at["delay_s"][2] == pytest.approx(20e-6, rel=0.01)
+
+
+@pytest.mark.parametrize(("spread", "told"), [(0.03, True), (0.3, False)])
+def test_people_as_alike_as_one_are_asked_about(spread: float, told: bool) -> None:
+    sd = np.column_stack([np.full((9, 4), 0.01), np.full(9, spread)])
+    texts = [one.text for one in _notices((), ("ana", "bo", "cy", "di"), sd)]
+    assert len(texts) == told
+    assert not told or "differ by 3 % at most" in texts[0] and "ana, bo, cy, di one" in texts[0]

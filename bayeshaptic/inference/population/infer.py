@@ -14,6 +14,7 @@ from bayeshaptic.inference.coordinates import Coordinates, coordinates
 from bayeshaptic.inference.population.below import draw_below
 from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.population.hierarchy import Hierarchy
+from bayeshaptic.inference.population.hyperparameters import TRIAL_SPREAD
 from bayeshaptic.inference.population.population import Population
 from bayeshaptic.inference.population.reweighting import ALONE, Reweighted, redescribed, reweight
 from bayeshaptic.inference.population.sampler import LevelChains, sample_level
@@ -24,6 +25,8 @@ from bayeshaptic.models.build import DAMPER_SCALE
 from bayeshaptic.models.prior_of_zero import weight_of_zero
 from bayeshaptic.models.structures import HAND
 from bayeshaptic.progress import silent, told
+from bayeshaptic.quantities import percent
+from bayeshaptic.shown import listed
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Progress
 
@@ -114,7 +117,7 @@ def infer_population(
         places=spots,
         model=model,
         recordings=own,
-        notices=(*chains.notices, *_notices(own, names)),
+        notices=(*chains.notices, *_notices(own, names, draws.level.hand_sd)),
         seconds=time.perf_counter() - began,
         chains=chains.resting(),
         walkers=walkers,
@@ -258,7 +261,9 @@ def _hierarchy(
     return hierarchy, names, spots
 
 
-def _notices(recordings: Sequence[Reweighted], users: tuple[str, ...]) -> tuple[Notice, ...]:
+def _notices(
+    recordings: Sequence[Reweighted], users: tuple[str, ...], hand_sd: Floats
+) -> tuple[Notice, ...]:
     notices = []
     alone = [one for one in recordings if one.how == ALONE]
     if alone:
@@ -274,6 +279,15 @@ def _notices(recordings: Sequence[Reweighted], users: tuple[str, ...]) -> tuple[
         text = (
             f"{len(users)} {says} little about how much people differ: the prior decides, and the "
             "interval of a new person is wide; record at least six people."
+        )
+        notices.append(Notice("warning", "population", text))
+    most = float(np.max(np.median(hand_sd, axis=0)))
+    if len(users) > 1 and most < TRIAL_SPREAD:
+        text = (
+            f"The hands of these {len(users)} people differ by {percent(most)} at most (standard "
+            "deviation), less than that of one person does from one recording to the next: are "
+            f"{listed(users)} one person? Then give all of its recordings one name; a person not "
+            "yet seen is taken to be as like them as they are like one another."
         )
         notices.append(Notice("warning", "population", text))
     return tuple(notices)
