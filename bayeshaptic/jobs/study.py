@@ -17,14 +17,14 @@ from bayeshaptic.jobs.executors import Outcome
 from bayeshaptic.jobs.job import Job, checkpoints_of, refuse_file
 from bayeshaptic.jobs.recording import reported
 from bayeshaptic.provenance import provenance
-from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.recordings.study import Study
 from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.draft import refuse_to_replace
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.write import NAMES, write_study_report
-from bayeshaptic.study.analysis import StudyAnalysis, analyse_study, distinct
+from bayeshaptic.study.analysed import names_of
+from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
 from bayeshaptic.types import Executor, Progress
 
 _WRITING = 0.95
@@ -149,7 +149,7 @@ def analyse_and_report(
 
 def folders_of(tasks: Sequence[Any], parent: Path) -> tuple[Path, ...]:
     """A folder for each recording, numbered where two have the same name."""
-    names = distinct([recording_name(task.entry.path) for task in tasks])
+    names = names_of([task.entry for task in tasks])
     return tuple(parent / name for name in names)
 
 

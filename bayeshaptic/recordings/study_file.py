@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import filecmp
 import math
 import os
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from bayeshaptic.recordings.cut import Cut, Span
 from bayeshaptic.recordings.feedback import read_feedback
 from bayeshaptic.recordings.known_limits import read_references
 from bayeshaptic.recordings.read import Columns
+from bayeshaptic.recordings.readers.packed import same_content
 from bayeshaptic.recordings.study import Study, StudyEntry
 
 STUDY_KEYS = ("device", "pool", "prior", "effects", "feedback", "recording", "reference")
@@ -107,12 +107,12 @@ def _pool(table: Table) -> bool | None:
 def _refuse_twice(entries: Sequence[StudyEntry], columns: Columns, path: Path) -> None:
     """Refuse samples that are listed twice: they would count as twice the data.
 
-    A copy of a file under another name is that file.
+    A copy of a file under another name, gzipped or not, is that file.
     """
     known: dict[Path, list[tuple[int, StudyEntry]]] = {}
     for number, entry in enumerate(entries, start=1):
         file = entry.path.resolve()
-        of_one = next((one for one in known if one == file or _copies(one, file)), file)
+        of_one = next((one for one in known if one == file or same_content(one, file)), file)
         others = known.setdefault(of_one, [])
         for other, earlier in others:
             alike = parse_columns(entry.columns or columns) == parse_columns(
@@ -130,15 +130,6 @@ def _refuse_twice(entries: Sequence[StudyEntry], columns: Columns, path: Path) -
                     "seconds of its own"
                 )
         others.append((number, entry))
-
-
-def _copies(one: Path, other: Path) -> bool:
-    """Whether two files have the same content; not said of what is empty or cannot be read."""
-    try:
-        size = one.stat().st_size
-        return 0 < size == other.stat().st_size and filecmp.cmp(one, other, shallow=False)
-    except OSError:
-        return False
 
 
 def _overlap(one: StudyEntry, other: StudyEntry) -> bool:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.recordings.study import StudyEntry
 
 
@@ -38,3 +40,17 @@ class Analysed:
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that were accepted."""
         return self.result.effect_names if self.result else ()
+
+
+def names_of(entries: Sequence[StudyEntry]) -> list[str]:
+    """What recordings are called: as their files, numbered where one name comes more than once.
+
+    Parameters
+    ----------
+    entries : sequence of StudyEntry
+    """
+    names = [recording_name(entry.path) for entry in entries]
+    return [
+        name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}"
+        for index, name in enumerate(names)
+    ]

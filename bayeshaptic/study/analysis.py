@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,18 +17,17 @@ from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.several import Together
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.errors import Notice, describe
+from bayeshaptic.errors import InputError, Notice, describe
 from bayeshaptic.inference.choose import CANDIDATES
 from bayeshaptic.inference.population.population import Population
 from bayeshaptic.models import prior_from_table
 from bayeshaptic.models.prior_table import refuse_unknown
 from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks.sufficiency import refuse_where_told
-from bayeshaptic.recordings.from_columns import recording_name
 from bayeshaptic.recordings.study import Study, StudyEntry
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.cases import Case, DeviceLimit
-from bayeshaptic.study.analysed import Analysed
+from bayeshaptic.study.analysed import Analysed, names_of
 from bayeshaptic.study.cases import StudyCases, study_cases
 from bayeshaptic.study.configuration_limits import ConfigurationLimits
 from bayeshaptic.study.hidden import known_together
@@ -183,13 +183,15 @@ def analyse_study(
         Where a prior of the study cannot be understood, or is of no parameter, or no effect.
     """
     study = study.with_periods_apart()
-    prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
+    with _in_the_file(study):
+        prior = {name: prior_from_table(name, table) for name, table in study.prior.items()}
+        if model == "auto" and options_from(options, changes).modes is None:
+            refuse_unknown(prior, CANDIDATES)
+        HiddenPrior.from_table(study.effects)
     chosen = options_from(options, changes)
     device = device_of(chosen, model) or study.device
     effects = {**study.effects, **chosen.effects}
     HiddenPrior.from_table(effects)
-    if model == "auto" and chosen.modes is None:
-        refuse_unknown(prior, CANDIDATES)
     chosen = replace(chosen, device=device, prior=prior | dict(chosen.prior), effects=effects)
     tasks = [
         Task(number, study, entry, model, close_loop, replace(chosen, progress=None))
@@ -236,7 +238,7 @@ def _analysed(
     tasks: Sequence[Task], report: Progress, executor: Executor | None
 ) -> tuple[Analysed, ...]:
     """All recordings in their order; the progress counts those that are done."""
-    names = distinct([recording_name(task.entry.path) for task in tasks])
+    names = names_of([task.entry for task in tasks])
     done: dict[int, Analysed] = {}
     outcomes = (
         _one_by_one(tasks, names, report) if executor is None else executor(analyse_entry, tasks)
@@ -262,6 +264,15 @@ def _one_by_one(
             yield _Outcome(task, error=describe(error))
 
 
+@contextmanager
+def _in_the_file(study: Study) -> Iterator[None]:
+    """What cannot be understood stands in the study's file."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{study.path}: {error}", topic="study") from None
+
+
 def _parts(whole: StudyCases) -> dict[str, Any]:
     names = ("population", "new_person", "users", "configurations", "cases", "limit")
     return {name: getattr(whole, name) for name in names}
@@ -275,16 +286,3 @@ def _failures(recordings: Sequence[Analysed]) -> tuple[Notice, ...]:
         f"{one.name} ({one.error})" for one in failed
     )
     return (Notice("warning", "recordings", text),)
-
-
-def distinct(names: Sequence[str]) -> list[str]:
-    """The names, numbered where one comes more than once.
-
-    Parameters
-    ----------
-    names : sequence of str
-    """
-    return [
-        name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}"
-        for index, name in enumerate(names)
-    ]

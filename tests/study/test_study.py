@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import re
 import shutil
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from bayeshaptic.models.prior_table import _FORMS
 from bayeshaptic.recordings import Recording, read_study
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.study_file import PRIOR_KEYS
+from bayeshaptic.study.analysis import analyse_study
 
 SIGNALS = np.random.default_rng(0).normal(size=(30, 2))
 
@@ -194,9 +197,29 @@ def test_a_copy_of_a_recording_is_no_second_person(folder: Path) -> None:
     shutil.copy(folder / "a.csv", folder / "of-a.csv")
     with pytest.raises(InputError, match=r"of-a\.csv is a copy of a\.csv, recording 1"):
         read_study(write(folder, DEVICE + "".join(named)))
+    for name in ("of-a.csv", "a.csv"):
+        packed = gzip.compress((folder / name).read_bytes(), mtime=len(name))
+        (folder / "of-a.csv").write_bytes(packed)
+        with pytest.raises(InputError, match=r"of-a\.csv is a copy of a\.csv, recording 1"):
+            read_study(write(folder, DEVICE + "".join(named)))
+        (folder / "of-a.csv").write_bytes(packed[:-9] + bytes(9))
+        assert len(read_study(write(folder, DEVICE + "".join(named))).users) == 3
     parts = f"{named[0]}rows=[1, 9]\n{named[1]}rows=[10, 20]\n"
     assert len(read_study(write(folder, DEVICE + parts)).users) == 2
     assert len(read_study(write(folder, DEVICE + named[0] + named[2])).users) == 2
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("[prior]\nmm1 = {median = 1, log_sd = 0.3}\n", "mm1.*did you mean 'm1'"),
+        ("[effects]\nextra_dely = 0.2\n", "extra_dely.*did you mean 'extra_delay'"),
+    ],
+)
+def test_a_misspelt_word_is_told_with_its_file(folder: Path, table: str, words: str) -> None:
+    path = write(folder, DEVICE + table + RECORDING)
+    with pytest.raises(InputError, match=f"{re.escape(str(path))}.*{words}"):
+        analyse_study(read_study(path))
 
 
 def test_parts_of_one_file_are_recordings_of_their_own(folder: Path) -> None:

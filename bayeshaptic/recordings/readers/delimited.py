@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import contextlib
 import csv
-import gzip
 import io
 import re
 import zlib
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.readers.layout import NUMBER, find_layout
 from bayeshaptic.recordings.readers.numbers import THOUSANDS
+from bayeshaptic.recordings.readers.packed import opened
 from bayeshaptic.recordings.readers.reader import MOST_TEXT, Arrays, Reader
 from bayeshaptic.recordings.units import is_unit
 from bayeshaptic.types import Floats
@@ -84,8 +84,7 @@ def read_delimited(path: Path) -> Arrays:
 
 def _text(path: Path) -> str:
     try:
-        open_file = gzip.open if _is_packed(path) else open
-        with open_file(path, "rb") as file:
+        with opened(path) as file:
             content = file.read(MOST_TEXT + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be unpacked or read ({error})") from None
@@ -116,11 +115,6 @@ def _text(path: Path) -> str:
     if "\0" in text:
         raise InputError(f"{path}: not a text file; its name should end as its format does")
     return text
-
-
-def _is_packed(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(2) == b"\x1f\x8b"
 
 
 def _separator(lines: list[str]) -> str | None:
