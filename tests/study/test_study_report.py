@@ -16,7 +16,8 @@ from fake_analysis import fake_analysis, fake_closed
 from fake_study import NAMES, SIX_DB, fake_study
 
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES
+from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
+from bayeshaptic.report.figures.style import called
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.study import write as study_report
 from bayeshaptic.report.study.headline import study_headline
@@ -122,6 +123,23 @@ def test_what_a_study_lacks_is_null_and_not_absent() -> None:
     for key in ("population", "correlation", "new_person", "configurations"):
         assert found[key] is None
     assert found["device_limit"]["binding"][0]["case"] == "nobody holds it"
+
+
+def test_figures_have_room_for_every_name() -> None:
+    """Warnings are errors here: an axis that long labels squeezed to nothing had been one."""
+    found = study("people alone")
+    longest = "user " + 300 * "x"
+    labels = {found.users[0].label: longest, found.users[1].label: "user a$b {\\frac ü"}
+    users = tuple(replace(case, label=labels[case.label]) for case in found.users)
+    cases = tuple(replace(case, label=labels.get(case.label, case.label)) for case in found.cases)
+    entries = [
+        replace(one, entry=replace(one.entry, user=labels[f"user {one.entry.user}"][5:]))
+        for one in found.recordings
+    ]
+    named = replace(found, users=users, cases=cases, recordings=tuple(entries))
+    assert set(draw_study_pictures(named)) == {"study_limit", "study_people"}
+    assert called(longest).startswith("user xxx") and len(called(longest)) < 50
+    assert called("user ü") == "user ü"
 
 
 def test_the_worst_case_decides_and_is_named() -> None:

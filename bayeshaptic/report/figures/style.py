@@ -181,6 +181,13 @@ def short(name: str) -> str:
     return without_unit.replace("_", " ")
 
 
+def called(name: str) -> str:
+    """A name that a user gave, as a figure has room for it; tables have all of it."""
+    most = 44  # characters, half of the page's width
+    half = most // 2 - 1
+    return name if len(name) <= most else f"{name[:half]}…{name[-half:]}"
+
+
 def named(name: str, unit: str, between: str = " ") -> str:
     """A parameter's name in words, and its unit where it has one."""
     return f"{short(name)}{between}[{unit}]" if unit else short(name)

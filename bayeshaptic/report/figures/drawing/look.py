@@ -7,6 +7,11 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
+# For signs of names that matplotlib's own font lacks; the last, its own from 3.11 on, has a box.
+_FOR_OTHER_SIGNS = (
+    *("Noto Sans CJK JP", "Yu Gothic", "Microsoft YaHei", "Malgun Gothic", "Hiragino Sans"),
+    *("Arial Unicode MS", "Segoe UI Emoji", "Last Resort High-Efficiency"),
+)
 _LOCK = Lock()
 _drawing: list[Any] = []  # a context for each that draws now
 
@@ -18,7 +23,7 @@ def own_look() -> Iterator[None]:
     These settings are the process's: of several threads that draw, the first puts the user's away,
     and the last brings them back.
     """
-    import matplotlib
+    import matplotlib.font_manager
 
     with _LOCK:
         if not _drawing:
@@ -26,6 +31,9 @@ def own_look() -> Iterator[None]:
             usual.__enter__()
             matplotlib.rcdefaults()
             matplotlib.rcParams["text.parse_math"] = False  # a dollar in a name is a dollar
+            known = matplotlib.font_manager.get_font_names()
+            others = [font for font in _FOR_OTHER_SIGNS if font in known]
+            matplotlib.rcParams["font.family"] = ["DejaVu Sans", *others]
         else:
             usual = _drawing[-1]
         _drawing.append(usual)

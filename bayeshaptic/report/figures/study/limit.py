@@ -48,7 +48,8 @@ def draw(study: StudyAnalysis) -> Figure:
         style.panel(axes)
         axes.grid(False, axis="y")
         axes.set_xlim(low, high)
-    labels = [f"{case.label}  ({percent(shares.get(case.label, 0.0))})" for case in cases]
+    named = [(style.called(case.label), shares.get(case.label, 0.0)) for case in cases]
+    labels = [f"{name}  ({percent(share)})" for name, share in named]
     panels[0].set_yticks(range(len(cases) + 1), [*labels, "the lowest of all"])
     unit = pretty_unit(study.limit.unit)
     figure.supxlabel(f"critical stiffness, dB re 1 {unit}", fontsize=style.FONT)

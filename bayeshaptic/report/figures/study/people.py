@@ -104,7 +104,7 @@ def _users(axes: Axes, study: StudyAnalysis) -> None:
             _bar(axes, limit, place + 0.17, "s", style.DATA, "white", 3.5, 1.0)
         if has_draws(case):
             _bar(axes, case.limit, place - 0.17, "o", style.MODEL, style.MODEL, 4.0, 1.8)
-    names = [case.label.removeprefix("user ") for case in study.users]
+    names = [style.called(case.label.removeprefix("user ")) for case in study.users]
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
     axes.plot([], [], "s-", color=style.DATA, markerfacecolor="white", label="own recording alone")

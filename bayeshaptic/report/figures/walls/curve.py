@@ -75,9 +75,9 @@ def _columns(labels: Iterable[str]) -> int:
 
 def _curves(table: LimitTable) -> list[tuple[str, NDArray[Any]]]:
     if len(table.cases) == 1:
-        return [(table.cases[0].label, table.cases[0].limit.samples)]
+        return [(style.called(table.cases[0].label), table.cases[0].limit.samples)]
     order = sorted(table.cases, key=lambda case: case.limit.quantile(0.05))
-    own = [(case.label, case.limit.samples) for case in order[:SHOWN]]
+    own = [(style.called(case.label), case.limit.samples) for case in order[:SHOWN]]
     return [("in every case", table.samples), *own]
 
 
