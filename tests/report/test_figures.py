@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -152,6 +153,17 @@ def test_what_a_user_set_for_figures_of_their_own_stays_outside() -> None:
                 pass
             assert not matplotlib.rcParams["text.usetex"]  # another thread still draws
         assert all(matplotlib.rcParams[name] == value for name, value in mine.items())
+
+
+def test_a_sign_without_a_font_is_no_warning_and_warnings_stay_as_they_are() -> None:
+    from bayeshaptic.report.figures.style import new_figure, panel
+
+    before = list(warnings.filters)
+    with own_look():
+        figure = new_figure(1.0)
+        panel(figure.add_subplot(), title="user 日本")
+        assert "user 日本" in (drawn(figure, "a").svg or "")
+    assert list(warnings.filters) == before
 
 
 def test_dollars_in_names_are_no_formula() -> None:

@@ -16,6 +16,7 @@ from fake_analysis import fake_analysis, fake_closed
 from fake_study import NAMES, SIX_DB, fake_study
 
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.report.figures.drawing.look import own_look
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
 from bayeshaptic.report.figures.style import called
 from bayeshaptic.report.headline import headline
@@ -129,7 +130,7 @@ def test_figures_have_room_for_every_name() -> None:
     """Warnings are errors here: an axis that long labels squeezed to nothing had been one."""
     found = study("people alone")
     longest = "user " + 300 * "x"
-    labels = {found.users[0].label: longest, found.users[1].label: "user a$b {\\frac ü"}
+    labels = {found.users[0].label: longest, found.users[1].label: "user a$b {\\frac 日本"}
     users = tuple(replace(case, label=labels[case.label]) for case in found.users)
     cases = tuple(replace(case, label=labels.get(case.label, case.label)) for case in found.cases)
     entries = [
@@ -137,7 +138,8 @@ def test_figures_have_room_for_every_name() -> None:
         for one in found.recordings
     ]
     named = replace(found, users=users, cases=cases, recordings=tuple(entries))
-    assert set(draw_study_pictures(named)) == {"study_limit", "study_people"}
+    with own_look():
+        assert set(draw_study_pictures(named)) == {"study_limit", "study_people"}
     assert called(longest).startswith("user xxx") and len(called(longest)) < 50
     assert called("user ü") == "user ü"
 

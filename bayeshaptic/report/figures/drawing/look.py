@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
-# For signs of names that matplotlib's own font lacks; the last, its own from 3.11 on, has a box.
-_FOR_OTHER_SIGNS = (
-    *("Noto Sans CJK JP", "Yu Gothic", "Microsoft YaHei", "Malgun Gothic", "Hiragino Sans"),
-    *("Arial Unicode MS", "Segoe UI Emoji", "Last Resort High-Efficiency"),
-)
+_NO_SIGN = "Glyph .* missing from"  # of a name, which matplotlib's own font lacks
 _LOCK = Lock()
 _drawing: list[Any] = []  # a context for each that draws now
+_own_filter: list[Any] = []  # of warnings, while somebody draws
 
 
 @contextmanager
@@ -23,7 +21,7 @@ def own_look() -> Iterator[None]:
     These settings are the process's: of several threads that draw, the first puts the user's away,
     and the last brings them back.
     """
-    import matplotlib.font_manager
+    import matplotlib
 
     with _LOCK:
         if not _drawing:
@@ -31,9 +29,8 @@ def own_look() -> Iterator[None]:
             usual.__enter__()
             matplotlib.rcdefaults()
             matplotlib.rcParams["text.parse_math"] = False  # a dollar in a name is a dollar
-            known = matplotlib.font_manager.get_font_names()
-            others = [font for font in _FOR_OTHER_SIGNS if font in known]
-            matplotlib.rcParams["font.family"] = ["DejaVu Sans", *others]
+            warnings.filterwarnings("ignore", _NO_SIGN)  # browsers have it, and tables
+            _own_filter.append(warnings.filters[0])
         else:
             usual = _drawing[-1]
         _drawing.append(usual)
@@ -44,3 +41,6 @@ def own_look() -> Iterator[None]:
             _drawing.pop()
             if not _drawing:
                 usual.__exit__(None, None, None)
+                mine = _own_filter.pop()
+                if mine in warnings.filters:  # not where somebody has reset them
+                    warnings.filters.remove(mine)  # type: ignore[attr-defined]
