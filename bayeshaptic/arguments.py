@@ -18,7 +18,7 @@ from fractions import Fraction
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
-from bayeshaptic.errors import InputError, nearest
+from bayeshaptic.errors import InputError, nearest, shown
 from bayeshaptic.faq import entry_of
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -29,8 +29,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     **dict.fromkeys(("draws", "max_draws"), (1, math.inf, "of at least 1")),
     **dict.fromkeys(("minimum_lines", "most_evaluations"), (1, math.inf, "of at least 1")),
     "count": (2, math.inf, "of at least 2"),
-    "ess": (1e-9, math.inf, "above 0"),
-    "budget_s": (1e-9, math.inf, "above 0"),
+    **dict.fromkeys(("ess", "budget_s"), (math.ulp(0.0), math.inf, "above 0")),
     **dict.fromkeys(("period_s", "default_period_s"), (1e-12, 1e12, "above 0, in seconds")),
     "encoder_resolution": (1e-300, 1e300, "above 0, in m or rad"),
     "lever_m": (1e-300, 1e300, "above 0, in metres"),
@@ -138,15 +137,6 @@ def instance(name: str, value: Any, kinds: type | tuple[type, ...], hint: str) -
     if isinstance(value, kinds):
         return value
     raise InputError(f"{name} is {shown(value)}; give {hint}")
-
-
-def shown(value: Any) -> str:
-    """A value in a few words, for a message: short, and its type where that is the point."""
-    if isinstance(value, str | Real | None) or isinstance(value, tuple | list) and len(value) < 4:
-        text = " ".join(repr(value).split())
-        return text if len(text) <= 60 else f"{text[:57]}..."
-    dtype = getattr(value, "dtype", None)  # of an array it is what it holds that is wrong
-    return f"of type {type(value).__name__}{f' of {dtype}' if dtype is not None else ''}"
 
 
 def _check(name: str, value: Any, annotation: str, names: Names) -> None:

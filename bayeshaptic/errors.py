@@ -5,7 +5,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
+from typing import Any
 
 
 class InputError(ValueError):
@@ -84,6 +86,15 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def nearest_or_all(word: str, known: Collection[str]) -> str:
     """`nearest`, or all that is known where nothing is close."""
     return nearest(word, known) or f"; there are {', '.join(known)}"
+
+
+def shown(value: Any) -> str:
+    """A value in a few words, for a message: short, and its type where that is the point."""
+    if isinstance(value, str | Real | None) or isinstance(value, tuple | list) and len(value) < 4:
+        text = " ".join(repr(value).split())
+        return text if len(text) <= 60 else f"{text[:57]}..."
+    dtype = getattr(value, "dtype", None)  # of an array it is what it holds that is wrong
+    return f"of type {type(value).__name__}{f' of {dtype}' if dtype is not None else ''}"
 
 
 def printable(text: str) -> str:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from bayeshaptic.arguments import check_fields, instance, shown
+from bayeshaptic.arguments import check_fields, instance
 from bayeshaptic.devices import Device
-from bayeshaptic.errors import InputError, nearest_or_all
+from bayeshaptic.errors import InputError, nearest_or_all, shown
 from bayeshaptic.numerics.spending import BUDGET_S
 from bayeshaptic.progress import told
 

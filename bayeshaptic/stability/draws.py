@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayeshaptic.arguments import shown
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, shown
 from bayeshaptic.models.model import Model
 from bayeshaptic.stability.crossings import rational
 from bayeshaptic.types import Floats

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.arguments import instance, shown
+from bayeshaptic.arguments import instance
 from bayeshaptic.devices import Device, load_device
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, shown
 from bayeshaptic.inference.choose import CANDIDATES
 from bayeshaptic.models import Model
 from bayeshaptic.models.prior_table import refuse_unknown

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from bayeshaptic.arguments import shown
-from bayeshaptic.errors import InputError
+from bayeshaptic.errors import InputError, shown
 from bayeshaptic.report.figures import style
 
 if TYPE_CHECKING:
