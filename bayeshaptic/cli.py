@@ -1,8 +1,8 @@
 """The command line: parse, run one command, and turn every error into one line and a status.
 
 Exit status: 0 done; 1 a study of a batch failed, or a defect in bayeshaptic; 2 input or options
-that cannot be used; 130 interrupted, 143 terminated. A command is one module of
-``bayeshaptic.commands``.
+that cannot be used; 130 interrupted, 143 terminated, 141 where nobody reads the output any more. A
+command is one module of ``bayeshaptic.commands``.
 """
 
 from __future__ import annotations
@@ -95,12 +95,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     debug = arguments.debug or bool(os.environ.get("BAYESHAPTIC_DEBUG"))
     try:
         with _warnings_in_one_line(), _stopped_in_order(alone=argv is None):
-            return arguments.run(arguments)
+            status = arguments.run(arguments)
+            sys.stdout.flush()
+            return status
     except (_Stopped, KeyboardInterrupt) as stop:
         number = signal.SIGTERM if signal.SIGTERM in stop.args else signal.SIGINT
         complain("terminated" if number == signal.SIGTERM else "interrupted")
         return 128 + number
     except (InputError, OSError) as error:
+        if isinstance(error, BrokenPipeError) and _nobody_reads():
+            return 128 + 13  # as a program that SIGPIPE ends
         if debug:
             traceback.print_exc()
         complain(f"error: {explained(error)}")
@@ -123,6 +127,16 @@ def _open_what_is_closed() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+
+
+def _nobody_reads() -> bool:
+    """Whether what read the output has ended, as ``head`` does; the rest then leads nowhere."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
 
 
 def _write_what_can_be() -> None:
