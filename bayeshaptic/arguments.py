@@ -12,7 +12,7 @@ import inspect
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from fractions import Fraction
 from numbers import Integral, Real
@@ -38,7 +38,8 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "delay_sd_s": (0, math.inf, "of at least 0, in seconds"),
     **dict.fromkeys(("risk", "risks"), (1e-12, 1 - 1e-12, "between 0 and 1, as in 0.01")),
     "p": (0, 1, "between 0 and 1, as in 0.05"),
-    "start": (-1e300, 1e300, "other than NaN or infinity"),
+    **dict.fromkeys(("start", "add"), (-1e300, 1e300, "other than NaN or infinity")),
+    "factors": (0, 1e300, "of at least 0"),
     **dict.fromkeys(("stiffness", "damping"), (-math.inf, math.inf, "other than NaN")),
 }
 """Lowest and highest value of numbers by their name, and how to say it."""
@@ -191,7 +192,8 @@ def _is(value: Any, part: str, names: Names) -> bool:
                 _any(one, within[1], names) for one in value.values()
             )
         if kind in ("Sequence", "tuple"):
-            if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+            once = str | Mapping | Iterator  # what is read once is empty when it is used
+            if isinstance(value, once) or not isinstance(value, Iterable):
                 return False
             if kind == "tuple" and within[-1] != "...":
                 return len(within) == len(list(value)) and all(

@@ -145,6 +145,10 @@ def next_experiment(
         return float(np.sqrt(sum(share * g @ covariance @ g for g, share in gradients)))
 
     now = spread(fisher)
+    if not now > 0:
+        raise InputError(
+            f"slopes are of none of the fit's parameters, {', '.join(fit.model.names)}"
+        )
     found = []
     for name, title, added in _experiments(known, fit, fisher, prior, crossing_hz):
         after = spread(fisher + added)

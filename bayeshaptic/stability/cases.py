@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayeshaptic.arguments import at_the_door
+from bayeshaptic.arguments import at_the_door, instance
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
 from bayeshaptic.numerics.effective_draws import effective_draws
@@ -19,7 +19,7 @@ from bayeshaptic.stability.draws import MOST_DRAWS
 from bayeshaptic.stability.tail import low_quantile, quantiles
 from bayeshaptic.types import Floats, Ints
 
-FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
+GROUPS = FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,6 +47,18 @@ class Case(Shown):
     draws: Floats = field(repr=False)
     limit: CriticalStiffness = field(repr=False)
     joint: str | None = None
+
+    def __post_init__(self) -> None:
+        instance("model", self.model, Model, "a Model (see bayeshaptic.grasped)")
+        maker = "bayeshaptic.critical_stiffness"
+        instance("limit", self.limit, CriticalStiffness, f"a CriticalStiffness (see {maker})")
+        if self.group not in GROUPS:
+            raise InputError(f"group is {self.group!r}; give one of {', '.join(GROUPS)}")
+        if np.shape(self.draws) != (len(self.limit.samples), self.model.size):
+            raise InputError(
+                f"draws have the shape {np.shape(self.draws)}; a case of this limit and model has "
+                f"{(len(self.limit.samples), self.model.size)}"
+            )
 
     def _lines(self) -> tuple[str, ...]:
         return (

@@ -57,6 +57,8 @@ def vectors_given(model: Model, theta: ArrayLike) -> Floats:
         not above zero.
     """
     vectors = np.atleast_2d(np.asarray(theta, float))
+    if not vectors.size:
+        raise InputError("theta is empty; give one vector of parameters or more")
     if not np.all(np.isfinite(vectors)):
         raise InputError(f"theta is {shown(theta)}; give numbers other than NaN or infinity")
     model.system(vectors[:1])  # which says how many there are

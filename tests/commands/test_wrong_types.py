@@ -143,6 +143,27 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
         (lambda: bh.elasticities(3), "source is 3; give a Model, Fit, Posterior"),
         (lambda: bh.write_report(3, "out"), "result is 3; give what bayeshaptic.analyse"),
         (lambda: bh.device_limit([3]), "cases is [3]; give a sequence of a Case"),
+        (lambda: bh.device_limit(iter([3])), "cases is of type list_iterator; give a sequence"),
+        (
+            lambda: bh.Case("a", "hold", FREE_MODEL, np.ones((32, 6)), LIMIT),
+            "group is 'hold'; give",
+        ),
+        (
+            lambda: bh.Case("a", "held", FREE_MODEL, np.ones((32, 5)), LIMIT),
+            "shape (32, 5); a case",
+        ),
+        (
+            lambda: bh.Case("a", "held", FREE_MODEL, np.ones((32, 6)), 3),
+            "limit is 3; give a Critical",
+        ),
+        (lambda: bh.sweep(FREE_MODEL, "kc", []), "factors is empty; give one number or more"),
+        (
+            lambda: bh.sweep(FREE_MODEL, "kc", [np.nan]),
+            "factors is [nan]; give numbers of at least 0",
+        ),
+        (lambda: bh.sweep(FREE_MODEL, "kc", [2.0], [1.0]), "factors and add are both given"),
+        (lambda: bh.sweep(FREE_MODEL, "m1", [0.0]), "m1 is 0; a mass must be above 0"),
+        (lambda: bh.critical_stiffness(FREE_MODEL, np.empty((0, 6))), "theta is empty; give one"),
         (lambda: bh.run_batch("a.csv", "out"), "sources is 'a.csv'; give a sequence of a text"),
     ],
 )

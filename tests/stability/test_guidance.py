@@ -162,6 +162,12 @@ def test_twice_as_long_narrows_the_limit_as_predicted(fits):
     assert now == pytest.approx(short.log_sd, rel=0.2)
 
 
+def test_slopes_of_nothing_in_the_fit_are_refused(fits):
+    for slopes, words in (([], "slopes is empty"), ([({"zz": 1.0}, 1.0)], "none of the fit's")):
+        with pytest.raises(bh.InputError, match=words):
+            next_experiment(fits[15.0], slopes)
+
+
 def test_the_prediction_is_the_spread_of_the_limit(fits):
     fit = fits[30.0]
     known = information(fit)

@@ -14,6 +14,7 @@ from bayeshaptic.quantities import quantity
 from bayeshaptic.shown import Shown, data_frame
 from bayeshaptic.stability.binding import TITLES, binding_kinds
 from bayeshaptic.stability.crossings import find_crossings
+from bayeshaptic.stability.draws import vectors_given
 from bayeshaptic.stability.guidance.elasticities import with_delay
 from bayeshaptic.stability.walls.loops import loops_of
 from bayeshaptic.types import Floats
@@ -125,7 +126,7 @@ def sweep(
     Raises
     ------
     InputError
-        If the model has no such parameter.
+        If the model has no such parameter, or none of it is a loop: a mass that is not above zero.
     """
     loops = loops_of(source, draws=draws)
     model, vectors = with_delay(loops.model, loops.draws)
@@ -135,16 +136,19 @@ def sweep(
         )
     column = model.names.index(name)
     now = float(np.median(vectors[:, column]))
-    steps = np.sort(np.asarray(FACTORS if factors is None else factors, float))
-    if add is not None:
-        steps = np.sort(np.asarray(add, float))
+    if factors is not None and add is not None:
+        raise InputError("factors and add are both given; give one of them")
+    given = FACTORS if factors is None and add is None else factors if add is None else add
+    steps = np.sort(np.ravel(np.asarray(given, float)))
+    if not steps.size:
+        raise InputError(f"{'factors' if add is None else 'add'} is empty; give one number or more")
     moved = np.repeat(vectors[None], len(steps), axis=0)
     moved[:, :, column] = (
         moved[:, :, column] * steps[:, None]
         if add is None
         else moved[:, :, column] + steps[:, None]
     )
-    system = model.system(moved.reshape(-1, model.size))
+    system = model.system(vectors_given(model, moved.reshape(-1, model.size)))
     found = find_crossings(system, loops.period_s)
     shape = moved.shape[:2]
     critical, hertz = found.critical.reshape(shape), found.binding_hz.reshape(shape)
