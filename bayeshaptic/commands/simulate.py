@@ -113,9 +113,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the recording: .csv, .csv.gz, .npz, .h5 or .mat",
     )
     hand = parser.add_mutually_exclusive_group()
-    hand.add_argument("--held", action="store_true", help="a user holds the device")
+    hand.add_argument("--held", action="store_true", default=None, help="a user holds the device")
     hand.add_argument(
-        "--free", dest="held", action="store_false", help="nobody holds it (the default)"
+        "--free",
+        dest="held",
+        action="store_false",
+        default=None,
+        help="nobody holds it (the default)",
     )
     for name, how in OPTIONS.items():
         parser.add_argument(name, **how)
@@ -149,6 +153,8 @@ def record(arguments: argparse.Namespace, bench: Bench) -> SimulatedRecording:
     from bayeshaptic.rig.loops import run_relay
     from bayeshaptic.rig.simulate import simulate
 
+    if arguments.band and arguments.excitation in ("relay", "step"):
+        raise InputError(f"--band is for other excitations: a {arguments.excitation} has none")
     if arguments.excitation == "relay":
         return run_relay(
             bench,
@@ -178,13 +184,15 @@ def bench_from(arguments: argparse.Namespace) -> Bench:
     if arguments.device.lower().endswith(".nc"):
         from bayeshaptic.commands.drawn import drawn_device
 
+        if arguments.held is not None:
+            raise InputError("--held and --free are for a device: a posterior.nc says who holds it")
         path = Path(arguments.device)
         device, mechanism = drawn_device(path, arguments.seed, arguments.from_prior)
         bench = Bench.from_device(device, mechanism=mechanism, **changes)
     else:
         if arguments.from_prior:
             raise InputError("--from-prior is for a posterior.nc, whose model has the priors")
-        bench = Bench.from_device(arguments.device, held=arguments.held, **changes)
+        bench = Bench.from_device(arguments.device, held=bool(arguments.held), **changes)
     for text in arguments.effect:
         name, fields = parse_effect(text)
         bench = bench.with_effect(name, **fields)

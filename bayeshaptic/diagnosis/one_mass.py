@@ -72,6 +72,7 @@ def analyse_one_mass(begun: Opened, options: Options) -> Analysis | None:
     """
     began = time.perf_counter()
     recording = begun.etfe.recording
+    options.report(0.0, "following one mass in time")
     found = None if recording is None else follow_in_loop(recording)
     if recording is None or found is None:
         return None

@@ -683,6 +683,7 @@ def test_simulate_options(run: Run) -> None:
         (("--seconds", "1e9", "--excitation", "relay"), "1,000,000,000,000 samples"),
         (("--band", "600,900"), "ends above the Nyquist frequency, 500 Hz"),
         (("--band", "600,900", "--excitation", "prbs"), "ends above the Nyquist"),
+        (("--band", "1,100", "--excitation", "relay"), "a relay has none"),
         (("--delay-s", "200"), "delay of 200 s is over 100 sampling periods"),
     ],
 )
@@ -696,6 +697,8 @@ def test_what_the_bench_cannot_simulate_is_one_line(
 
 def test_simulate_from_a_posterior_and_from_its_priors(run: Run, tmp_path: Path) -> None:
     fake_analysis("grasped", device="lhifam").posterior.save(tmp_path / "p.nc")
+    status, _, err = run("simulate", "p.nc", "-o", "a.csv", "--free")
+    assert status == 2 and "a posterior.nc says who holds it" in only_line(err)
     truths = []
     for options in ((), ("--seed", "1"), ("--from-prior",)):
         status, out, err = run(
