@@ -20,6 +20,7 @@ from bayeshaptic.stability.walls.damping import Backward, LowPass
 from bayeshaptic.stability.walls.joint import joint_region
 from bayeshaptic.stability.walls.limit_table import limit_table
 from bayeshaptic.stability.walls.region import kb_region
+from bayeshaptic.stability.walls.tail import lower_tail
 
 COMPARE = (np.less, np.less_equal)
 
@@ -134,6 +135,17 @@ def test_loops_that_are_never_stable_have_limits_of_zero(one):
     assert set(found.filters[0].quantile(0.05)) == {0.0}
     json.loads(found.as_json(), parse_constant=pytest.fail)
     assert limits_section(found).html
+
+
+def test_loops_that_are_never_stable_have_no_small_risks_of_their_own():
+    """Many draws of a fit that is unstable however soft the wall is: none is below the others."""
+    many = case("grasped", draws=10_500)
+    many.draws[:, many.model.names.index("kh")] = -5e3
+    never = replace(many, limit=bh.critical_stiffness(many.model, many.draws))
+    some = kb_region(never, draws=2000)
+    levels = np.zeros(1)
+    found = lower_tail(never, some, many.draws[:2000], levels, some.limits(levels), 0.01)
+    assert found is None
 
 
 def test_least_damped_the_case_with_the_least_damping(one):

@@ -78,14 +78,14 @@ def lower_tail(
     if found is None:
         return None
     chosen, safe = found
+    place = int(np.ceil(risk * len(index)))
+    if len(chosen) <= place:  # as where no draw has a stable wall: none is below the others
+        return None
     region = region_of_draws(
         case.model, case.draws[index][chosen], some.kind, samples[index][chosen]
     )
     ends = np.sort(region.largest_damping())
     tail = Tail(region, np.empty((0, 0)), ends, len(index), risk).at(levels)
-    place = int(np.ceil(risk * len(index)))
-    if len(chosen) <= place:
-        return None
     reached = np.append(tail.limits[place, possible], ends[place])
     return None if np.any(reached > safe) else tail  # some of the lowest may be missing
 
