@@ -52,7 +52,7 @@ def test_friction_that_is_nearly_all_damping_leaves_little(held: bool, counts: f
     recording = simulation.recording
     friction = (Acting(CoulombFriction(MOTOR), FRICTION),)
     system = simulation.model.system(theta)
-    by_itself = linear_motion(system, simulation.command, recording.period_s)[0]
+    by_itself = linear_motion(system, simulation.arriving(()), recording.period_s)[0]
     left = recording.position - by_itself - simulation.added(friction, theta).sum(axis=0)
     besides = simulation._besides(theta, (MOTOR,))
     assert np.std(left - besides.of(left)) < counts * count

@@ -69,8 +69,8 @@ class Simulation:
 
     @cached_property
     def command(self) -> Floats:
-        """The commanded force without its mean, shape (N,)."""
-        return self.recording.force - self.recording.force.mean()
+        """The commanded force with its mean, shape (N,): an actuator's laws are of zero force."""
+        return self.recording.force
 
     @cached_property
     def _measured(self) -> Floats:
@@ -103,7 +103,7 @@ class Simulation:
 
     def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
         """Position and velocity at places, on the fine grid, beside the forces that are there."""
-        linear = self._linear(theta, self.command, places)
+        linear = self._linear(theta, self.arriving(()), places)
         taken = self._besides(theta, places).of(self._left(linear) - self.there)
         return self._moving(theta, places, linear, taken)
 
@@ -156,6 +156,11 @@ class Simulation:
                 lost = lost + one.effect.lost(one.strength, self.command - lost)
         return lost
 
+    def arriving(self, forces: tuple[Acting, ...]) -> Floats:
+        """What of the command arrives, without its mean, shape (N,)."""
+        arriving = self.command - self.lost(forces)
+        return arriving - arriving.mean()
+
     def driven(self, forces: tuple[Acting, ...], theta: Floats, added: Floats) -> Floats:
         """The sum of motions added, and what an actuator's forces do by the command's lack."""
         total = np.asarray(added.sum(axis=0))
@@ -176,7 +181,7 @@ class Simulation:
         order = sorted(range(len(acting)), key=lambda i: acting[i].effect.sticks)
         places = _places(acting)
         laws = [one.effect.law(one.strength, self.model, theta) for one in acting]
-        linear = self._linear(theta, self.command - self.lost(forces), places)
+        linear = self._linear(theta, self.arriving(forces), places)
         left, mechanism = self._left(linear), self.model.system(theta).mechanism
         period, away = self.recording.period_s, 1e3 * np.ptp(self.recording.position)
 
