@@ -48,7 +48,7 @@ SINGLE: dict[str, tuple[str, set[str]]] = {
     "velocity_cubed": ("nonlinear", {"cubic_damping"}),
     "load_friction": ("nonlinear", {"coulomb_friction"}),
     "lopsided_friction": ("nonlinear", {"coulomb_friction", UNKNOWN}),
-    "asymmetric_gain": ("nonlinear", {UNKNOWN}),
+    "asymmetric_gain": ("nonlinear", {"uneven_actuator"}),
     "coarse_command": ("nonlinear", {UNKNOWN}),
     "eccentric_encoder": ("nonlinear", {UNKNOWN}),
     "end_stops": ("nonlinear", {UNKNOWN}),

@@ -32,13 +32,13 @@ class TanhSaturation(Effect):
 
 @dataclass(frozen=True)
 class AsymmetricGain(Effect):
-    """An actuator that pushes more than it pulls."""
+    """An actuator that pushes in full and pulls by a share less."""
 
     name: ClassVar[str] = "asymmetric_gain"
-    share: float = 0.15
+    share: float = 0.25
 
     def command(self, force: Floats, progress: Floats, time_s: Floats) -> Floats:
-        return np.asarray(force * (1 + self.share * np.sign(force)))
+        return np.asarray(force - self.share * np.minimum(force, 0.0))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Actuators that do not give what is commanded: saturation, hard or gradual, and a dead zone."""
+"""Actuators that do not give what is commanded.
+
+Saturation, hard or gradual, a dead zone, and one that gives less one way than the other.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ _CUBE = Shape(
     COMMAND,
     lambda u: -(u**3),
 )
+_EVEN = Shape("|u|", "a command that acts like |u|, more one way than the other", COMMAND, np.abs)
 
 
 @register
@@ -85,3 +89,26 @@ class DeadZone(CommandEffect):
 
     def lost(self, strength: float, command: Floats) -> Floats:
         return np.clip(command, -strength, strength)
+
+
+@register
+class UnevenActuator(CommandEffect):
+    """The actuator gives less of the commands of one sign than of those of the other.
+
+    As the two sides of a cylinder's piston do, or two halves of an amplifier.  The stronger way is
+    given in full, so that the limit is that of a wall which is pushed against that way.
+    """
+
+    name = "uneven_actuator"
+    title = "an actuator that is weaker one way"
+    tests = (_EVEN,)
+    over = (COMMAND,)
+    strength = ("weaker_by", "number")
+    signed = True  # above zero: the commands below zero are given in part
+
+    def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
+        return np.array([0.01, 0.03, 0.1, 0.3])
+
+    def lost(self, strength: float, command: Floats) -> Floats:
+        weaker = np.minimum(command, 0.0) if strength > 0 else np.maximum(command, 0.0)
+        return abs(strength) * weaker
