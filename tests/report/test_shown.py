@@ -64,7 +64,7 @@ def test_a_result_is_equal_to_itself_alone(name: str) -> None:
         bh.load_device("lhifam"),
         bh.Options(prior={"m1": bh.LogNormal(0.2, 0.1)}, effects={"each": 0.1}),
         bh.Settings(columns="time=t,force=u,position=q"),
-        bh.read_study(Path(__file__).parents[1] / "examples" / "study" / "study.toml"),
+        bh.read_study(ROOT / "examples" / "study" / "study.toml"),
     ],
     ids=lambda thing: type(thing).__name__,
 )
