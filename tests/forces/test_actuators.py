@@ -83,7 +83,7 @@ def test_one_that_is_weaker_one_way_is_sized(
     assert seen(state, "u^3") < 1
     best = best_of(state, "|u|", monkeypatch)
     assert best.name == "uneven_actuator"
-    assert best.accepted.estimates["weaker_by"].mean == pytest.approx(weaker, rel=0.01)
+    assert best.accepted.estimates["weaker_below_zero_by"].mean == pytest.approx(weaker, rel=0.01)
 
 
 def test_one_that_gives_what_is_commanded_is_not_uneven() -> None:

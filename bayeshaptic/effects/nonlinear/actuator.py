@@ -103,8 +103,8 @@ class UnevenActuator(CommandEffect):
     title = "an actuator that is weaker one way"
     tests = (_EVEN,)
     over = (COMMAND,)
-    strength = ("weaker_by", "number")
-    signed = True  # above zero: the commands below zero are given in part
+    strength = ("weaker_below_zero_by", "number")
+    signed = True  # where it is negative it is the commands above zero that are given in part
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         return np.array([0.01, 0.03, 0.1, 0.3])

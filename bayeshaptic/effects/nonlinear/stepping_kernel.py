@@ -1,6 +1,6 @@
 """Steps of a linear mechanism with forces that its motion makes, compiled.
 
-`tests/support/plain_stepping.py` is the same in plain NumPy.
+`tests/references/plain_stepping.py` is the same in plain NumPy.
 """
 
 from __future__ import annotations

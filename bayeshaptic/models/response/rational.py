@@ -1,7 +1,7 @@
 """Sampled response of a mechanism behind filters, for large batches: compiled.
 
 The formulas are those of `alias_tables.py`, filters are those of `filters.py`;
-`tests/support/plain_response.py` is the same in plain NumPy.  What takes one number a row is
+`tests/references/plain_response.py` is the same in plain NumPy.  What takes one number a row is
 prepared for the whole batch; what takes one a frequency is left to `kernels/rational.py`, a vector
 at a time, so that no result depends on the batch around it.
 """

@@ -1,4 +1,4 @@
-"""Periods of a plant, compiled: the plain form is `tests/support/plain_bench_stepper.py`."""
+"""Periods of a plant, compiled: the plain form is `tests/references/plain_bench_stepper.py`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Terms and values of a `PoleResponse`, compiled.
 
-In plain NumPy `from_poles` of `tests/support/plain_response.py` is the same.  It contains
+In plain NumPy `from_poles` of `tests/references/plain_response.py` is the same.  It contains
 `held_pole.py` of the sampled response, and is to be compiled anew where that is changed.
 """
 

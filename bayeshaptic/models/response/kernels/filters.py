@@ -8,7 +8,7 @@ their poles q_j: with mechanism N/D and filters M/F,
 
 C the numerator of the sum over j.  The poles have the closed form, and R/D has no poles but the
 mechanism's.  The division for R begins at the lowest power, where F is 1 + small terms.
-`tests/support/plain_response.py` is the same in plain NumPy.  It contains `held_pole.py` beside
+`tests/references/plain_response.py` is the same in plain NumPy.  It contains `held_pole.py` beside
 it, and is to be compiled anew where that is changed.
 """
 

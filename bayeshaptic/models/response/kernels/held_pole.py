@@ -1,6 +1,6 @@
 """A pole in the closed form, behind a hold and part of a period.
 
-In plain NumPy it is `from_poles` of `tests/support/plain_response.py`.
+In plain NumPy it is `from_poles` of `tests/references/plain_response.py`.
 
 Kernels elsewhere contain it: they are to be compiled anew where it is changed.
 """
