@@ -46,8 +46,9 @@ class Notice:
     about : tuple of str
         What a decision needs to know of it, so that none hangs on the words of `text`: of units the
         quantities ("force", "position", "time") that a warning doubts, or whose unit was assumed as
-        a note says; of feedback "undecided" where that is only a doubt; of a recording that says
-        too little the reason and what to do.
+        a note says; of feedback "undecided" where that is only a doubt, and "or noise of a band"
+        where that would look the same; of a recording that says too little the reason and what to
+        do.
     """
 
     level: str

@@ -12,6 +12,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.types import Floats
 
 UNDECIDED = "undecided"  # what a warning is about where feedback is only a doubt
+OR_NOISE = "or noise of a band"  # what it is about where noise of a band looks the same
 _KEYS = ("law", "proportional", "derivative", "integral", "filter_hz")
 
 
@@ -61,6 +62,20 @@ def is_certain(notices: Iterable[Notice]) -> bool:
     """Whether there is feedback, and not only a doubt that cannot be decided."""
     found = [n for n in notices if n.topic == "feedback" and n.level == "warning"]
     return bool(found) and not any(UNDECIDED in n.about for n in found)
+
+
+def doubts(notices: Iterable[Notice]) -> tuple[str, ...]:
+    """What speaks for an open loop all the same: `UNDECIDED`, `OR_NOISE`, or nothing."""
+    about = {what for n in notices if n.topic == "feedback" for what in n.about}
+    return tuple(doubt for doubt in (UNDECIDED, OR_NOISE) if doubt in about)
+
+
+def how_computed(notices: Iterable[Notice]) -> str:
+    """Whether the force was computed from the motion, as far as anybody knows, for a sentence."""
+    doubted = doubts(notices)
+    if OR_NOISE in doubted:
+        return "was computed from the motion, or is noise of a band"
+    return f"{'may have been' if doubted else 'was'} computed from the motion"
 
 
 def told(feedback: Feedback | None, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:

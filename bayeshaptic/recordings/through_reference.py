@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayeshaptic.errors import Notice
-from bayeshaptic.recordings.feedback import Feedback, has_feedback
+from bayeshaptic.recordings.feedback import Feedback, doubts, has_feedback, how_computed
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.added_noise import command_innovations
@@ -67,10 +67,11 @@ def through_reference(
         why = f"{what} answers to the motion itself ({judged.evidence})"
         return alone, (*notices, unusable(f"{why}: check its gains, its filter and its sign"))
     text = (
-        f"The force was computed from the motion; {what} tells what of it was not, and the "
+        f"The force {how_computed(notices)}; {what} tells what of it was not, and the "
         "response is read through that alone, so that feedback does not bias it."
     )
-    told = Notice("note", "feedback", text, (_INNOVATIONS,) if what == _UNFORETOLD else ())
+    how = (_INNOVATIONS,) if what == _UNFORETOLD else ()
+    told = Notice("note", "feedback", text, how + doubts(notices))
     kept = (n for n in notices if (n.level, n.topic) != ("warning", "feedback"))
     return tried, (*kept, told)
 

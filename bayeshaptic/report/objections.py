@@ -16,7 +16,7 @@ from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
-from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.feedback import has_feedback, how_computed, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.beyond_band import beyond_band
@@ -143,10 +143,9 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
     if has_feedback(analysis.notices) and analysis.in_loop is None:
-        how = "was" if is_certain(analysis.notices) else "may have been"
         found.append(
-            f"the force {how} computed from the motion (feedback), which biases the response that "
-            "everything here is read from"
+            f"the force {how_computed(analysis.notices)} (feedback), and that biases the response "
+            "which everything here is read from"
         )
     found += in_closed_loop(analysis, verdict)
     found += _of_the_alignment(analysis)

@@ -21,7 +21,7 @@ from bayeshaptic.quantities import (
     spread_of,
 )
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
-from bayeshaptic.recordings.feedback import has_feedback
+from bayeshaptic.recordings.feedback import doubts, has_feedback
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
@@ -194,7 +194,8 @@ def _excitation(analysis: Analysis) -> str:
     if analysis.etfe.through_reference:
         return "of a controller, read through what of it the motion does not make"
     if analysis.etfe.direct:
-        return "of a controller, whichever it is"
+        random = ", or random" if doubts(analysis.notices) else ""
+        return f"of a controller, whichever it is{random}"
     if told_too_little(analysis.notices):
         return "too little of a response"
     lines = analysis.etfe.period_lines

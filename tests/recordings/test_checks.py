@@ -17,12 +17,15 @@ from tiny_bench import PERIOD, SCALE, band_noise, record
 
 import bayeshaptic as bh
 from bayeshaptic.devices import Device, load_device
+from bayeshaptic.diagnosis.base.direct import opened_directly
+from bayeshaptic.diagnosis.base.opened import opened
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
 from bayeshaptic.recordings.checks import what_drives_what
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt, steps_of_a_turn
-from bayeshaptic.recordings.feedback import is_certain
+from bayeshaptic.recordings.feedback import doubts, is_certain
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.units import is_assumed
 
@@ -245,6 +248,25 @@ def test_a_doubt_of_feedback_is_no_certainty(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(what_drives_what, "causality", lambda _, found=found: found)
         notices = check_recording(held())
         assert topics(notices) == ["feedback"] and is_certain(notices) == has_feedback
+
+
+@pytest.mark.parametrize(
+    ("far_past", "said"), [(True, ", or is noise of a band"), (False, "was computed from the mot")]
+)
+def test_noise_of_a_band_is_not_said_to_be_feedback(
+    far_past: bool, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not at the door, and not where all lines are fitted because of it."""
+    found = SimpleNamespace(
+        has_feedback=True, doubtful=True, evidence="", relay=False, swapped=False,
+        opposite=False, early_position=False, far_past=far_past,
+    )  # fmt: skip
+    monkeypatch.setattr(what_drives_what, "causality", lambda _: found)
+    fitted = opened_directly(opened(held(), "grasped", Options()), Options())
+    assert fitted is not None
+    (note,) = (n for n in fitted.notices if n.topic == "feedback")
+    assert note.level == "note" and said in note.text
+    assert ("or is noise" in note.text) == bool(doubts(fitted.notices)) == far_past
 
 
 def test_the_measured_recordings(measured: Callable[[str], Path]) -> None:

@@ -11,14 +11,14 @@ from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
-from bayeshaptic.recordings.feedback import has_feedback, is_certain
+from bayeshaptic.recordings.feedback import doubts, has_feedback, how_computed
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 
 AGAINST = "direct"  # the topic of what speaks against such a fit
 _WHATEVER = (
     "whatever controller made it: all lines of the spectrum are fitted, up to the Nyquist "
-    "frequency, whose sum feedback does not bias. The measured response is biased, and shown for "
-    "comparison only."
+    "frequency, whose sum feedback does not bias. The measured response is biased then, and shown "
+    "for comparison only."
 )
 
 
@@ -44,10 +44,11 @@ def opened_directly(found: Opened, options: Options) -> Opened | None:
         etfe = estimate_by_direct_method(replace(recording, reference=None))
     except InputError:
         return None
-    how = "was" if through or is_certain(found.notices) else "may have been"
-    text = f"The force {how} computed from the motion, and the device is read from it {_WHATEVER}"
+    how = how_computed(found.notices)
+    text = f"The force {how}; the device is read from it {_WHATEVER}"
     kept = (n for n in found.notices if n.topic not in ("feedback", "band"))
-    notices = (*kept, *etfe.notices, Notice("note", "feedback", text))
+    note = Notice("note", "feedback", text, doubts(found.notices))
+    notices = (*kept, *etfe.notices, note)
     return replace(found, etfe=etfe, notices=notices)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.quantities import percent
-from bayeshaptic.recordings.feedback import UNDECIDED
+from bayeshaptic.recordings.feedback import OR_NOISE, UNDECIDED
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import Causality, causality
 from bayeshaptic.recordings.signals.controller import share_by_a_law
@@ -126,7 +126,7 @@ def _feedback(evidence: str, against: bool, far_past: bool = False) -> Notice:
             " The position goes against the force: if this was an open loop, one of them has the "
             "opposite sign; turn it round with --columns, as in position=NAME*-1."
         )
-    return Notice("warning", "feedback", text)
+    return Notice("warning", "feedback", text, (OR_NOISE,) if far_past else ())
 
 
 def _doubt(evidence: str) -> Notice:
