@@ -25,7 +25,7 @@ from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG, Way
 from bayeshaptic.inference.time_domain.white_force import in_white_force
-from bayeshaptic.inference.time_domain.widths import FREEDOM
+from bayeshaptic.inference.time_domain.widths.correlated import FREEDOM
 from bayeshaptic.models import rigid
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording

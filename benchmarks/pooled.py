@@ -20,7 +20,7 @@ from bayeshaptic.inference.sampler import sample
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.white_force import in_white_force
-from bayeshaptic.inference.time_domain.widths import FREEDOM
+from bayeshaptic.inference.time_domain.widths.correlated import FREEDOM
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording

@@ -28,7 +28,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample_around
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
-from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import DRY
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import percent
@@ -149,8 +149,8 @@ def traced_of_one_mass(traced: Traced, analysis: Analysis) -> Traced:
     names = ("coulomb", "offset")
     laws = tuple(_accepted(law, analysis) for law in analysis.in_loop.laws)
     # Another law of dry friction has Coulomb's in it; and the motion knows better than the force.
-    motion, coulomb = analysis.in_loop.motion, NAMES.index(names[0])
-    rubs = motion.values[coulomb] > _SEEN * motion.sd[coulomb]
+    motion = analysis.in_loop.motion
+    rubs = motion.values[DRY] > _SEEN * motion.sd[DRY]
     named = any(law.effect.sticks for law in analysis.in_loop.laws)
     dry = traced.state.accepted if rubs and not named else ()
     accepted = (*(replace(effect, estimates={}, parameters=names) for effect in dry), *laws)

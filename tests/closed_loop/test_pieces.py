@@ -14,10 +14,10 @@ from bayeshaptic.diagnosis.residuals.pieces import force_in_pieces
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.inference.time_domain.between_pieces import between_pieces
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
 from bayeshaptic.inference.time_domain.uneven import Ridge
+from bayeshaptic.inference.time_domain.widths.between_pieces import between_pieces
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.join import unbroken

@@ -19,7 +19,7 @@ from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood, in_lo
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, ridge
-from bayeshaptic.inference.time_domain.widths import covariance
+from bayeshaptic.inference.time_domain.widths.correlated import covariance
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.feedback import Feedback
 from bayeshaptic.recordings.recording import Recording
@@ -192,7 +192,7 @@ def test_a_delay_below_zero_by_chance_is_said_to_be_unknown(far: float, clear: b
     delay = NAMES.index("delay_s")
     values, inside = motion.values.copy(), motion.inside.copy()
     values[delay], inside[delay] = -far * motion.sd[delay], 0.0
-    motion = replace(motion, values=values, inside=inside)
+    motion = replace(motion, values=values, whole=np.append(inside, motion.whole[len(inside) :]))
     model = rigid_with_friction(recording, motion)
     fit = in_loop_fit(model, estimate_etfe(recording), motion, 1.0)
     assert fit.impossible == (("delay_s",) if clear else ())

@@ -12,9 +12,9 @@ from bayeshaptic.inference.fit import MISFIT
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, DELAY, MASS, NAMES, SHARED
 from bayeshaptic.inference.time_domain.white_force import in_white_force
-from bayeshaptic.inference.time_domain.widths import SURELY
+from bayeshaptic.inference.time_domain.widths.correlated import SURELY
 from bayeshaptic.models import HalfNormal
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import pure, quantity
@@ -87,8 +87,8 @@ def _like_one_mass(motion: MotionFit, recording: Recording) -> MotionFit:
     """The fit with wider mass and damping, by what a single tone cannot tell from them."""
     velocity = np.gradient(motion.simulated, recording.period_s)
     spread, size = motion.covariance.copy(), UNSEEN * float(np.std(recording.force))
-    for name, moves in (("m", np.gradient(velocity, recording.period_s)), ("b", velocity)):
-        spread[NAMES.index(name), NAMES.index(name)] += (size / float(np.std(moves))) ** 2
+    for index, moves in ((MASS, np.gradient(velocity, recording.period_s)), (DAMPING, velocity)):
+        spread[index, index] += (size / float(np.std(moves))) ** 2
     return replace(motion, covariance=spread)
 
 
@@ -142,8 +142,8 @@ def _by_chance(halves: tuple[MotionFit, ...], parts: tuple[Recording, ...]) -> f
         if not np.isfinite(columns).all():  # with its own values it runs away: no chance does
             return 0.0
         # Where the pieces begin, and hums, are fitted to each.
-        begins = columns[:, len(NAMES) : loop.plain - len(half.numbers)]
-        own = columns[:, : len(NAMES)]
+        begins = columns[:, SHARED : loop.plain - len(half.numbers)]
+        own = columns[:, :SHARED]
         own = own - begins @ np.linalg.lstsq(begins, own, rcond=None)[0]
         errors.append(np.sum((own @ spread) * own, axis=1))
     return float(np.mean(np.concatenate(errors)))
@@ -186,8 +186,7 @@ def is_wide(limit: CriticalStiffness) -> bool:
 
 def _unsure_of_the_delay(motion: MotionFit) -> bool:
     """Whether the delay is below zero by chance, as one may be that is known to a period or two."""
-    delay = NAMES.index("delay_s")
-    value, sd = motion.values[delay], motion.sd[delay]
+    value, sd = motion.values[DELAY], motion.sd[DELAY]
     return bool(value < 0 <= value + SURELY * sd)
 
 

@@ -28,7 +28,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
-from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, Hum
+from bayeshaptic.inference.time_domain.mass_in_loop import DELAY, DRY, Hum
 from bayeshaptic.inference.time_domain.scores import Score, scores
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
@@ -42,8 +42,7 @@ _SEEN = 5.04
 # as small as the encoder's to a law that has joined.
 _WORTH = 0.1
 _ROUNDS = 2  # another law of dry friction, and a resistance
-_DRY = (StribeckFriction.name, RisingFriction.name, DahlFriction.name)
-_COULOMB, _DELAY = NAMES.index("coulomb"), NAMES.index("delay_s")
+_DRY_LAWS = (StribeckFriction.name, RisingFriction.name, DahlFriction.name)
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ def with_laws(
     for _ in range(_ROUNDS):
         asked = [c for c in candidate_laws(recording, path, usual) if c.name not in seen]
         if motion.forces.friction.name != COULOMB.friction.name:
-            asked = [c for c in asked if c.name not in _DRY]
+            asked = [c for c in asked if c.name not in _DRY_LAWS]
         better = further + [
             (more, candidate.name, score)
             for candidate, score in _best_of_each(motion, recording, asked)
@@ -119,8 +118,8 @@ def _with_drag(
     if not strength > clear * sd:
         return []
     mass, damping, offset, dry = (found[n][0] for n in ("mass", "damping", "offset", "coulomb"))
-    start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[_DELAY]])
-    start[_DELAY] = min(start[_DELAY], recording.period_s)
+    start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[DELAY]])
+    start[DELAY] = min(start[DELAY], recording.period_s)
     dragged = MassForces(others=(Drag(MOTOR),), strengths=(strength,))
     more = _refitted(recording, follower, dragged, start, alone.hums)
     if more is None:
@@ -137,13 +136,13 @@ def _with_law(
     follower: Follower | None,
 ) -> MotionFit | None:
     """Fitted again with a law; None where that does not do what its score promised."""
-    acting, dry = motion.forces.at(motion.numbers), float(motion.inside[_COULOMB])
+    acting, dry = motion.forces.at(motion.numbers), float(motion.inside[DRY])
     forces = candidate.joined(acting, dry, score.strength)
     more = _refitted(recording, follower, forces, motion.inside, motion.hums)
     if more is None or (more.error_rms / motion.error_rms) ** 2 > 1 - _WORTH:
         return None
-    rubs = more.inside[_COULOMB] > np.sqrt(more.covariance[_COULOMB, _COULOMB])
-    return more if rubs or candidate.name not in _DRY else None
+    rubs = more.inside[DRY] > np.sqrt(more.covariance[DRY, DRY])
+    return more if rubs or candidate.name not in _DRY_LAWS else None
 
 
 def _refitted(

@@ -10,7 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.samples.sinusoids import Tone
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.inference.time_domain.fit import MotionFit
-from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, Hum
+from bayeshaptic.inference.time_domain.mass_in_loop import MASS, SHARED, Hum
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Complexes, Floats
@@ -50,7 +50,7 @@ def tones_of(motion: MotionFit) -> tuple[Tone, ...]:
 
     Their frequencies are those of the error's lines, known far better than anything asks for.
     """
-    first = len(NAMES) + 2  # behind where the piece begins
+    first = SHARED + 2  # behind where the piece begins
     sd = motion.whole_sd[first : first + 2 * len(motion.hums)].reshape(2, -1)
     both = zip(motion.hums, np.sqrt(np.mean(sd**2, axis=0)), strict=True)
     return tuple(Tone(hum.frequency_hz, 0.0, hum.amplitude, float(own)) for hum, own in both)
@@ -75,7 +75,7 @@ def _strongest(motion: MotionFit, recording: Recording) -> Hum | None:
     tone = max(loud, key=lambda tone: abs(tone.amplitude))
     rad_s = 2 * np.pi * tone.frequency_hz
     # As if nothing but the mass held it: friction may, and then nothing answers to a little more.
-    return Hum(tone.frequency_hz, complex(-motion.inside[0] * rad_s**2 * tone.amplitude))
+    return Hum(tone.frequency_hz, complex(-motion.inside[MASS] * rad_s**2 * tone.amplitude))
 
 
 def _flat(frequency_hz: Floats) -> Complexes:

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.between_pieces import between_pieces
-from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, SHARED, MassInLoop
-from bayeshaptic.inference.time_domain.one_way import one_way
-from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge, ridge
-from bayeshaptic.inference.time_domain.widths import covariance, of_white
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.inference.time_domain.linearised import Linearised, linearised
+from bayeshaptic.inference.time_domain.mass_in_loop import MASS, MassInLoop
+from bayeshaptic.inference.time_domain.uneven import WAVES
+from bayeshaptic.inference.time_domain.widths.of_values import covariance_of_values
 from bayeshaptic.types import Floats
 
+_STEPS, _TRIALS = 10, 6
+_SHORTER = 0.4  # a step that does not lower the error, at the next trial
+_SETTLED = 1e-4  # of the error's power, that a last step takes away
 _STUCK = 0.5  # of the error's power, that a settled fit does not promise to take away
 
 
@@ -24,116 +24,65 @@ class Descended:
 
     Attributes
     ----------
-    values, inside : ndarray, shape (V,)
-        Of the `MassInLoop`: where the data put them, and the best that are possible.
-    uneven : ndarray, shape (2 WAVES,)
-        The force that changes along the way.
+    values : ndarray, shape (V,)
+        Of the `MassInLoop`: where the data put them, possible or not.
     covariance : ndarray, shape (V, V)
-    error : ndarray, shape (N,)
-        Measured less simulated position.
-    found : Ridge
-        The linear problem around it.
+    there : Linearised
+        The loop about the best values that are possible.
     converged : bool
     """
 
     values: Floats
-    inside: Floats
-    uneven: Floats
     covariance: Floats
-    error: Floats
-    found: Ridge
+    there: Linearised
     converged: bool
 
 
-def descend(loop: MassInLoop, start: Floats, name: str) -> Descended:
+def descend(loop: MassInLoop, start: Floats) -> Descended:
     """Gauss-Newton steps, first without the uneven force, then with it."""
     values, uneven = start, np.zeros(2 * WAVES)
-    plain = loop.plain
-    steps = 10
+    converged = False
     for with_waves in (False, True):
-        converged = False
-        for _ in range(steps):
-            error, columns, solved = _linearised(loop, values, uneven, with_waves, name)
-            better = _step(loop, values, uneven, error, solved)
-            if better is None:
-                converged = True
+        for _ in range(_STEPS):
+            better = _step(linearised(loop, values, uneven, with_waves))
+            if better is not None:
+                values, uneven, gain = better
+            converged = better is None or gain < _SETTLED
+            if converged:
                 break
-            values, uneven, gain = better
-            if gain < 1e-4:
-                converged = True
-                break
-    error, columns, solved = _linearised(loop, values, uneven, True, name)
-    left = error + columns[:, plain:] @ uneven - columns @ solved.solution
-    promised = error + columns[:, plain:] @ uneven - columns @ _within(loop, values, solved)
+    there = linearised(loop, values, uneven)
+    promised = there.without(_within(there))
     # Where no step is any better, but a line promises much, it is stuck.
-    converged = converged and bool(promised @ promised > (1 - _STUCK) * (error @ error))
-    spread = _spread(loop, values, uneven, columns, left, solved)
-    best = values + solved.solution[: loop.plain]
-    return Descended(best, values, uneven, spread, error, solved, converged)
+    stuck = not promised @ promised > (1 - _STUCK) * (there.error @ there.error)
+    best = values + there.found.solution[: loop.plain]
+    return Descended(best, covariance_of_values(there), there, converged and not stuck)
 
 
-def _spread(
-    loop: MassInLoop, values: Floats, uneven: Floats, columns: Floats, left: Floats, solved: Ridge
-) -> Floats:
-    """Covariance of the values, (V, V): within pieces, between them, and of what goes one way."""
-    plain = loop.plain
-    if loop.white:
-        spread = of_white(left, solved, loop.independent)
-    else:
-        spread = covariance(columns, left, solved, loop.independent, SHARED)
-    friction = np.array([NAMES.index("b"), NAMES.index("coulomb")])
-    own = loop.pieces, friction, loop.beginnings
-    spread = spread + between_pieces(columns, left, solved, *own, loop.independent)
-    spread = spread[:plain, :plain]
-    # A fit that leaves less than rounding does, as where the mass rests for long, follows that.
-    rounded = (increment_unit(loop.position) or 0.0) ** 2 / 12
-    spread *= max(1.0, rounded * len(left) / float(left @ left))
-    return spread + one_way(loop, values, uneven, columns, solved, spread)
-
-
-def _linearised(
-    loop: MassInLoop, values: Floats, uneven: Floats, with_waves: bool, name: str
-) -> tuple[Floats, Floats, Ridge]:
-    """The error, its slopes, and the linear problem's solution for the step and all waves."""
-    plain = loop.plain
-    error = loop.error(values, uneven)
-    columns = loop.columns(values, uneven, error)
-    if not (np.all(np.isfinite(error)) and np.all(np.isfinite(columns))):
-        raise InputError(f"{name}: no motion of one mass stays near the measured one")
-    if not with_waves:
-        columns[:, plain:] = 0.0
-    size = float(np.std(loop.force))
-    target = error + columns[:, plain:] @ uneven
-    return error, columns, ridge(columns, target, plain, size, loop.independent, loop.reach)
-
-
-def _step(
-    loop: MassInLoop, values: Floats, uneven: Floats, error: Floats, solved: Ridge
-) -> tuple[Floats, Floats, float] | None:
+def _step(there: Linearised) -> tuple[Floats, Floats, float] | None:
     """As much of the step as lowers the penalised error, and by which share; None where none."""
-    plain, lowest, highest = loop.plain, loop.lowest, loop.highest
-    penalty = solved.share[plain:]
+    loop, values, uneven, error = there.loop, there.values, there.uneven, there.error
+    plain, penalty = loop.plain, there.found.share[loop.plain :]
     before = float(error @ error + penalty @ uneven**2)
-    share, step = 1.0, _within(loop, values, solved)
-    for _ in range(6):
-        trial = np.clip(values + share * step[:plain], lowest, highest)
-        trial[0] = np.clip(trial[0], 0.5 * values[0], 2 * values[0])
+    share, step = 1.0, _within(there)
+    for _ in range(_TRIALS):
+        trial = np.clip(values + share * step[:plain], loop.lowest, loop.highest)
+        trial[MASS] = np.clip(trial[MASS], 0.5 * values[MASS], 2 * values[MASS])
         more = uneven + share * (step[plain:] - uneven)
         left = loop.error(trial, more)
         after = float(left @ left + penalty @ more**2)
         if after < before:
             return trial, more, 1 - after / before
-        share *= 0.4
+        share *= _SHORTER
     return None
 
 
-def _within(loop: MassInLoop, values: Floats, solved: Ridge) -> Floats:
+def _within(there: Linearised) -> Floats:
     """The solution where no value leaves what is possible: the others make up for those held."""
-    plain = loop.plain
-    low, high = loop.lowest - values, loop.highest - values
-    step, held = solved.solution, np.zeros(plain, dtype=bool)
-    for _ in range(plain):
-        out = ~held & ((step[:plain] < low) | (step[:plain] > high))
+    loop, solved = there.loop, there.found
+    low, high = loop.lowest - there.values, loop.highest - there.values
+    step, held = solved.solution, np.zeros(loop.plain, dtype=bool)
+    for _ in range(loop.plain):
+        out = ~held & ((step[: loop.plain] < low) | (step[: loop.plain] > high))
         if not np.any(out):
             break
         held |= out

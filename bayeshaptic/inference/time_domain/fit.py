@@ -24,10 +24,10 @@ from bayeshaptic.inference.time_domain.descent import Descended, descend
 from bayeshaptic.inference.time_domain.follower import Follower, bandwidth_hz
 from bayeshaptic.inference.time_domain.innovations.filter import Disturbance
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
-from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, NAMES, Hum, MassInLoop
+from bayeshaptic.inference.time_domain.mass_in_loop import SHARED, Hum, MassInLoop
 from bayeshaptic.inference.time_domain.start import by_inverse_dynamics
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way
-from bayeshaptic.inference.time_domain.widths import mean_of_uneven
+from bayeshaptic.inference.time_domain.widths.of_values import covariance_of_shared
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
@@ -42,8 +42,6 @@ class MotionFit:
         `NAMES`: mass, viscous damping, dry friction, constant force (positive against a positive
         command), delay in s.  Not held above zero: where the data put a parameter below, its
         part above is what the posterior keeps.
-    inside : ndarray, shape (5,)
-        The best values that are possible.
     covariance : ndarray, shape (5, 5)
     bandwidth_hz : float
         Of the follower, or of the command where the feedback was declared.
@@ -59,7 +57,7 @@ class MotionFit:
     way : Way
     follower : Follower
     whole : ndarray
-        All values of the `MassInLoop`: `inside`, where pieces begin, numbers of the laws.
+        All values of the `MassInLoop`, as they are best where they are possible.
     forces : MassForces
         Dry friction's law, and further ones.
     whole_sd : ndarray
@@ -71,7 +69,6 @@ class MotionFit:
     """
 
     values: Floats
-    inside: Floats
     covariance: Floats
     bandwidth_hz: float
     error_rms: float
@@ -86,6 +83,11 @@ class MotionFit:
     whole_sd: Floats
     hums: tuple[Hum, ...] = ()
     disturbed: Disturbance | None = None
+
+    @property
+    def inside(self) -> Floats:
+        """The best values that are possible, shape (5,)."""
+        return self.whole[:SHARED]
 
     @property
     def numbers(self) -> Floats:
@@ -158,31 +160,28 @@ def fit_motion(
     loop = MassInLoop.of(recording, width, way, forces, hums)
     begun = loop.begun(by_inverse_dynamics(recording) if start is None else start)
     loop = loop.led(feedback, begun)
-    first = descend(loop, begun, recording.name)
+    first = descend(loop, begun)
+    there = first.there
     other = 0.4  # bandwidth of the second follower over that of the first
-    second = descend(loop.led(None, begun, other), first.inside, recording.name)
+    second = descend(loop.led(None, begun, other), there.values)
     apart = _beyond_noise(first, second)
-    whole = first.covariance + np.outer(apart, apart)
-    spread = whole[: len(NAMES), : len(NAMES)].copy()
-    for index in FORCES:
-        spread[index, index] += mean_of_uneven(first.found)
+    spread = first.covariance + np.outer(apart, apart)
     assert loop.follower is not None
     return MotionFit(
-        values=first.values[: len(NAMES)],
-        inside=first.inside[: len(NAMES)],
-        covariance=spread,
+        values=first.values[:SHARED],
+        covariance=covariance_of_shared(spread, there.found),
         bandwidth_hz=width,
-        error_rms=float(np.sqrt(np.mean(first.error**2))),
-        uneven_rms=float(np.sqrt(np.mean((first.uneven.reshape(2, WAVES) @ loop.shapes) ** 2))),
+        error_rms=float(np.sqrt(np.mean(there.error**2))),
+        uneven_rms=float(np.sqrt(np.mean((there.uneven.reshape(2, WAVES) @ loop.shapes) ** 2))),
         converged=first.converged and second.converged,
-        simulated=loop.position - first.error,
-        uneven=first.uneven,
+        simulated=loop.position - there.error,
+        uneven=there.uneven,
         way=way,
         follower=loop.follower,
-        whole=first.inside,
+        whole=there.values,
         forces=forces,
-        whole_sd=np.sqrt(np.diag(whole)),
-        hums=loop.hums_at(first.inside),
+        whole_sd=np.sqrt(np.diag(spread)),
+        hums=loop.hums_at(there.values),
     )
 
 
@@ -195,6 +194,6 @@ def _beyond_noise(first: Descended, second: Descended) -> Floats:
     """
     apart = second.values - first.values
     chance = np.diag(second.covariance) - np.diag(first.covariance)
-    chance[len(NAMES) :] = 0.0
+    chance[SHARED:] = 0.0
     beyond = np.maximum(apart**2 - np.maximum(chance, 0.0), 0.0)
     return np.asarray(np.copysign(np.sqrt(beyond), apart))

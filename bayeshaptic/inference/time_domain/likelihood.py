@@ -10,8 +10,8 @@ import numpy as np
 from bayeshaptic.inference.fit import AT_BOUND, CONVERGED, Fit
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.time_domain.fit import MotionFit
-from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
-from bayeshaptic.inference.time_domain.widths import FREEDOM, SURELY
+from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, SHARED
+from bayeshaptic.inference.time_domain.widths.correlated import FREEDOM, SURELY
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.types import Complexes, Floats
@@ -57,7 +57,7 @@ class MotionLikelihood:
     def __call__(self, theta: Floats) -> Floats:
         """Log likelihood of parameter vectors of shape (B, P); shape (B,)."""
         squares = np.sum(self._apart(theta) ** 2, axis=1)
-        return -0.5 * (FREEDOM + len(NAMES)) * np.log1p(squares / FREEDOM)
+        return -0.5 * (FREEDOM + SHARED) * np.log1p(squares / FREEDOM)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ import numpy as np
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import Law, numbers_of
 from bayeshaptic.effects.nonlinear.protocol import NonlinearEffect
+from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.models import Model, rigid
 from bayeshaptic.types import Floats
 
@@ -95,8 +96,7 @@ def simulate(
     backward: Floats,
     command: Floats,
     measured: Floats,
-    above: Floats,
-    below: Floats,
+    follower: Follower,
     period_s: float,
 ) -> Floats:
     """The simulated position at the samples, as `kernels.follow` has it."""
@@ -107,7 +107,7 @@ def simulate(
 
     forces = tuple(callback(law.force) for law in laws)
     sticks = np.array([law.sticks for law in laws])
-    signals = forward, backward, command, measured, above, below
+    signals = forward, backward, command, measured, follower.above, follower.below
     with warnings.catch_warnings():  # numba calls tuples of functions an experiment
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         return follow(values, *signals, period_s, forces, sticks, *numbers_of(laws))

@@ -13,10 +13,11 @@ from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats, Ints
 
-# Mass, damping, dry friction, constant force, delay: the same in all pieces.
+# The values that are the same in all pieces, and where they are.
 NAMES = ("m", "b", "coulomb", "offset", "delay_s")
 SHARED = len(NAMES)
-FORCES = [NAMES.index("coulomb"), NAMES.index("offset")]
+MASS, DAMPING, DRY, OFFSET, DELAY = range(SHARED)
+FORCES = [DRY, OFFSET]
 _LARGEST = 10.0  # of the command's rms: no friction, and no constant force, is larger
 _LOWEST = (0.0, 0.0, 0.0, -np.inf, 0.0)
 
@@ -57,6 +58,8 @@ class MassInLoop:
     joints : tuple of int
         Where further pieces begin.
     hums : tuple of Hum
+    name : str
+        Of the recording, for messages.
     """
 
     force: Floats = field(repr=False)
@@ -68,6 +71,7 @@ class MassInLoop:
     forces: MassForces = COULOMB
     joints: tuple[int, ...] = ()
     hums: tuple[Hum, ...] = ()
+    name: str = "recording"
 
     @classmethod
     def of(
@@ -89,12 +93,18 @@ class MassInLoop:
             forces=forces,
             joints=recording.joints,
             hums=hums,
+            name=recording.name,
         )
 
     @property
     def plain(self) -> int:
         """How many values there are."""
-        return SHARED + self._own * (len(self.joints) + 1) + len(self.forces.names)
+        return self._laws_from + len(self.forces.names)
+
+    @property
+    def _laws_from(self) -> int:
+        """Where the numbers of the laws begin."""
+        return SHARED + self._own * (len(self.joints) + 1)
 
     @property
     def _own(self) -> int:
@@ -105,14 +115,13 @@ class MassInLoop:
     def lowest(self) -> Floats:
         """Below which no value may go, shape (plain,)."""
         least = 1e-3  # of a law's number: none is below zero
-        anywhere = np.full(self.plain - SHARED - len(self.forces.names), -np.inf)
+        anywhere = np.full(self._laws_from - SHARED, -np.inf)
         return np.concatenate([_LOWEST, anywhere, least * self.forces.start])
 
     @property
     def highest(self) -> Floats:
         """Above which no value may go, shape (plain,)."""
-        most = self.forces.most
-        return np.append(np.full(self.plain - len(most), np.inf), most)
+        return np.append(np.full(self._laws_from, np.inf), self.forces.most)
 
     @property
     def reach(self) -> Floats:
@@ -135,7 +144,7 @@ class MassInLoop:
     @property
     def beginnings(self) -> list[Ints]:
         """Which values are a piece's own: its beginning, and its hums."""
-        firsts = range(SHARED, self.plain - len(self.forces.names), self._own)
+        firsts = range(SHARED, self._laws_from, self._own)
         return [np.arange(first, first + self._own) for first in firsts]
 
     def begun(self, shared: Floats, numbers: Floats | None = None) -> Floats:
@@ -184,7 +193,7 @@ class MassInLoop:
         trials = 10
         calmer = 1.6  # the bandwidth is lowered by this until the start can be simulated
         for _ in range(trials):
-            chosen = feedback or spring_and_damper(start[0], width, self.period_s)
+            chosen = feedback or spring_and_damper(start[MASS], width, self.period_s)
             loop = replace(self, bandwidth_hz=width, follower=chosen)
             error = loop.error(start, np.zeros(2 * WAVES))
             if np.all(np.isfinite(error)) and np.abs(error).max() < 10 * np.ptp(self.position):
@@ -196,9 +205,8 @@ class MassInLoop:
         """Measured less simulated position, shape (N,); `more` is a force on the mass."""
         assert self.follower is not None
         mass, damping, dry, offset, delay_s = values[:SHARED]
-        laws = self.forces.laws(dry, values[self.plain - len(self.forces.names) :])
+        laws = self.forces.laws(dry, values[self._laws_from :])
         forward, backward = uneven.reshape(2, WAVES) @ self.shapes + more
-        above, below = self.follower.above, self.follower.below
         simulated = np.empty_like(self.position)
         for piece, own in zip(self.pieces, self.beginnings, strict=True):
             hum = values[own[2:]] @ self._waves(piece.stop - piece.start)
@@ -210,8 +218,7 @@ class MassInLoop:
                     backward[piece] + hum,
                     self.force[piece],
                     self.position[piece],
-                    above,
-                    below,
+                    self.follower,
                     self.period_s,
                 )
         return self.position - simulated
@@ -225,22 +232,14 @@ class MassInLoop:
     def columns(self, values: Floats, uneven: Floats, error: Floats) -> Floats:
         """How the simulated position moves with every value and wave, shape (N, C)."""
         size = float(np.std(self.force))
-        steps = np.array(
-            [
-                1e-3 * values[0],
-                1e-2 * max(values[1], values[0]),
-                2e-3 * size,
-                2e-3 * size,
-                0.05 * self.period_s,
-            ]
-        )
+        heavier, thicker = 1e-3 * values[MASS], 1e-2 * max(values[DAMPING], values[MASS])
+        steps = np.array([heavier, thicker, 2e-3 * size, 2e-3 * size, 0.05 * self.period_s])
         out = np.zeros((len(error), self.plain + 2 * WAVES))
         for i, step in enumerate(steps):
             out[:, i] = self._slope(values, uneven, [i], step)
         for piece, own, slopes in self._begins(values, uneven):
             out[piece, own] = slopes
-        numbers = self.forces.start
-        for i, number in enumerate(numbers, self.plain - len(numbers)):
+        for i, number in enumerate(self.forces.start, self._laws_from):
             out[:, i] = self._slope(values, uneven, [i], 1e-2 * max(values[i], 0.1 * number))
         for i in range(2 * WAVES):
             more = uneven.copy()

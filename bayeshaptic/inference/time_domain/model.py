@@ -9,6 +9,7 @@ import numpy as np
 
 from bayeshaptic.devices import Device
 from bayeshaptic.inference.time_domain.fit import MotionFit
+from bayeshaptic.inference.time_domain.mass_in_loop import MASS
 from bayeshaptic.models import LogNormal, MaybeZero, Model, Normal, Parameter, Prior, build_model
 from bayeshaptic.models.build import delay_prior
 from bayeshaptic.models.prior_of_zero import SPIKE_OF_MOTOR
@@ -44,7 +45,7 @@ def rigid_with_friction(
     base = replace(
         base, force_unit=recording.force_unit, position_unit=recording.position_unit
     ).with_period(period_s)
-    mass, size = float(motion.inside[0]), float(np.std(recording.force))
+    mass, size = float(motion.inside[MASS]), float(np.std(recording.force))
     mass_log_sd = 1.0
     weak: dict[str, Prior] = {
         "m": LogNormal(mass, mass_log_sd),

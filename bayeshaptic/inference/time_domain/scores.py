@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.inference.time_domain.fit import MotionFit
-from bayeshaptic.inference.time_domain.uneven import ridge
-from bayeshaptic.inference.time_domain.widths import spread_of
+from bayeshaptic.inference.time_domain.linearised import linearised
+from bayeshaptic.inference.time_domain.widths.correlated import spread_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
@@ -47,17 +47,12 @@ def scores(motion: MotionFit, recording: Recording, forces: Sequence[Floats]) ->
     forces : sequence of ndarray, shape (N,)
         Of strength one, as the measured motion says.
     """
-    loop = motion.loop(recording)
-    values, uneven, plain = motion.whole, motion.uneven, loop.plain
-    error = loop.error(values, uneven)
-    columns = loop.columns(values, uneven, error)
-    target = error + columns[:, plain:] @ uneven
-    size = float(np.std(loop.force))
-    found = ridge(columns, target, plain, size, loop.independent, loop.reach)
-    left = target - columns @ found.solution
+    there = linearised(motion.loop(recording), motion.whole, motion.uneven)
+    columns, found = there.columns, there.found
+    left = there.without(found.solution)
     scored: list[Score | None] = []
     for force in forces:
-        answer = loop.answer(values, uneven, error, force)
+        answer = there.loop.answer(there.values, there.uneven, there.error, force)
         along = columns.T @ answer
         own = answer - columns @ (found.inverse @ along)  # what no other column does
         its_own = 1e-9  # of its power: less is rounding
@@ -67,7 +62,7 @@ def scores(motion: MotionFit, recording: Recording, forces: Sequence[Floats]) ->
             continue
         strength = float(own @ left) / power
         after = left - strength * own
-        variance = spread_of(own, after, along, found, loop.independent)
+        variance = spread_of(own, after, along, found, there.loop.independent)
         sd = float(np.sqrt(variance)) / power
         scored.append(Score(strength, sd, float(after @ after) / float(left @ left)))
     return scored

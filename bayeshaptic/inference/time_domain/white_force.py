@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.inference.time_domain.counts.fit import FEWEST, LAGS, RARE, by_counts
+from bayeshaptic.inference.time_domain.counts.fit import by_counts
 from bayeshaptic.inference.time_domain.descent import Descended, descend
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.innovations.filter import (
@@ -24,9 +24,10 @@ from bayeshaptic.inference.time_domain.innovations.filter import (
     Innovations,
     innovations,
 )
-from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, NAMES, MassInLoop
+from bayeshaptic.inference.time_domain.mass_in_loop import SHARED, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES
-from bayeshaptic.inference.time_domain.widths import mean_of_uneven
+from bayeshaptic.inference.time_domain.whiteness import FEWEST, LAGS, by_chance
+from bayeshaptic.inference.time_domain.widths.of_values import covariance_of_shared
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
@@ -93,39 +94,34 @@ def in_white_force(motion: MotionFit, recording: Recording) -> MotionFit:
 
 
 def _by_innovations(motion: MotionFit, recording: Recording) -> MotionFit:
-    settled = _settled(motion.loop(recording), motion.whole, recording.name)
+    settled = _settled(motion.loop(recording), motion.whole)
     if settled is None:
         return motion
     found, disturbed = settled
-    shared = len(NAMES)
-    spread = found.covariance[:shared, :shared].copy()
-    for index in FORCES:
-        spread[index, index] += mean_of_uneven(found.found)
     return replace(
         motion,
-        values=found.values[:shared],
-        inside=found.inside[:shared],
-        covariance=spread,
-        whole=found.inside,
+        values=found.values[:SHARED],
+        covariance=covariance_of_shared(found.covariance, found.there.found),
+        whole=found.there.values,
         whole_sd=np.sqrt(np.diag(found.covariance)),
         disturbed=disturbed,
     )
 
 
-def _settled(loop: MassInLoop, values: Floats, name: str) -> tuple[Descended, Disturbance] | None:
+def _settled(loop: MassInLoop, values: Floats) -> tuple[Descended, Disturbance] | None:
     """The fit beside its own filter; None where innovations are not white or no fit settles."""
     disturbed, tried = _usual(loop), _SIZES * float(np.std(loop.force))
-    before, shared = values, len(NAMES)
+    before = values
     for _ in range(_ROUNDS):
         disturbed, filtered = _disturbance(loop, values, disturbed, tried)
-        whitened = _whitened(loop, filtered)
+        whitened = WhitenedLoop(**vars(loop), filtered=filtered)
         if not _like_noise(whitened, values):
             return None
-        found = descend(whitened, values, name)
-        moved = (found.values - before)[:shared] / np.sqrt(np.diag(found.covariance)[:shared])
+        found = descend(whitened, values)
+        moved = (found.values - before)[:SHARED] / np.sqrt(np.diag(found.covariance)[:SHARED])
         if found.converged and np.max(np.abs(moved)) < _STILL:
             return found, disturbed
-        tried, values = _around(disturbed.force_sd, _CLOSER[0]), found.inside
+        tried, values = _around(disturbed.force_sd, _CLOSER[0]), found.there.values
         before = found.values
     return None
 
@@ -139,11 +135,6 @@ def _usual(loop: MassInLoop) -> Disturbance:
 
 def _around(size: float, decades: float) -> Floats:
     return np.asarray(size * 10.0 ** np.linspace(-decades, decades, 5))
-
-
-def _whitened(loop: MassInLoop, filtered: Innovations) -> WhitenedLoop:
-    kept = {name: getattr(loop, name) for name in loop.__dataclass_fields__}
-    return WhitenedLoop(**kept, filtered=filtered)
 
 
 def _disturbance(
@@ -180,11 +171,15 @@ def _disturbance(
 
 def _left(filtered: Innovations, values: Floats, error: Floats, slopes: Floats) -> Floats:
     """Innovations that the columns do not explain, shape (N,)."""
-    target = filtered(error, values)
     columns = np.stack([filtered(column, values) for column in slopes.T], axis=1)
+    return _unexplained(filtered(error, values), columns)
+
+
+def _unexplained(series: Floats, columns: Floats) -> Floats:
+    """What is left of a series where columns are fitted to it, shape (N,)."""
     scale = np.linalg.norm(columns, axis=0)
     scale[scale == 0] = 1.0
-    return np.asarray(target - columns / scale @ np.linalg.lstsq(columns / scale, target)[0])
+    return np.asarray(series - columns / scale @ np.linalg.lstsq(columns / scale, series)[0])
 
 
 def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
@@ -192,8 +187,6 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
 
     As far as a line says: where friction is clear, for half of the motion at least.
     """
-    from scipy.stats import chi2
-
     assert loop.filtered is not None
     clear, moving = loop.filtered.clear, np.count_nonzero(loop.filtered.moving)
     if np.count_nonzero(clear) < max(_MOSTLY * moving, FEWEST):
@@ -201,18 +194,13 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
     waves = np.zeros(2 * WAVES)
     error = loop.error(values, waves)
     columns = loop.columns(values, waves, error)
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale == 0] = 1.0
-    columns = columns / scale
     if not told_apart(columns[:, : loop.plain]):
         return False
-    plain, with_waves = (
-        error - part @ np.linalg.lstsq(part, error)[0]
-        for part in (columns[:, : loop.plain], columns)
-    )
+    plain = _unexplained(error, columns[:, : loop.plain])
+    with_waves = _unexplained(error, columns)
     along = moving * (plain @ plain / (with_waves @ with_waves) - 1)
     correlated = _correlated(plain, clear)
-    return bool(correlated < chi2.isf(RARE, LAGS) and along < chi2.isf(RARE, 2 * WAVES))
+    return bool(correlated < by_chance(LAGS) and along < by_chance(2 * WAVES))
 
 
 def told_apart(columns: Floats) -> bool:
@@ -223,7 +211,7 @@ def told_apart(columns: Floats) -> bool:
     """
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     inflated = np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True))
-    return bool(np.max(inflated[: len(NAMES)]) < _APART)
+    return bool(np.max(inflated[:SHARED]) < _APART)
 
 
 def _correlated(left: Floats, clear: NDArray[np.bool_]) -> float:

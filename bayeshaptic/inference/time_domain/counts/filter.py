@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.innovations.filter import held
+from bayeshaptic.inference.time_domain.held_force import over_span
 from bayeshaptic.types import Floats
 
 _LEAST = 1e-6  # of a period, that the old command acts in each
@@ -85,7 +85,7 @@ class Counts:
         late = min(max(delay_s / self.period_s - whole, _LEAST), 1 - _LEAST)
         late_s = late * self.period_s
         spans = late_s, self.period_s - late_s
-        moves = (held(mass, damping, span) for span in spans)
+        moves = (over_span(mass, damping, span) for span in spans)
         kept = np.array([(motion[1, 1], motion[0, 1], *push) for motion, push in moves])
         loads = np.array([dry, offset, force_sd, whole, late_s, self.period_s])
         further = np.zeros(len(self.position)) if more is None else more

@@ -13,7 +13,6 @@ import numpy as np
 from bayeshaptic.inference.time_domain.counts.filter import Counts
 from bayeshaptic.inference.time_domain.counts.likeliest import (
     ROUGH,
-    VALUES,
     Likeliest,
     about,
     after,
@@ -23,15 +22,14 @@ from bayeshaptic.inference.time_domain.counts.likeliest import (
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.innovations.filter import Disturbance
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB
-from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
+from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, DELAY, MASS, SHARED
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
-from bayeshaptic.inference.time_domain.widths import SURELY
+from bayeshaptic.inference.time_domain.whiteness import FEWEST, LAGS, by_chance
+from bayeshaptic.inference.time_domain.widths.correlated import SURELY
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
-LAGS = 20  # samples
-RARE = 1e-3  # how often chance is told from white noise by a test
 # Times that, with few cells, from which on more of them do not make it white.
 _HOPELESS = 10.0
 # Of a count, that the white force moves the mass by within a sample.  With less nearly every count
@@ -40,7 +38,6 @@ _HOPELESS = 10.0
 # the 90 % intervals hold, of the 12 below 62 to 88 %, of the 10 above 50 to 100 %.
 _LEAST, _MOST = 0.005, 0.5
 _NUDGE = 3e-3  # of the white force, over which slopes over a further force are taken
-FEWEST = 300  # samples that show whether a series is white
 
 
 def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
@@ -65,21 +62,20 @@ def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
         near = about(counts, motion.inside)
         if not _LEAST < _in_counts(near) < _MOST:
             return None
-        if _correlated(near) > _HOPELESS * _by_chance(LAGS):
+        if _correlated(near) > _HOPELESS * by_chance(LAGS):
             return None
-        found = exactly(near, float(motion.inside[4]), float(motion.sd[4]))
+        found = exactly(near, float(motion.inside[DELAY]), float(motion.sd[DELAY]))
     except np.linalg.LinAlgError:  # two values that nothing tells apart
         return None
     if found is None or not found.settled or _none_has(found) or not _like_noise(found):
         return None
-    spread = found.covariance[:VALUES, :VALUES]
-    rest = motion.whole[VALUES:], motion.whole_sd[VALUES:]
+    spread = found.covariance[:SHARED, :SHARED]
+    rest = motion.whole[SHARED:], motion.whole_sd[SHARED:]
     return replace(
         motion,
-        values=found.point[:VALUES],
-        inside=found.point[:VALUES],
+        values=found.point[:SHARED],
         covariance=spread,
-        whole=np.append(found.point[:VALUES], rest[0]),
+        whole=np.append(found.point[:SHARED], rest[0]),
         whole_sd=np.append(np.sqrt(np.diag(spread)), rest[1]),
         disturbed=Disturbance(found.force_sd, unit / np.sqrt(12)),
     )
@@ -87,25 +83,18 @@ def by_counts(motion: MotionFit, recording: Recording) -> MotionFit | None:
 
 def _none_has(found: Likeliest) -> bool:
     """Whether mass, damping or delay would be below zero, as none is: others can say so."""
-    known = [NAMES.index(name) for name in ("m", "b", "delay_s")]
-    return bool(np.any(found.past[known] > SURELY))
-
-
-def _by_chance(freedom: int) -> float:
-    from scipy.stats import chi2
-
-    return float(chi2.isf(RARE, freedom))
+    return bool(np.any(found.past[[MASS, DAMPING, DELAY]] > SURELY))
 
 
 def _in_counts(found: Likeliest) -> float:
     """Of a count, what the white force moves the mass by within a sample."""
     counts = found.counts
-    return found.force_sd * counts.period_s**2 / float(found.point[0]) / counts.unit
+    return found.force_sd * counts.period_s**2 / float(found.point[MASS]) / counts.unit
 
 
 def _like_noise(found: Likeliest) -> bool:
     """Whether innovations are white, and owe nothing to the way."""
-    return _correlated(found) < _by_chance(LAGS) and _along(found) < _by_chance(2 * WAVES)
+    return _correlated(found) < by_chance(LAGS) and _along(found) < by_chance(2 * WAVES)
 
 
 def _correlated(found: Likeliest) -> float:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayeshaptic.inference.time_domain.counts.filter import Counts, Followed
+from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, DELAY, MASS, SHARED
 from bayeshaptic.types import Floats
 
-VALUES = 5  # mass, damping, dry friction, constant force, delay; then log of the white force's sd
+WHITE = SHARED  # in a point: behind the values, the logarithm of the white force's sd
 ROUGH = 4  # cells of a count, with which values are looked for at first
 _FINER = (8, 16, 32)  # cells, where fewer are not enough
 # Squared changes of the samples' log likelihoods with twice the cells, added: with less than this
@@ -56,11 +57,11 @@ class Likeliest:
     slopes: Floats = field(repr=False)
     covariance: Floats
     settled: bool
-    past: Floats = field(default_factory=lambda: np.zeros(VALUES + 1))
+    past: Floats = field(default_factory=lambda: np.zeros(WHITE + 1))
 
     @property
     def force_sd(self) -> float:
-        return float(np.exp(self.point[VALUES]))
+        return float(np.exp(self.point[WHITE]))
 
 
 def about(counts: Counts, values: Floats) -> Likeliest:
@@ -100,7 +101,7 @@ def _begun(counts: Counts, values: Floats) -> Floats:
 
 def after(counts: Counts, point: Floats, more: Floats | None = None) -> Followed:
     """The counts with these values and this white force, and a further force."""
-    return counts.after(point[:VALUES], float(np.exp(point[VALUES])), more)
+    return counts.after(point[:SHARED], float(np.exp(point[WHITE])), more)
 
 
 def slopes_of(counts: Counts, point: Floats, sd: Floats) -> Floats:
@@ -161,7 +162,7 @@ def _held(found: Likeliest) -> Likeliest:
 def _first_sd(counts: Counts, point: Floats) -> Floats:
     """What standard deviations may be at most, shape (6,), before anything is known of them."""
     size = float(np.std(counts.command))
-    mass, damping = point[:2]
+    mass, damping = point[[MASS, DAMPING]]
     moves = [0.02 * mass, 0.06 * max(damping, mass), 0.02 * size, 0.02 * size]
     return np.array([*moves, 0.2 * counts.period_s, 0.2])
 
@@ -184,12 +185,10 @@ def _ascend(counts: Counts, start: Floats, settled: float, steps: int = _STEPS) 
                 better = trial
                 break
             damped = max(8 * damped, 1e-3)
-        if better is None:
-            done = True
-            break
-        point, likely, damped = better, likely + gain, max(damped / 8, 1e-6)
-        if gain < settled:
-            done = True
+        if better is not None:
+            point, likely, damped = better, likely + gain, max(damped / 8, 1e-6)
+        done = better is None or gain < settled
+        if done:
             break
     return Likeliest(counts, point, likely, slopes, covariance, done)
 
@@ -211,26 +210,26 @@ def _moved(point: Floats, slopes: Floats, damped: float) -> Floats:
             break
         free &= ~out
     moved = np.maximum(point + step, _LOWEST)
-    moved[0] = np.clip(moved[0], 0.5 * point[0], 2 * point[0])
-    moved[VALUES] = np.clip(moved[VALUES], point[VALUES] - 1.5, point[VALUES] + 1.5)
+    moved[MASS] = np.clip(moved[MASS], 0.5 * point[MASS], 2 * point[MASS])
+    moved[WHITE] = np.clip(moved[WHITE], point[WHITE] - 1.5, point[WHITE] + 1.5)
     return np.asarray(moved)
 
 
 def _elsewhere(found: Likeliest, delay_s: float, delay_sd: float) -> Likeliest | None:
     """The likeliest values from another delay, the others moved along with it; None where none."""
-    inner = found.slopes[:, :4].T @ found.slopes
-    along = np.linalg.lstsq(inner[:, :4], inner[:, 4], rcond=None)[0]
+    inner = found.slopes[:, :DELAY].T @ found.slopes
+    along = np.linalg.lstsq(inner[:, :DELAY], inner[:, DELAY], rcond=None)[0]
     counts = found.counts
     near = 0.1  # of a period, within which nothing else is looked for
     wide = delay_s + delay_sd * np.linspace(-2, 2, 9)
-    close = found.point[4] + counts.period_s * np.array([-1.0, -0.5, 0.5, 1.0])
+    close = found.point[DELAY] + counts.period_s * np.array([-1.0, -0.5, 0.5, 1.0])
     tried = []
     for delay in np.unique(np.maximum(np.append(wide, close), 0.0)):
-        off = delay - found.point[4]
+        off = delay - found.point[DELAY]
         point = found.point.copy()
-        point[:4] -= along * off
-        point[4] = delay
-        possible = 0.5 < point[0] / found.point[0] < 2
+        point[:DELAY] -= along * off
+        point[DELAY] = delay
+        possible = 0.5 < point[MASS] / found.point[MASS] < 2
         if abs(off) > near * counts.period_s and possible:
             tried.append(np.maximum(point, _LOWEST))
     if not tried:

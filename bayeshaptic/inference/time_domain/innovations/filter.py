@@ -9,7 +9,6 @@ Identification, 1999, chapter 7).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.inference.time_domain.held_force import over_span, position_over_command
 from bayeshaptic.types import Floats, Ints
 
 _UNKNOWN = 100.0  # counts a sample, that a velocity may be off where a piece begins
@@ -91,7 +91,7 @@ class Innovations:
         led = self.follower
         force = np.concatenate([lfilter(led.above, led.below, error[one]) for one in self.pieces])
         mass, damping, _, _, delay_s = values[:5]
-        answer = _position_over_force(mass, damping, delay_s, self.period_s)
+        answer = position_over_command(mass, damping, delay_s, self.period_s)
         beside = self.motion, self.gains, self.variances, _starts(self.pieces)
         return np.asarray(innovations_of(*beside, *answer, force, error))
 
@@ -125,7 +125,7 @@ def innovations(
     from bayeshaptic.inference.time_domain.innovations.kernels import gains_of
 
     mass, damping, dry = values[:3]
-    motion, push = held(mass, damping, period_s)
+    motion, push = over_span(mass, damping, period_s)
     unknown = _UNKNOWN * disturbed.position_sd / period_s
     sizes = np.array([disturbed.force_sd, disturbed.position_sd, dry, unknown])
     gains, variances = gains_of(motion, push, sizes, velocity, _rests(velocity), _starts(pieces))
@@ -141,34 +141,3 @@ def _rests(velocity: Floats) -> NDArray[np.bool_]:
 
 def _starts(pieces: Sequence[slice]) -> Ints:
     return np.array([piece.start for piece in pieces])
-
-
-def held(mass: float, damping: float, span_s: float) -> tuple[Floats, Floats]:
-    """Position and velocity `span_s` later, (2, 2), and what a held unit force adds, (2,)."""
-    rate = damping / mass
-    slight = 1e-6  # of a velocity, lost in the time: a series then is exact
-    if rate * span_s > slight:
-        kept = math.exp(-rate * span_s)
-        once = (1 - kept) / rate
-        twice = (span_s - once) / rate
-    else:
-        kept = 1 - rate * span_s
-        once, twice = span_s * (1 - 0.5 * rate * span_s), 0.5 * span_s**2
-    return np.array([[1.0, once], [0.0, kept]]), np.array([twice, once]) / mass
-
-
-def _position_over_force(
-    mass: float, damping: float, delay_s: float, period_s: float
-) -> tuple[Floats, Floats]:
-    """Position over a command, held and late: numerator and denominator in powers of 1/z."""
-    whole = math.floor(delay_s / period_s)
-    late_s = delay_s - whole * period_s
-    motion, _ = held(mass, damping, period_s)
-    after, now = held(mass, damping, period_s - late_s)
-    _, before = held(mass, damping, late_s)
-    far, kept = motion[0, 1], motion[1, 1]
-    above = np.zeros(whole + 4)
-    for first, (moved, faster) in ((whole, now), (whole + 1, after @ before)):
-        above[first + 1] += moved
-        above[first + 2] += far * faster - kept * moved
-    return above, np.array([1.0, -1.0 - kept, kept])

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge
+from bayeshaptic.inference.time_domain.uneven import Ridge
 from bayeshaptic.types import Floats
 
 FREEDOM = 8  # cosines, and so degrees of freedom
 SURELY = 3.83  # standard deviations (Student's t, `FREEDOM`) that chance exceeds 1 in 200 times
-# How far the mean of a half wave along the way goes with the way's ends, of its standard deviation.
-# Of 199 loops 90 % intervals hold dry friction and constant force in 90 and 82 % without it, in 98
-# and 94 % with 0.05; the constant force published of EMPS is 0.15 of one off the mean over the way
-# and three standard deviations beside.
-_ENDS = 0.2
 _SMOOTH, _FEWEST = 0.35, 6  # lines either side of one, as a share of its number, and at least
 
 
@@ -78,15 +73,6 @@ def spread_of(
     still = float(_stationary(own[:, None], residual)[0, 0])
     held = along @ (found.inverse * found.share)
     return float(lost * max(np.sum(slow**2) / FREEDOM, still) + held**2 @ found.prior)
-
-
-def mean_of_uneven(found: Ridge) -> float:
-    """Variance of the mean of a force with that prior over the way, as far as it is not known.
-
-    A share of that of its longest half wave: how much of it lies in the constant is a matter of
-    where the way happens to begin and to end.
-    """
-    return float(_ENDS**2 * found.prior[-WAVES])
 
 
 def _cosines(columns: Floats, residual: Floats) -> Floats:

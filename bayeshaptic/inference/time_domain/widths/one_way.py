@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.mass_in_loop import FORCES, MassInLoop
-from bayeshaptic.inference.time_domain.uneven import Ridge
+from bayeshaptic.inference.time_domain.linearised import Linearised
+from bayeshaptic.inference.time_domain.mass_in_loop import FORCES
 from bayeshaptic.types import Floats
 
 _NEAREST = 0.01  # of the command's rms
 _CLEAR = 100.0  # times its noise, by which an error grows that other values make no smaller
 
 
-def one_way(
-    loop: MassInLoop,
-    values: Floats,
-    uneven: Floats,
-    columns: Floats,
-    found: Ridge,
-    spread: Floats,
-) -> Floats:
+def one_way(there: Linearised, spread: Floats) -> Floats:
     """Covariance that it adds to that of the values, shape (plain, plain).
 
     A mass that moves one way and rests says how large the sum (or the difference) of both is, and
@@ -29,20 +22,16 @@ def one_way(
 
     Parameters
     ----------
-    loop : MassInLoop
-    values, uneven : ndarray
-        Fitted.
-    columns : ndarray, shape (N, C)
-        The slopes there.
-    found : Ridge
-        Of these.
+    there : Linearised
+        About the fitted values.
     spread : ndarray, shape (plain, plain)
-        Covariance of the values by these.
+        Covariance of the values by the slopes there.
     """
+    loop, values, uneven = there.loop, there.values, there.uneven
     size = float(np.std(loop.force))
-    others = np.delete(columns, FORCES, axis=1)
-    gram = others.T @ others + np.diag(np.delete(found.share, FORCES))
-    waves = columns[:, loop.plain :] @ uneven
+    others = np.delete(there.columns, FORCES, axis=1)
+    gram = others.T @ others + np.diag(np.delete(there.found.share, FORCES))
+    waves = there.columns[:, loop.plain :] @ uneven
 
     def power(moved: Floats) -> float:
         target = loop.error(moved, uneven) + waves

@@ -1,0 +1,1 @@
+"""How far the values of a fitted motion may be off: by noise, between pieces, and by friction."""
