@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
-from bayeshaptic.diagnosis.feedback.choose_terms import between_sets, choose_terms
+from bayeshaptic.diagnosis.feedback.choose_terms import Regression, between_sets, choose_terms
 from bayeshaptic.diagnosis.feedback.smooth_motion import at_rest
 
 RNG = np.random.default_rng(7)
@@ -25,13 +25,13 @@ def force_of(*names: str, noise: float = NOISE, seed: int = 1) -> np.ndarray:
 
 
 def chosen_of(force: np.ndarray, seconds: float = 40.0, positive: frozenset = frozenset()) -> list:
-    return choose_terms(COLUMNS, START, positive, force, seconds)[0][len(START) :]
+    return choose_terms(Regression(COLUMNS, force, START, positive), seconds)[0][len(START) :]
 
 
 def test_only_what_predicts_earns_its_place() -> None:
     assert chosen_of(force_of(*START)) == []
     assert chosen_of(force_of(*START, "coulomb")) == ["coulomb"]
-    chosen, steps, tried = choose_terms(COLUMNS, START, set(), force_of(*TRUE), 40.0)
+    chosen, steps, tried = choose_terms(Regression(COLUMNS, force_of(*TRUE), START), 40.0)
     assert chosen[2:] == ["coulomb", "spring"], "the simplest law first, though the spring is more"
     assert [one.term for one in steps] == ["linear", "coulomb", "spring"]
     assert steps[-1].held_out_rms == pytest.approx(NOISE, rel=0.1)  # 400 errors: to 3.5 %
@@ -54,7 +54,7 @@ def test_what_makes_another_term_impossible_is_not_taken() -> None:
 def test_a_term_that_others_already_say_is_none() -> None:
     columns = COLUMNS | {"spring": COLUMNS["mass"] * 1.5}
     force = force_of(*START) + 1e-3 * columns["spring"]
-    chosen, _, tried = choose_terms(columns, START, set(), force, 40.0)
+    chosen, _, tried = choose_terms(Regression(columns, force, START), 40.0)
     assert "spring" not in chosen and "spring" not in [one.term for one in tried]
 
 
@@ -68,9 +68,9 @@ def test_errors_hold_what_another_law_would_say() -> None:
     chosen = [*START, "coulomb"]
     value = np.array([TRUE[name] for name in chosen])
     moved = 0.2 * TRUE["coulomb"]  # of the damping, with the root instead
-    left = between_sets(alike, START, chosen, force, value)
+    left = between_sets(Regression(alike, force, START), chosen, value)
     assert 0.3 * moved < left[1] < moved
-    assert np.all(between_sets(apart, START, chosen, force, value) < 1e-3)
+    assert np.all(between_sets(Regression(apart, force, START), chosen, value) < 1e-3)
 
 
 def test_rests_are_left_out() -> None:

@@ -39,23 +39,62 @@ class Addition:
     held_out_rms: float
 
 
+@dataclass(frozen=True)
+class Regression:
+    """A force, and the terms that may explain it.
+
+    Attributes
+    ----------
+    columns : mapping of str to ndarray, shape (N,)
+        Of the terms.
+    force : ndarray, shape (N,)
+    start : sequence of str
+        Terms that are there in any case.
+    positive : set of str
+        Terms that are nothing below zero: no other may make them that.  In steps under a controller
+        a spring does: the controller is one.
+    """
+
+    columns: Mapping[str, Floats]
+    force: Floats
+    start: Sequence[str]
+    positive: Set[str] = frozenset()
+
+    def design(self, names: Sequence[str]) -> Floats:
+        """The columns of these terms, shape (N, J)."""
+        return np.stack([self.columns[name] for name in names], axis=1)
+
+    def possible(self, names: Sequence[str]) -> bool:
+        """Whether no term is below zero that cannot be."""
+        value = np.linalg.lstsq(self.design(names), self.force, rcond=None)[0]
+        return all(v >= 0 for name, v in zip(names, value, strict=True) if name in self.positive)
+
+    def says_more(self, chosen: Sequence[str], name: str) -> bool:
+        """Whether a column is more than a combination of those chosen."""
+        design, column = self.design(chosen), self.columns[name]
+        design = design / (np.linalg.norm(design, axis=0) + np.finfo(float).tiny)
+        left = column - design @ np.linalg.lstsq(design, column, rcond=None)[0]
+        return bool(left @ left > _ITS_OWN * (column @ column))
+
+    def held_out(self, names: Sequence[str]) -> tuple[float, Floats]:
+        """Rms error of each half with the other half's coefficients: together, and a half, (2,)."""
+        design, force = self.design(names), self.force
+        first = np.arange(len(force)) < len(force) // 2
+        squares = []
+        for own in (first, ~first):
+            value = np.linalg.lstsq(design[~own], force[~own], rcond=None)[0]
+            squares.append(np.mean((force[own] - design[own] @ value) ** 2))
+        return float(np.sqrt(np.mean(squares))), np.sqrt(np.array(squares, dtype=np.float64))
+
+
 def choose_terms(
-    columns: Mapping[str, Floats],
-    start: Sequence[str],
-    positive: Set[str],
-    force: Floats,
-    seconds: float,
+    asked: Regression, seconds: float
 ) -> tuple[list[str], list[Addition], list[Addition]]:
     """The terms that earn their place beside those to start with.
 
     Parameters
     ----------
-    columns : mapping of str to ndarray, shape (N,)
-    start : sequence of str
-    positive : set of str
-        Terms that are nothing below zero: no other may make them that.  In steps under a controller
-        a spring does: the controller is one.
-    force : ndarray, shape (N,)
+    asked : Regression
     seconds : float
         How long the device moves.
 
@@ -65,33 +104,27 @@ def choose_terms(
     steps, tried : list of Addition
         What was added, and what did not earn its place.
     """
-    chosen, steps = list(start), [Addition("linear", held_out(columns, start, force)[0])]
+    chosen, steps = list(asked.start), [Addition("linear", asked.held_out(asked.start)[0])]
     enough = max(_WORTH * min(1.0, _SHORT_S / seconds), _LEAST_WORTH)
-    rounds = ((SIMPLEST,), min(_SIMPLEST_WORTH, enough)), (tuple(columns), enough)
+    rounds = ((SIMPLEST,), min(_SIMPLEST_WORTH, enough)), (tuple(asked.columns), enough)
     tried: list[Addition] = []
     for names, worth in rounds:
-        tried = _grow(columns, names, positive, worth, chosen, force, steps)
+        tried = _grow(asked, names, worth, chosen, steps)
     return chosen, steps, tried
 
 
 def _grow(
-    columns: Mapping[str, Floats],
-    names: Sequence[str],
-    positive: Set[str],
-    worth: float,
-    chosen: list[str],
-    force: Floats,
-    steps: list[Addition],
+    asked: Regression, names: Sequence[str], worth: float, chosen: list[str], steps: list[Addition]
 ) -> list[Addition]:
     """Add terms to `chosen` while both halves gain; what is left over comes back."""
     while True:
-        _, halves = held_out(columns, chosen, force)
+        _, halves = asked.held_out(chosen)
         found = {
-            name: held_out(columns, [*chosen, name], force)
+            name: asked.held_out([*chosen, name])
             for name in names
             if name not in chosen
-            and _says_more(columns, chosen, name)
-            and _possible(columns, [*chosen, name], positive, force)
+            and asked.says_more(chosen, name)
+            and asked.possible([*chosen, name])
         }
         order = sorted(found, key=lambda name: found[name][0])
         if not order or np.any(found[order[0]][1] > (1 - worth) * halves):
@@ -100,13 +133,7 @@ def _grow(
         steps.append(Addition(order[0], found[order[0]][0]))
 
 
-def between_sets(
-    columns: Mapping[str, Floats],
-    start: Sequence[str],
-    chosen: Sequence[str],
-    force: Floats,
-    value: Floats,
-) -> Floats:
+def between_sets(asked: Regression, chosen: Sequence[str], value: Floats) -> Floats:
     """How far coefficients are from those of other sets that predict about as well, rms, (J,).
 
     The others have a term more, less, or another one instead; or none, or the simplest law alone,
@@ -114,58 +141,26 @@ def between_sets(
 
     Parameters
     ----------
-    columns : mapping of str to ndarray, shape (N,)
-    start, chosen : sequence of str
-    force : ndarray, shape (N,)
+    asked : Regression
+    chosen : sequence of str
     value : ndarray, shape (J,)
         Of the chosen terms.
     """
-    own = frozenset(chosen[len(start) :])
-    others = [name for name in columns if name not in start and name not in own]
+    own = frozenset(chosen[len(asked.start) :])
+    others = [name for name in asked.columns if name not in asked.start and name not in own]
     sets = {own, frozenset(), frozenset({SIMPLEST}), frozenset({SIMPLEST, LAG})}
     sets |= {own - {out} for out in own} | {own | {more} for more in others}
     sets |= {own - {out} | {more} for out in own for more in others}
     errors, found = [], []
     for one in sorted(sets, key=sorted):
-        names = [*start, *sorted(one)]
-        design = np.stack([columns[name] for name in names], axis=1)
+        names = [*asked.start, *sorted(one)]
+        design = asked.design(names)
         scale = np.linalg.norm(design, axis=0) + np.finfo(float).tiny
         if np.linalg.cond(design / scale) > 1 / _ITS_OWN**2:
             continue
-        fit = np.linalg.lstsq(design / scale, force, rcond=None)[0] / scale
+        fit = np.linalg.lstsq(design / scale, asked.force, rcond=None)[0] / scale
         fitted = dict(zip(names, fit.tolist(), strict=True))
-        errors.append(np.log(held_out(columns, names, force)[0]) + len(one) / _COUNT)
+        errors.append(np.log(asked.held_out(names)[0]) + len(one) / _COUNT)
         found.append([fitted.get(name, 0.0) for name in chosen])
     weight = np.exp(-_COUNT * (np.array(errors) - min(errors)))
     return np.asarray(np.sqrt(weight @ (np.array(found) - value) ** 2 / weight.sum()))
-
-
-def _possible(
-    columns: Mapping[str, Floats], names: Sequence[str], positive: Set[str], force: Floats
-) -> bool:
-    """Whether no term is below zero that cannot be."""
-    design = np.stack([columns[name] for name in names], axis=1)
-    value = np.linalg.lstsq(design, force, rcond=None)[0]
-    return all(v >= 0 for name, v in zip(names, value, strict=True) if name in positive)
-
-
-def _says_more(columns: Mapping[str, Floats], chosen: Sequence[str], name: str) -> bool:
-    """Whether a column is more than a combination of those chosen."""
-    design = np.stack([columns[one] for one in chosen], axis=1)
-    scale = np.linalg.norm(design, axis=0) + np.finfo(float).tiny
-    column = columns[name]
-    left = column - design / scale @ np.linalg.lstsq(design / scale, column, rcond=None)[0]
-    return bool(left @ left > _ITS_OWN * (column @ column))
-
-
-def held_out(
-    columns: Mapping[str, Floats], names: Sequence[str], force: Floats
-) -> tuple[float, Floats]:
-    """Rms error of each half with the other half's coefficients: together, and a half, (2,)."""
-    design = np.stack([columns[name] for name in names], axis=1)
-    first = np.arange(len(force)) < len(force) // 2
-    squares = []
-    for own in (first, ~first):
-        value = np.linalg.lstsq(design[~own], force[~own], rcond=None)[0]
-        squares.append(np.mean((force[own] - design[own] @ value) ** 2))
-    return float(np.sqrt(np.mean(squares))), np.sqrt(np.array(squares, dtype=np.float64))

@@ -13,7 +13,6 @@ ICRA 1997; A. Janot, M. Gautier and M. Brunot, "Data set and reference models of
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import astuple, dataclass, field
 from typing import Any
 
@@ -23,9 +22,9 @@ from scipy.signal import decimate
 
 from bayeshaptic.diagnosis.feedback.choose_terms import (
     Addition,
+    Regression,
     between_sets,
     choose_terms,
-    held_out,
 )
 from bayeshaptic.diagnosis.feedback.smooth_motion import (
     SmoothMotion,
@@ -135,21 +134,25 @@ def inverse_dynamics(
         name: (low.thin if term.linear else low.smooth)(term.column(path))
         for name, term in known.items()
     }
-    columns = {name: one[moving] for name, one in column.items()}
-    force, names = low.smooth(recording.force), [term.name for term in start]
+    force = low.smooth(recording.force)
+    asked = Regression(
+        {name: one[moving] for name, one in column.items()},
+        force[moving],
+        [term.name for term in start],
+        {term.name for term in library if term.positive},
+    )
+    step_s = low.every * recording.period_s
     if terms is None:
-        positive = {term.name for term in library if term.positive}
-        seconds = low.every * recording.period_s * np.count_nonzero(moving)
-        chosen, steps, tried = choose_terms(columns, names, positive, force[moving], seconds)
+        chosen, steps, tried = choose_terms(asked, step_s * np.count_nonzero(moving))
     else:
-        chosen, steps, tried = _asked_for(columns, names, force[moving], terms)
-    design = np.stack([columns[name] for name in chosen], axis=1)
+        chosen, steps, tried = _asked_for(asked, terms)
+    design = asked.design(chosen)
     block_s = 1.0  # residuals further apart are taken to be independent
-    value, sd = _solve(design, force[moving], int(block_s / (low.every * recording.period_s)))
+    value, sd = _solve(design, force[moving], int(block_s / step_s))
     late = low.smooth(np.concatenate([recording.force[:1], recording.force[:-1]]))[moving]
     sd = np.hypot(sd, _LAG * (np.linalg.lstsq(design, late, rcond=None)[0] - value))
     if terms is None:
-        sd = np.hypot(sd, between_sets(columns, names, chosen, force[moving], value))
+        sd = np.hypot(sd, between_sets(asked, chosen, value))
     explained = np.stack([column[name] for name in chosen], axis=1) @ value
     left = (force - explained)[moving]
     return InverseDynamics(
@@ -216,16 +219,16 @@ def _moving(recording: Recording, low: _LowPass) -> Bools:
 
 
 def _asked_for(
-    columns: Mapping[str, Floats], start: list[str], force: Floats, terms: tuple[str, ...]
+    asked: Regression, terms: tuple[str, ...]
 ) -> tuple[list[str], list[Addition], list[Addition]]:
     """Exactly the terms that were asked for, beside the linear ones."""
-    unknown = sorted(set(terms) - set(columns))
+    unknown = sorted(set(terms) - set(asked.columns))
     if unknown:
-        raise InputError(f"no term {', '.join(unknown)}; there are {', '.join(columns)}")
-    chosen = [*start, *(name for name in terms if name not in start)]
+        raise InputError(f"no term {', '.join(unknown)}; there are {', '.join(asked.columns)}")
+    chosen = [*asked.start, *(name for name in terms if name not in asked.start)]
     steps = [
-        Addition("linear", held_out(columns, start, force)[0]),
-        Addition(" + ".join(terms), held_out(columns, chosen, force)[0]),
+        Addition("linear", asked.held_out(asked.start)[0]),
+        Addition(" + ".join(terms), asked.held_out(chosen)[0]),
     ]
     return chosen, steps, []
 

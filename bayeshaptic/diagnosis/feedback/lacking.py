@@ -16,6 +16,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.feedback.candidate_laws import CandidateLaw, candidate_laws
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
+from bayeshaptic.diagnosis.feedback.refit import Refit, is_worth_it
 from bayeshaptic.diagnosis.feedback.smooth_motion import smooth_pieces
 from bayeshaptic.diagnosis.feedback.tones_in_motion import with_tones
 from bayeshaptic.diagnosis.feedback.unlike_one_mass import unlike_one_mass
@@ -28,19 +29,16 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB, MassForces
-from bayeshaptic.inference.time_domain.mass_in_loop import DELAY, DRY, Hum
+from bayeshaptic.inference.time_domain.mass_in_loop import DELAY, DRY
 from bayeshaptic.inference.time_domain.scores import Score, scores
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.types import Floats
 
-# Student's t of eight degrees of freedom: 1 in 1,000 for each of some twenty forces.  With `_WORTH`
-# a law joins in 5 of 199 loops with a force along the way that is no law, something speaks against
-# a limit in 6 (benchmarks/closed_loop.py); neither in any of 20 clean ones of benchmarks/strangers.
+# Student's t of eight degrees of freedom: 1 in 1,000 for each of some twenty forces.  With what
+# `is_worth_it` asks, a law joins in 5 of 199 loops with a force along the way that is no law,
+# something speaks against a limit in 6 (benchmarks/closed_loop.py); neither in any of 20 clean ones
+# of benchmarks/strangers.
 _SEEN = 5.04
-# Of the error's power, that a force must take away: steps of a sample leave up to 0.08 of an error
-# as small as the encoder's to a law that has joined.
-_WORTH = 0.1
 _ROUNDS = 2  # another law of dry friction, and a resistance
 _DRY_LAWS = (StribeckFriction.name, RisingFriction.name, DahlFriction.name)
 
@@ -80,14 +78,10 @@ def with_laws(
     """
     path = smooth_pieces(recording)
     usual = Usual.of(path.velocity, path.position, recording.position_unit)
-    motion = fit_motion(recording, follower)
-
-    def humming(hums: tuple[Hum, ...]) -> MotionFit | None:
-        return _refitted(recording, follower, motion.forces, motion.inside, hums)
-
-    motion = with_tones(motion, recording, _WORTH, humming)
+    refit = Refit(recording, follower)
+    motion = with_tones(fit_motion(recording, follower), refit)
     seen: dict[str, Score] = {}
-    further = _with_drag(recording, follower, motion)
+    further = _with_drag(motion, refit)
     for _ in range(_ROUNDS):
         asked = [c for c in candidate_laws(recording, path, usual) if c.name not in seen]
         if motion.forces.friction.name != COULOMB.friction.name:
@@ -95,7 +89,7 @@ def with_laws(
         better = further + [
             (more, candidate.name, score)
             for candidate, score in _best_of_each(motion, recording, asked)
-            if (more := _with_law(motion, candidate, score, recording, follower)) is not None
+            if (more := _with_law(motion, candidate, score, refit)) is not None
         ]
         if not better:
             break
@@ -104,13 +98,11 @@ def with_laws(
     return motion, _found(motion, seen), _speaks_against(motion, recording)
 
 
-def _with_drag(
-    recording: Recording, follower: Follower | None, alone: MotionFit
-) -> list[tuple[MotionFit, str, Score]]:
+def _with_drag(alone: MotionFit, refit: Refit) -> list[tuple[MotionFit, str, Score]]:
     """A fit that begins with drag, where the inverse dynamics see it: its score alone would not."""
     name = "drag_2"
     try:
-        found = inverse_dynamics(unbroken(recording), terms=("coulomb", name))
+        found = inverse_dynamics(unbroken(refit.recording), terms=("coulomb", name))
     except InputError:
         return []
     strength, sd = found[name]
@@ -119,44 +111,25 @@ def _with_drag(
         return []
     mass, damping, offset, dry = (found[n][0] for n in ("mass", "damping", "offset", "coulomb"))
     start = np.array([mass, max(damping, 0.01 * mass), max(dry, 0.0), offset, alone.inside[DELAY]])
-    start[DELAY] = min(start[DELAY], recording.period_s)
+    start[DELAY] = min(start[DELAY], refit.recording.period_s)
     dragged = MassForces(others=(Drag(MOTOR),), strengths=(strength,))
-    more = _refitted(recording, follower, dragged, start, alone.hums)
+    more = refit.with_more(alone, start, dragged)
     if more is None:
         return []
-    left = (more.error_rms / alone.error_rms) ** 2
-    return [(more, Drag.name, Score(strength, sd, left))] if left < 1 - _WORTH else []
+    return [(more, Drag.name, Score(strength, sd, (more.error_rms / alone.error_rms) ** 2))]
 
 
 def _with_law(
-    motion: MotionFit,
-    candidate: CandidateLaw,
-    score: Score,
-    recording: Recording,
-    follower: Follower | None,
+    motion: MotionFit, candidate: CandidateLaw, score: Score, refit: Refit
 ) -> MotionFit | None:
     """Fitted again with a law; None where that does not do what its score promised."""
     acting, dry = motion.forces.at(motion.numbers), float(motion.inside[DRY])
     forces = candidate.joined(acting, dry, score.strength)
-    more = _refitted(recording, follower, forces, motion.inside, motion.hums)
-    if more is None or (more.error_rms / motion.error_rms) ** 2 > 1 - _WORTH:
+    more = refit.with_more(motion, motion.inside, forces)
+    if more is None:
         return None
     rubs = more.inside[DRY] > np.sqrt(more.covariance[DRY, DRY])
     return more if rubs or candidate.name not in _DRY_LAWS else None
-
-
-def _refitted(
-    recording: Recording,
-    follower: Follower | None,
-    forces: MassForces,
-    start: Floats,
-    hums: tuple[Hum, ...],
-) -> MotionFit | None:
-    """Fitted with other forces; None where no motion stays near the measured one."""
-    try:
-        return fit_motion(recording, follower, forces, start, hums)
-    except (InputError, np.linalg.LinAlgError):
-        return None
 
 
 def _found(motion: MotionFit, seen: Mapping[str, Score]) -> tuple[Lacking, ...]:
@@ -175,7 +148,7 @@ def _best_of_each(
     scored = scores(motion, recording, [one.force for one in asked])
     found: dict[str, tuple[CandidateLaw, Score]] = {}
     for one, score in zip(asked, scored, strict=True):
-        if score is None or score.t < _SEEN or score.left > 1 - _WORTH:
+        if score is None or score.t < _SEEN or not is_worth_it(score.left):
             continue
         if one.name not in found or score.left < found[one.name][1].left:
             found[one.name] = one, score
@@ -189,6 +162,6 @@ def _speaks_against(motion: MotionFit, recording: Recording) -> tuple[str, ...]:
     seen = [
         (score.left, f"{why} (t = {abs(score.t):.3g})")
         for (why, _), score in zip(asked, scored, strict=True)
-        if score is not None and abs(score.t) > _SEEN and score.left < 1 - _WORTH
+        if score is not None and abs(score.t) > _SEEN and is_worth_it(score.left)
     ]
     return (min(seen)[1],) if seen else ()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from bayeshaptic.diagnosis.feedback.refit import Refit
 from bayeshaptic.diagnosis.samples.sinusoids import Tone
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.inference.time_domain.fit import MotionFit
@@ -21,25 +21,22 @@ _HIGHEST = 0.45  # of the sampling rate
 _LEAST = 0.5
 
 
-def with_tones(
-    motion: MotionFit, recording: Recording, worth: float, again: Callable[..., MotionFit | None]
-) -> MotionFit:
+def with_tones(motion: MotionFit, refit: Refit) -> MotionFit:
     """The motion, fitted with the tones that stand out of its error and are worth it.
 
     Parameters
     ----------
     motion : MotionFit
-        Of the recording.
-    recording : Recording
-    worth : float
-        Of the error's power, that a tone must take away.
-    again : callable
-        Fits the motion with these hums; None where no motion stays near.
+    refit : Refit
+        Of the same recording.
     """
+    start = motion.inside
     for _ in range(_MOST):
-        hum = _strongest(motion, recording)
-        more = None if hum is None else again((*motion.hums, hum))
-        if more is None or (more.error_rms / motion.error_rms) ** 2 > 1 - worth:
+        hum = _strongest(motion, refit.recording)
+        if hum is None:
+            break
+        more = refit.with_more(motion, start, hums=(*motion.hums, hum))
+        if more is None:
             break
         motion = more
     return motion
