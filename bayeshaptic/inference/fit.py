@@ -128,8 +128,9 @@ class Fit(Shown):
         return replace(there, alike=self.alike, etfe=self.etfe)
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
-        """The fitted sampled response at `frequency_hz`, as it is measured, shape (L,)."""
-        return self.model.response(self.theta, frequency_hz, measured=True)
+        """The fitted sampled response at frequencies of any shape, as it is measured."""
+        found = self.model.response(self.theta, frequency_hz.ravel(), measured=True)
+        return found.reshape(frequency_hz.shape)
 
     def sensor(self, frequency_hz: Floats) -> NDArray[np.complex128]:
         """That over the loop's own, shape (L,): one unless a force's sensor lags.

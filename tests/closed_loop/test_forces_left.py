@@ -13,7 +13,8 @@ from test_direct import loop
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals import residual
 from bayeshaptic.diagnosis.residuals.causal import causal_tests
-from bayeshaptic.diagnosis.residuals.columns import columns, line_transform
+from bayeshaptic.diagnosis.residuals.columns import columns
+from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.forces_left import forces_left
@@ -45,9 +46,7 @@ def test_what_a_force_moves_is_what_a_fit_with_it_moves() -> None:
     name = "v^3"
     (test,) = (one for one in causal_tests(fit, etfe) if one.name == name)
     assert test.force is not None and len(test.force.moves) == fit.model.size
-    frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    transform = line_transform(etfe, recording)
-    every = columns(fit, recording, frequency_hz, transform, in_loop=True)
+    every = columns(fit, recording, Lines.of(etfe, recording), in_loop=True)
     added = next(motions for shape, motions, _ in every if shape == name)[0]
     # As strong as the noise leaves it open, so that the first order holds.
     strength = 0.5 * test.force.sd

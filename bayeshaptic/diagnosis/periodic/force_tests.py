@@ -13,6 +13,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.periodic.period import Period
 from bayeshaptic.diagnosis.residuals.columns import ROUNDING, WEAK, columns, force_test
+from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.residuals.residual import (
     ForceSeen,
     Test,
@@ -50,14 +51,14 @@ def force_tests(fit: Fit, etfe: Etfe, period: Period) -> tuple[Test, ...]:
     """
     recording = etfe.unbroken
     assert recording is not None
-    frequency_hz = fit.windows.frequency_hz[:, 0]
 
-    def at_lines(signal: Floats) -> Complexes:
+    def at_excited(signal: Floats) -> Complexes:
         return period.at_lines(period.transform(period.average(signal)))
 
     beside = _beside(fit)
     tests = []
-    for name, inputs, rms in columns(fit, recording, frequency_hz, at_lines):
+    excited = Lines(fit.windows.frequency_hz[:, 0], at_excited)
+    for name, inputs, rms in columns(fit, recording, excited):
         rows = as_rows(fit, inputs.T[:, None])
         left = beside.left_of(rows)
         instrument, column = left[:, 0], left[:, -1]

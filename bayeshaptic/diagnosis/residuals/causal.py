@@ -22,8 +22,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.diagnosis.residuals.columns import columns, force_test, line_transform
+from bayeshaptic.diagnosis.residuals.columns import columns, force_test
 from bayeshaptic.diagnosis.residuals.drift import SHAPES
+from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test, chi_square_score
 from bayeshaptic.diagnosis.residuals.unforced import fitted_motion
 from bayeshaptic.inference.coordinates import believed, coordinates
@@ -106,7 +107,7 @@ def _closer(fit: Fit, etfe: Etfe, acted: Floats | float) -> tuple[Fit, Etfe]:
     if (count := increment_unit(measured)) is not None:
         motion = fitted_motion(fit, recording, acted)
         rounded = count * np.rint((motion - measured[0]) / count) + measured[0]
-        position = position - line_transform(etfe, recording)(rounded - motion)
+        position = position - Lines.of(etfe, recording)(rounded - motion)
     left = position - spectra.force * fit.response(spectra.frequency_hz)
     slopes = noise_slopes(spectra, left)
     etfe = replace(etfe, spectra=replace(spectra, position=position, noise_slope=slopes))
@@ -116,7 +117,7 @@ def _closer(fit: Fit, etfe: Etfe, acted: Floats | float) -> tuple[Fit, Etfe]:
 def scores(fit: Fit, windows: Windows, changes: Complexes) -> Scores:
     """Scores of changes of the response at the nodes, (W, k, C), and then of further inputs."""
     nodes = windows.frequency_hz
-    response = fit.response(nodes.ravel()).reshape(nodes.shape)
+    response = fit.response(nodes)
     own, further = windows.design[:, :, : nodes.shape[1]], windows.design[:, :, nodes.shape[1] :]
     left = windows.target - (own @ response[..., None])[..., 0]
     moved = np.concatenate([own @ changes, further], axis=2)
@@ -147,7 +148,7 @@ def _own_changes(fit: Fit, frequency_hz: Floats) -> Complexes:
 def _filtered(fit: Fit) -> Complexes:
     """The response behind stable filters, (W, k, C): what a causal change may be made of."""
     nodes = fit.windows.frequency_hz
-    response = fit.response(nodes.ravel()).reshape(nodes.shape)
+    response = fit.response(nodes)
     at = np.geomspace(nodes.min(), nodes.max() / 2, _FILTERS)
     s = 1j * nodes[..., None] / at
     second = 1 / (1 + 2 * _DAMPED * s + s**2)
@@ -177,10 +178,8 @@ def _force_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
     """Of forces by their shapes, what any linear response can do taken off."""
     recording = etfe.unbroken
     assert recording is not None
-    frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    at_lines = line_transform(etfe, recording)
     found = []
-    moved = columns(fit, recording, frequency_hz, at_lines, in_loop=True)
+    moved = columns(fit, recording, Lines.of(etfe, recording), in_loop=True)
     for name, inputs, rms in moved:
         score, sd, moves = _beside_linear(fit, etfe, smooth, inputs[0])
         found.append(force_test(name, abs(score), ForceSeen(score * sd, sd, rms, moves)))
@@ -191,10 +190,9 @@ def _time_tests(fit: Fit, etfe: Etfe, smooth: Complexes) -> list[Test]:
     """Of parameters and a gain that change in time, what any steady response can do taken off."""
     recording = etfe.unbroken
     assert recording is not None
-    frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    at_lines, time = line_transform(etfe, recording), np.linspace(-1.0, 1.0, recording.samples)
-    gain = fit.response(frequency_hz)[:, None]
-    changes = np.concatenate([_own_changes(fit, frequency_hz), gain], axis=1).T
+    at_lines, time = Lines.of(etfe, recording), np.linspace(-1.0, 1.0, recording.samples)
+    gain = fit.response(at_lines.frequency_hz)[:, None]
+    changes = np.concatenate([_own_changes(fit, at_lines.frequency_hz), gain], axis=1).T
     found = []
     for name, shape in SHAPES.items():
         windows = etfe.spectra.windows(

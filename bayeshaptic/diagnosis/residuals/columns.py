@@ -8,12 +8,13 @@ outputs; S. F. Masri and T. K. Caughey, J. Appl. Mech. 46, 1979, for the force s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.special import ndtri, stdtr
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.residuals.moved import coasting, slow_velocity
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
 from bayeshaptic.effects.laws import tested
@@ -50,9 +51,8 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     if recording is None or etfe.period_lines is not None:
         return ()
     tests = []
-    frequency_hz = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    at_lines, response = line_transform(etfe, recording), remembered(fit.response)
-    made = columns(fit, recording, frequency_hz, at_lines, etfe.through_reference)
+    response = remembered(fit.response)
+    made = columns(fit, recording, Lines.of(etfe, recording), etfe.through_reference)
     for name, inputs, rms in made:
         windows = etfe.spectra.windows(response, inputs)
         strength, sd, freedom = common_coefficient(windows, len(inputs))
@@ -103,11 +103,7 @@ def as_normal(score: float, freedom: float) -> float:
 
 
 def columns(
-    fit: Fit,
-    recording: Recording,
-    frequency_hz: Floats,
-    at_lines: Callable[[Floats], Complexes],
-    in_loop: bool = False,
+    fit: Fit, recording: Recording, at_lines: Lines, in_loop: bool = False
 ) -> Iterator[tuple[str, Complexes, float]]:
     """Motions that nonlinear forces would add, one after the other: those of an hour are large.
 
@@ -118,9 +114,7 @@ def columns(
     ----------
     fit : Fit
     recording : Recording
-    frequency_hz : ndarray, shape (L,)
-    at_lines : callable
-        A signal, shape (N,), to its DFT there.
+    at_lines : Lines
     in_loop : bool
         Damping along the way is left out: of it, alone, eight clean loops have scores two and
         three times too large.
@@ -134,13 +128,12 @@ def columns(
     rms : float
         Of the motion that the force is a function of, or is multiplied by.
     """
-    s = np.asarray(2j * np.pi * frequency_hz, dtype=complex)
     known = motions(fit, recording)
     fast = float(known[VELOCITY].std())
     for over, motion in known.items():
         if in_loop and over == ALONG:
             continue
-        response = response_to(fit, over, s)
+        response = response_to(fit, over, at_lines.s)
         driven = _by_the_command(fit, recording, over)
         times = known[VELOCITY] / fast if over == ALONG else 1.0
         for shape in tested().values():
@@ -207,17 +200,6 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
     else:
         v = v + coasting(system, recording.position - x, recording.period_s)[1]
     return x, v
-
-
-def line_transform(etfe: Etfe, recording: Recording):  # type: ignore[no-untyped-def]
-    """A function from a signal, shape (N,), to its DFT at the lines of the spectra."""
-    duration = recording.samples * recording.period_s
-    lines = np.rint(etfe.spectra.frequency_hz * duration).astype(int)  # type: ignore[attr-defined]
-
-    def transform(signal: Floats) -> Complexes:
-        return np.fft.rfft(signal - signal.mean())[lines] / np.sqrt(recording.samples)
-
-    return transform
 
 
 def load_response(fit: Fit, s: Complexes) -> Complexes:

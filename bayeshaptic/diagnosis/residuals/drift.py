@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.diagnosis.residuals.columns import line_transform
-from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score
+from bayeshaptic.diagnosis.residuals.lines import Lines
+from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score, hats
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows, remembered
@@ -25,11 +25,11 @@ def drift_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     recording = etfe.unbroken
     if recording is None or etfe.period_lines is not None:
         return ()
-    at_lines = line_transform(etfe, recording)
+    at_lines = Lines.of(etfe, recording)
     force = recording.force - recording.force.mean()
     time = np.linspace(-1, 1, recording.samples)
     response = remembered(fit.response)
-    answers = response(etfe.spectra.frequency_hz)  # type: ignore[attr-defined]
+    answers = response(at_lines.frequency_hz)
     tests = []
     for name, shape in SHAPES.items():
         column = answers * at_lines(force * shape(time))
@@ -46,8 +46,8 @@ def _smooth_score(windows: Windows) -> tuple[float, float]:
     weight = np.sqrt(np.maximum(windows.lines - nodes - 2, 0.5) / windows.scatter)
     log_f = np.log10(windows.frequency_hz.mean(axis=1))
     knots = np.linspace(log_f[0], log_f[-1], _KNOTS)
-    hats = np.stack([np.interp(log_f, knots, row) for row in np.eye(_KNOTS)], axis=-1)
-    basis, sizes, _ = np.linalg.svd((weight * slope)[:, None] * hats, full_matrices=False)
+    columns = (weight * slope)[:, None] * hats(log_f, knots)
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     basis = basis[:, sizes > 1e-6 * sizes[0]]
     projection = basis.conj().T @ (weight * found)
     # A complex normal variable of unit variance: twice its square is chi-square with two.

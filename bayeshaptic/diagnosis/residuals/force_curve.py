@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.columns import line_transform, response_to
+from bayeshaptic.diagnosis.residuals.columns import response_to
+from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Complexes, Floats
@@ -64,9 +65,8 @@ def force_curve(
     knots = _KNOTS * motion.std()
     knots = knots[(knots > low) & (knots < high)]
     hats = [np.interp(motion, knots, row) for row in np.eye(len(knots))]
-    s = 2j * np.pi * etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-    response = response_to(fit, over, s)
-    at_lines = line_transform(etfe, etfe.recording)
+    at_lines = Lines.of(etfe, etfe.recording)
+    response = response_to(fit, over, at_lines.s)
     columns = np.stack([response * at_lines(times * hat) for hat in hats])
     force, covariance = _weighted(fit, etfe, columns)
     # A constant force has no line in the band: what is drawn has mean zero over time.
@@ -80,7 +80,7 @@ def _weighted(fit: Fit, etfe: Etfe, columns: Complexes) -> tuple[Floats, Floats]
     windows = etfe.spectra.windows(fit.response, columns)
     count = len(columns)
     nodes = windows.frequency_hz.shape[1]
-    g = fit.response(windows.frequency_hz.ravel()).reshape(-1, nodes)
+    g = fit.response(windows.frequency_hz)
     left = windows.target - np.einsum("wij,wj->wi", windows.design[:, :, :nodes], g)
     freedom = np.maximum(windows.lines - nodes - count, 1.0)
     weight = np.sqrt(2 * freedom / windows.scatter)  # of real and imaginary part

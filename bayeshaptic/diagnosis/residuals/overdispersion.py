@@ -29,7 +29,7 @@ def correlation_length(fit: Fit) -> float:
     """
     windows = fit.windows
     nodes = windows.frequency_hz
-    response = fit.response(nodes.ravel()).reshape(nodes.shape)
+    response = fit.response(nodes)
     fitted = np.einsum("wij,wj->wi", windows.design[:, :, : nodes.shape[1]], response)
     left = windows.target - fitted
     sd = np.sqrt(windows.scatter / np.maximum(windows.lines - 2, 0.5))

@@ -16,7 +16,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.drift import SHAPES
-from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score
+from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score, hats
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.numerics.gauss_newton import jacobian
@@ -238,17 +238,16 @@ def _smooth(frequency_hz: Floats, power: Floats, weight: Floats, kept: Bools) ->
     Linear Models", 1989, chapter 8), by its usual reweighted steps.
     """
     log_f = np.log10(frequency_hz)
-    knots = list(_knots(log_f[kept]))
-    hats = np.stack([np.interp(log_f, knots, row) for row in np.eye(len(knots))], axis=-1)
+    straight = hats(log_f, np.array(list(_knots(log_f[kept]))))
     own, seen = np.sqrt(weight[kept]), np.maximum(power[kept], np.finfo(float).tiny)
-    design = hats[kept] * own[:, None]
+    design = straight[kept] * own[:, None]
     mean_of_log = -np.euler_gamma  # of an exponential variable of mean one
     level = np.linalg.lstsq(design, own * (np.log(seen) - mean_of_log), rcond=None)[0]
     most, steps = 1.0, 12
     for _ in range(steps):
-        over = seen / np.exp(hats[kept] @ level) - 1
+        over = seen / np.exp(straight[kept] @ level) - 1
         level += np.clip(np.linalg.lstsq(design, own * over, rcond=None)[0], -most, most)
-    return np.asarray(np.exp(hats @ level))
+    return np.asarray(np.exp(straight @ level))
 
 
 def _knots(log_f: Floats) -> Iterable[float]:

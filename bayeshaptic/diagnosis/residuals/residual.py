@@ -161,17 +161,21 @@ def smooth_columns(fit: Fit) -> tuple[Floats, Floats, Floats]:
     """
     windows = fit.windows
     own, residual = beside_parameters(fit)
-    g = fit.response(windows.frequency_hz.ravel()).reshape(windows.frequency_hz.shape)
+    g = fit.response(windows.frequency_hz)
     log_f = np.log10(windows.frequency_hz)
     knots = np.linspace(log_f.min(), log_f.max(), _KNOTS)
-    hats = np.stack([np.interp(log_f, knots, row) for row in np.eye(_KNOTS)], axis=-1)
-    effect = windows.design @ (g[..., None] * hats)  # (W, k, knots)
+    effect = windows.design @ (g[..., None] * hats(log_f, knots))  # (W, k, knots)
     stacked = as_rows(fit, np.concatenate([effect, 1j * effect], axis=-1))
     stacked = stacked - own @ (own.T @ stacked)
     basis, sizes, _ = np.linalg.svd(stacked, full_matrices=False)
     basis = basis[:, sizes > 1e-6 * sizes[0]]
     rows = np.repeat(windows.frequency_hz.ravel(), 2)
     return basis, residual, rows
+
+
+def hats(at: Floats, knots: Floats) -> Floats:
+    """What each knot's value is multiplied by where a line is piecewise straight, (..., K)."""
+    return np.stack([np.interp(at, knots, row) for row in np.eye(len(knots))], axis=-1)
 
 
 def beside_parameters(fit: Fit) -> tuple[Floats, Floats]:

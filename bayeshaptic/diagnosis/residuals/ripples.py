@@ -15,7 +15,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from bayeshaptic.diagnosis import thresholds
-from bayeshaptic.diagnosis.residuals.columns import common_coefficient, line_transform
+from bayeshaptic.diagnosis.residuals.columns import common_coefficient
+from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.quantities import percent, quantity
@@ -254,8 +255,8 @@ def _looked_at(
     recording = etfe.unbroken
     assert recording is not None
     force = recording.force - recording.force.mean()
-    at_lines, response = line_transform(etfe, recording), remembered(fit.response)
-    answers = response(etfe.spectra.frequency_hz)  # type: ignore[attr-defined]
+    at_lines, response = Lines.of(etfe, recording), remembered(fit.response)
+    answers = response(at_lines.frequency_hz)
     sizes, sds, square = [], [], 0.0
     for turn in (np.sin, np.cos):
         column = answers * at_lines(wave.on(force) * turn(rate * place))

@@ -55,7 +55,7 @@ def modelled(fit: Fit) -> Complexes:
     """What the model makes of every window, shape (W, r)."""
     windows = fit.windows
     nodes = windows.frequency_hz
-    g = fit.response(nodes.ravel()).reshape(nodes.shape)
+    g = fit.response(nodes)
     return np.einsum("wij,wj->wi", windows.design[:, :, : nodes.shape[1]], g)
 
 

@@ -68,7 +68,7 @@ def slopes_along(
     phi = here.coordinate(theta[None])[0]
     moving = [not isinstance(one.effect, CommandEffect) for one in forces]
     if not any(moving):
-        return np.zeros((len(phi), 0, len(tryout.frequency_hz)), complex)
+        return np.zeros((len(phi), 0, len(tryout.at_lines.frequency_hz)), complex)
 
     def near(vector: Floats) -> Floats:
         return tryout.simulation.added_near(forces, vector, added)[moving]

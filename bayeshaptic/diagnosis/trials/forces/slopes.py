@@ -238,7 +238,7 @@ def _with_a_hand(
     spectra: Any = tryout.without(changes, theta).spectra
     left = (
         spectra.position
-        - tryout.model.response(theta, tryout.frequency_hz, measured=True) * spectra.force
+        - tryout.model.response(theta, tryout.at_lines.frequency_hz, measured=True) * spectra.force
     )
     found = np.array(slopes)
     found[grounded] += left * tryout.answer(theta).growth(answered(changes), found[grounded])

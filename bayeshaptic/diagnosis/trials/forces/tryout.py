@@ -8,14 +8,14 @@ another's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.columns import line_transform
+from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.state import Change, State, fit_part, log_likelihoods
 from bayeshaptic.diagnosis.trials.forces.answer import Answer
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
@@ -85,10 +85,8 @@ class Tryout:
     ----------
     before : tuple of Acting
         The forces of the state, which act beside what is tried.
-    frequency_hz : ndarray, shape (L,)
-        The lines of the spectra.
-    at_lines : callable
-        A signal, shape (N,), to its DFT there.
+    at_lines : Lines
+        Of the spectra.
     simulation : Simulation
         Of forces in the recording, those of the state put back.
     """
@@ -102,8 +100,7 @@ class Tryout:
         self._etfe = with_forces(replace(state.etfe, recording=recording), there)
         assert self._etfe.recording is not None
         self.recording = self._etfe.recording
-        self.frequency_hz: Floats = state.etfe.spectra.frequency_hz  # type: ignore[attr-defined]
-        self.at_lines: Callable[[Floats], Complexes] = line_transform(state.etfe, recording)
+        self.at_lines = Lines.of(state.etfe, recording)
         self._somewhere = state.fit.windows.frequency_hz.mean(axis=1)
         self._base = self._likelihoods(state.fit.theta, state.fit.windows)
         self.simulation = Simulation(
@@ -176,7 +173,8 @@ class Tryout:
     def answer(self, theta: Floats) -> Answer:
         """How the answer of forces to a motion is read beside linear parameters, shape (P,)."""
         system, spectra = self.model.system(theta), self._etfe.spectra
-        return Answer.of(system, self.frequency_hz, spectra.position, self.simulation.edge_hz)  # type: ignore[attr-defined]
+        frequency_hz = self.at_lines.frequency_hz
+        return Answer.of(system, frequency_hz, spectra.position, self.simulation.edge_hz)  # type: ignore[attr-defined]
 
     def changes(self, forces: tuple[Acting, ...], added: Floats) -> tuple[Change, ...]:
         """What each force takes off the recording, of the motions that they add, (F, N)."""
