@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
+from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit, refuse_unfit, search_box, summarise, weighted_residuals
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.valleys import ONE_VALLEY, OTHER_VALLEYS, Optimum, refine
@@ -118,7 +119,7 @@ def likeliest(fit: Fit, etfe: Etfe, seed: int = 0, most: int = SETS) -> Fit:
 
 def _log_density(fit: Fit) -> float:
     """Log posterior density, in the coordinates of the search, up to a constant."""
-    here, _, _ = search_box(fit.model)
+    here = coordinates(fit.model)
     theta = fit.theta[None]
     prior = fit.model.log_prior(theta) + here.log_jacobian(here.coordinate(theta))
     return fit.log_likelihood + float(prior[0])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
-from bayeshaptic.inference.fit import search_box
+from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.types import Complexes, Floats
 
 # Coordinates and logarithms: how far slopes over linear parameters hold.  Fifteen fits of
@@ -64,7 +64,7 @@ def slopes_along(
     distances : ndarray, shape (P,)
         How far each parameter goes.
     """
-    here, _, _ = search_box(tryout.model)
+    here = coordinates(tryout.model)
     phi = here.coordinate(theta[None])[0]
     moving = [not isinstance(one.effect, CommandEffect) for one in forces]
     if not any(moving):

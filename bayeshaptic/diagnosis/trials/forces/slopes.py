@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis.state import Change, share, weights
 from bayeshaptic.diagnosis.trials.forces.along import Along, slopes_along
 from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout, answered
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
+from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
@@ -84,7 +85,7 @@ def spread(tryout: Tryout, found: Point) -> tuple[Floats, Floats]:
     covariance : ndarray, shape (J, J)
         Of the logarithms of each force's strength and tuned shape.
     along : ndarray, shape (P, J)
-        Change of the linear parameters' coordinates (`search_box`) with each logarithm, all else
+        Change of the linear parameters' coordinates with each logarithm, all else
         fitted anew: friction that is a little more leaves a damper that is far less.
     """
     _, linear, forces, free = slopes_of_all(tryout, found)
@@ -122,7 +123,7 @@ def nudges_of(tryout: Tryout) -> Floats:
     Less would see how a sticking mass jumps, not where it goes; more would leave a resonance.
     """
     fit = tryout.state.fit
-    here, _, _ = search_box(tryout.model)
+    here = coordinates(tryout.model)
     relative = fit.sd / np.where(here.log, np.maximum(fit.theta, 1e-300), here.scale)
     return np.clip(np.nan_to_num(_SDS * relative, nan=np.inf), _LEAST, _FARTHEST)
 
@@ -198,7 +199,7 @@ def linearised(
 
     sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
     slopes = [slope(unit, side) for side, unit in zip(sides, np.eye(len(logs)), strict=True)]
-    here, _, _ = search_box(tryout.model)
+    here = coordinates(tryout.model)
     phi = here.coordinate(theta[None])[0]
     strengths = ~form.shape
     at, nearest = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
@@ -277,7 +278,7 @@ def _residuals(
 
     `shape` says which logarithms are of a shape, and `moved` how far all of them have come.
     """
-    here, _, _ = search_box(model)
+    here = coordinates(model)
     nodes, size = windows.frequency_hz.shape[1], model.size
     columns = windows.design[:, :, nodes:]
     own = Likelihood(model, replace(windows, design=windows.design[:, :, :nodes]))
