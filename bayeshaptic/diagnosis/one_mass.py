@@ -8,12 +8,8 @@ from dataclasses import replace
 from bayeshaptic.diagnosis.analyse import NO_WITNESS
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.opened import Opened
-from bayeshaptic.diagnosis.feedback.in_loop import (
-    UNSEEN,
-    contradictions,
-    follow_in_loop,
-    open_questions,
-)
+from bayeshaptic.diagnosis.feedback.against_one_mass import contradictions, open_questions
+from bayeshaptic.diagnosis.feedback.in_loop import UNSEEN, follow_in_loop
 from bayeshaptic.diagnosis.feedback.lacking import Lacking
 from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of

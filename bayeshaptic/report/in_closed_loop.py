@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.base.direct import AGAINST
-from bayeshaptic.diagnosis.feedback.in_loop import WIDE, is_wide
+from bayeshaptic.diagnosis.feedback.against_one_mass import WIDE, is_wide
 from bayeshaptic.diagnosis.feedback.mode_above_band import VALLEY
 from bayeshaptic.quantities import quantity
 from bayeshaptic.report.numbers.result import hides_hand

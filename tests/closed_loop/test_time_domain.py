@@ -12,7 +12,7 @@ import pytest
 from one_truth import check_page, page_of, words_only
 
 from bayeshaptic.diagnosis.close_loop import close_loop
-from bayeshaptic.diagnosis.feedback.in_loop import contradictions, open_questions
+from bayeshaptic.diagnosis.feedback.against_one_mass import contradictions, open_questions
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
 from bayeshaptic.inference.time_domain.likelihood import MotionLikelihood, in_loop_fit

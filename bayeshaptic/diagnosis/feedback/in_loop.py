@@ -1,4 +1,4 @@
-"""The motion of one mass fitted to a recording with feedback, and what speaks against its limit."""
+"""The motion of one mass fitted to a recording with feedback, and to each half of it."""
 
 from __future__ import annotations
 
@@ -9,32 +9,24 @@ import numpy as np
 from bayeshaptic.diagnosis.feedback.lacking import Lacking, with_laws
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.fit import MISFIT
-from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.time_domain.fit import MotionFit, fit_motion
 from bayeshaptic.inference.time_domain.follower import Follower
-from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, DELAY, MASS, NAMES, SHARED
+from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, MASS, NAMES, SHARED
 from bayeshaptic.inference.time_domain.white_force import in_white_force
-from bayeshaptic.inference.time_domain.widths.correlated import SURELY
-from bayeshaptic.models import HalfNormal
-from bayeshaptic.models.parameter import unit_of
-from bayeshaptic.quantities import pure, quantity
+from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.checks.sufficiency import few_tones
 from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.types import Floats
 
 # Half a recording has too few strokes to say much: the halves may differ by so many of their sds.
 _APART = 4.0
-_WIDEST_DB = 6.0  # of the limit's 90 % interval: wider, and the priors decide it
+_FEW_PIECES = 3  # of which no two halves are made
 # Share of the force (one standard deviation) that may be anything but one mass where its few tones
 # cannot tell: a base that gives, eddy currents, a gain that ripples.
 UNSEEN = 0.01
-WIDE = "the recording leaves the limit open within more than a factor of two"
-"""What is said of a limit that `is_wide`."""
 _CENTRAL = 1.6449  # standard deviations that hold 90 %
-_DIMENSIONS = {"m": "mass", "b": "damping", "delay_s": "time"}
-_WORDS = {"m": "mass", "b": "viscous damping", "delay_s": "delay"}
+WORDS = {"m": "mass", "b": "viscous damping", "delay_s": "delay"}
 
 
 @dataclass(frozen=True)
@@ -94,8 +86,7 @@ def _like_one_mass(motion: MotionFit, recording: Recording) -> MotionFit:
 
 def _with_halves(recording: Recording) -> InLoop | None:
     follower = _declared(recording)
-    parts = _halves(recording)
-    late_s = 0.0 if len(recording.pieces) > 3 else parts[0].duration_s
+    parts, late_s = _halves(recording)
     try:
         motion, laws, doubts = with_laws(recording, follower)
     except (InputError, np.linalg.LinAlgError):
@@ -149,88 +140,19 @@ def _by_chance(halves: tuple[MotionFit, ...], parts: tuple[Recording, ...]) -> f
     return float(np.mean(np.concatenate(errors)))
 
 
-def open_questions(
-    found: InLoop, posterior: Posterior, limit: CriticalStiffness, one_mass: bool
-) -> tuple[str, ...]:
-    """What speaks against the limit alone; `one_mass` says that the device was declared to be one.
+def _halves(recording: Recording) -> tuple[tuple[Recording, Recording], float]:
+    """The first and the second half of its way, and how much later the second begins, in s.
 
-    Parameters
-    ----------
-    found : InLoop
-    posterior : Posterior
-    limit : CriticalStiffness
-    one_mass : bool
+    Of several pieces every other one: what is between these nobody knows.
     """
-    reasons = []
-    if not one_mass:
-        reasons.append(
-            f"nothing here shows how the device vibrates above {found.motion.bandwidth_hz:.3g} Hz, "
-            "where a vibration mode may set a lower limit than that of one mass"
-        )
-    model, unsure = posterior.model, _unsure_of_the_delay(found.motion)
-    for name, dominated in posterior.prior_dominated.items():
-        free = name != "delay_s" or isinstance(model.prior(name), HalfNormal)
-        unknown = dominated or (unsure and name == "delay_s")
-        if unknown and free and name in _WORDS:
-            reasons.append(f"the recording says too little of the {_WORDS[name]}")
-    if is_wide(limit):
-        reasons.append(WIDE)
-    return tuple(reasons)
-
-
-def is_wide(limit: CriticalStiffness) -> bool:
-    """Whether the limit's 90 % interval is wider than a factor of two."""
-    low, high = (limit.quantile(p) for p in (0.05, 0.95))
-    return not (low > 0 and 20 * np.log10(high / low) < _WIDEST_DB)
-
-
-def _unsure_of_the_delay(motion: MotionFit) -> bool:
-    """Whether the delay is below zero by chance, as one may be that is known to a period or two."""
-    value, sd = motion.values[DELAY], motion.sd[DELAY]
-    return bool(value < 0 <= value + SURELY * sd)
-
-
-def contradictions(motion: MotionFit, posterior: Posterior) -> tuple[str, ...]:
-    """What was given, as known or by a prior, and is contradicted by the motion.
-
-    A device file's delay that is not the recording's moves the damping, and with it the limit.
-    What was given may be right as well, and the motion be that of more than one mass; that is
-    certain where one mass would need what no device has, such as a delay below zero.
-    """
-    model, drawn = posterior.model, posterior.summary()
-    known: list[str] = []
-    believed: list[str] = []
-    for name, value, sd in zip(NAMES, motion.values, motion.sd, strict=True):
-        free = name in model.names
-        told = drawn[name]["q50"] if free else model.fixed[name]
-        if name not in _WORDS or abs(told - value) < SURELY * sd:
-            continue
-        unit = unit_of(_DIMENSIONS[name], model.force_unit, model.position_unit)
-        what = "comes out, with its prior, as" if free else "was given as"
-        why = (
-            ", which no device has: more than one mass moves, or force and position are not of one "
-            "sample"
-            if value < 0
-            else ": correct what gave it (--device, --delay-s, a prior), or more than one mass "
-            "moves"
-        )
-        (believed if free else known).append(
-            f"the {_WORDS[name]} {what} {quantity(told, unit)}, and one mass that moves so would "
-            f"have {quantity(value, unit, sd)}{why}"
-        )
-    # What is known wrongly pulls the others along.
-    return tuple(known or believed)
-
-
-def _halves(recording: Recording) -> tuple[Recording, Recording]:
-    """The first and the second half of its way; of pieces every other one."""
     pieces = recording.pieces
-    if len(pieces) > 3:
-        return join_recordings(pieces[::2]), join_recordings(pieces[1::2])
+    if len(pieces) > _FEW_PIECES:
+        return (join_recordings(pieces[::2]), join_recordings(pieces[1::2])), 0.0
     way = np.cumsum(np.abs(np.diff(recording.position)))
     shortest = recording.samples // 4
     middle = int(np.clip(np.searchsorted(way, 0.5 * way[-1]), shortest, 3 * shortest))
-    return recording.part(0, middle), recording.part(middle, recording.samples)
+    first, second = recording.part(0, middle), recording.part(middle, recording.samples)
+    return (first, second), first.duration_s
 
 
 def _declared(recording: Recording) -> Follower | None:
@@ -249,7 +171,7 @@ def _differences(first: MotionFit, second: MotionFit) -> tuple[str, ...]:
     apart = np.abs(first.values - second.values)
     sd = np.sqrt(np.diag(first.covariance) + np.diag(second.covariance))
     return tuple(
-        f"the two halves of the recording disagree about the {_WORDS[name]}"
+        f"the two halves of the recording disagree about the {WORDS[name]}"
         for name, far in zip(NAMES, apart > _APART * sd, strict=True)
-        if far and name in _WORDS
+        if far and name in WORDS
     )
