@@ -22,6 +22,7 @@ from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
@@ -209,6 +210,7 @@ def linearised(
         along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
     changes = tryout.changes(forces, added)
+    etfe = tryout.without(changes, theta)
     columns = [
         *(tryout.at_lines(slope) for slope in slopes),
         *along.slopes.reshape(-1, along.slopes.shape[-1]),
@@ -216,8 +218,9 @@ def linearised(
     ]
     by_strengths = np.tile(form.grounded[along.strengths], len(along.slopes))
     grounded = np.array([*form.grounded, *by_strengths, *(own for _, own in further)], bool)
-    columns = _with_a_hand(tryout, changes, theta, columns, grounded)
-    windows, weight = _weighed_windows(tryout, changes, theta, columns, parts)
+    if tryout.held and grounded.any():
+        columns = _with_a_hand(tryout, changes, etfe, theta, columns, grounded)
+    windows, weight = _weighed_windows(tryout, etfe, theta, columns, parts)
     start = np.concatenate([phi, np.zeros(len(logs) + len(further))])[None]
     return _residuals(tryout.model, windows, weight, form.shape, moved, start, along), start, along
 
@@ -225,36 +228,28 @@ def linearised(
 def _with_a_hand(
     tryout: Tryout,
     changes: tuple[Change, ...],
+    etfe: Etfe,
     theta: Floats,
     slopes: list[Complexes],
     grounded: NDArray[np.bool_],
 ) -> list[Complexes]:
-    """Slopes of the motion, with those of what a hand would do without the forces.
+    """Slopes of the motion, with those of what a hand would do without the forces: `etfe`.
 
     The more they take off, the further it alone would have moved the device: see `Windows.louder`.
     As it was measured that is a slope like those of the motion.
     """
-    if not (tryout.held and grounded.any()):
-        return slopes
-    spectra: Any = tryout.without(changes, theta).spectra
-    left = (
-        spectra.position
-        - tryout.model.response(theta, tryout.at_lines.frequency_hz, measured=True) * spectra.force
-    )
+    spectra: Any = etfe.spectra
+    response = tryout.model.response(theta, tryout.at_lines.frequency_hz, measured=True)
+    left = spectra.position - response * spectra.force
     found = np.array(slopes)
     found[grounded] += left * tryout.answer(theta).growth(answered(changes), found[grounded])
     return list(found)
 
 
 def _weighed_windows(
-    tryout: Tryout,
-    changes: tuple[Change, ...],
-    theta: Floats,
-    columns: list[Complexes],
-    parts: tuple[int, ...],
+    tryout: Tryout, etfe: Etfe, theta: Floats, columns: list[Complexes], parts: tuple[int, ...]
 ) -> tuple[Windows, Floats]:
     """Windows without what forces changed, with slopes as inputs; and roots of their weights."""
-    etfe = tryout.without(changes, theta)
     windows = tryout.windows(etfe, theta, columns)
     # The many slopes leave too little of a window to read its noise from.
     left, scattered = weights(tryout.model, tryout.windows(etfe, theta), theta)
