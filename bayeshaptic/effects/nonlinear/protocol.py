@@ -124,6 +124,11 @@ class Acting:
     effect: NonlinearEffect
     strength: float
 
+    @property
+    def moves_a_mass(self) -> bool:
+        """An actuator's does not: it takes some of the command away."""
+        return not isinstance(self.effect, CommandEffect)
+
 
 @dataclass(frozen=True)
 class CommandEffect(NonlinearEffect):

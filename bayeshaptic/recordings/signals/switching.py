@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Bools, Floats, Ints
 
 # Error rates of these numbers are in docs/door.md.
 FEWEST_SWITCHES = 16
@@ -41,10 +40,21 @@ class Stretch:
     at_places: int
 
 
-def switches_of(force: Floats) -> NDArray[np.int_]:
+def switches_of(force: Floats) -> Ints:
     """The first sample after each switch of a force between two levels."""
-    up = force > (force.min() + force.max()) / 2
-    return np.flatnonzero(np.diff(up.astype(int))) + 1
+    return np.flatnonzero(np.diff(_pushes_up(force))) + 1
+
+
+def _pushes_up(force: Floats) -> Bools:
+    """Where a force of two levels is nearer to the upper one."""
+    return np.asarray(force > (force.min() + force.max()) / 2)
+
+
+def _at_a_level(force: Floats) -> Bools:
+    """Where a force is at its lowest or its highest."""
+    low, high = force.min(), force.max()
+    near = 1e-6 * (high - low)
+    return np.asarray((force - low <= near) | (high - force <= near))
 
 
 def stretches(force: Floats, position: Floats) -> tuple[Stretch, ...]:
@@ -52,7 +62,7 @@ def stretches(force: Floats, position: Floats) -> tuple[Stretch, ...]:
     at = switches_of(force)
     if len(at) < FEWEST_SWITCHES:
         return ()
-    up = force[at] > (force.min() + force.max()) / 2
+    up = _pushes_up(force)[at]
     holds = np.maximum.reduceat(position, at), np.minimum.reduceat(position, at)
     top, bottom = (np.asarray(side[:-1]) for side in holds)
     # Over a whole oscillation, a hold up and one down.
@@ -70,7 +80,7 @@ def stretches(force: Floats, position: Floats) -> tuple[Stretch, ...]:
     return tuple(found)
 
 
-def _stretch(position: Floats, at: NDArray[np.int_], up: NDArray[np.bool_]) -> Stretch:
+def _stretch(position: Floats, at: Ints, up: Bools) -> Stretch:
     best, middle = -1, 0.0
     for lag in range(_LATEST + 1):
         after, before = (np.maximum(at - lag - k, 0) for k in (0, 1))
@@ -82,9 +92,7 @@ def _stretch(position: Floats, at: NDArray[np.int_], up: NDArray[np.bool_]) -> S
     return Stretch(int(at[0]), int(at[-1]), middle, best)
 
 
-def _at_places(
-    position: Floats, at: NDArray[np.int_], up: NDArray[np.bool_], lag: int, places: list[float]
-) -> int:
+def _at_places(position: Floats, at: Ints, up: Bools, lag: int, places: list[float]) -> int:
     """Switches that come `lag` samples after the position is first beyond their place."""
     count = 0
     for begin, end, turns_up in zip(at[:-1], at[1:], up[1:], strict=True):
@@ -105,11 +113,9 @@ def is_relay(force: Floats, position: Floats) -> bool:
     ----------
     force, position : ndarray, shape (N,)
     """
-    low, high = force.min(), force.max()
-    near = 1e-6 * (high - low)
-    if not np.all((force - low <= near) | (high - force <= near)):
+    if not np.all(_at_a_level(force)):
         return False
-    pushes_up = force > (low + high) / 2
+    pushes_up = _pushes_up(force)
     if not 0.2 < np.mean(pushes_up) < 0.8:
         return False
     levels = (0.0, float(np.median(position)), float((position.min() + position.max()) / 2))
@@ -130,9 +136,7 @@ def is_switched(force: Floats, position: Floats) -> bool:
     Under a square wave of a clock the motion is as regular as that: nothing is said of a force
     whose switches come in equal times but for a sample.
     """
-    low, high = force.min(), force.max()
-    near = 1e-6 * (high - low)
-    if np.mean((force - low <= near) | (high - force <= near)) < _AT_LEVEL:
+    if np.mean(_at_a_level(force)) < _AT_LEVEL:
         return False
     at = switches_of(force)
     if len(at) < FEWEST_SWITCHES or _clocked(at):
@@ -141,7 +145,7 @@ def is_switched(force: Floats, position: Floats) -> bool:
     return sum(part.at_places for part in found) >= OF_SWITCHES * len(at)
 
 
-def _clocked(at: NDArray[np.int_]) -> bool:
+def _clocked(at: Ints) -> bool:
     """Times between switches, each direction's, are the same but for one sample."""
     times = np.diff(at)
     sides = (times[::2], times[1::2])

@@ -8,23 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.types import Floats
 
 # Standard deviation of the time steps over the period beyond which samples are not evenly spaced:
 # at 10 % the error at a tenth of the Nyquist frequency is 3 % of the signal, more than any device
 # can be known to.
 MOST_JITTER = 0.1
-_USUAL = (
-    0.6745  # the median distance from the mean, of normal numbers with a standard deviation of one
-)
+# The median distance from the mean, of normal numbers with a standard deviation of one.
+_USUAL = 0.6745
 # Seconds; a later stamp is damage, even in nanoseconds since 1970, and its square is no number.
 _LATEST = 1e100
 # Rows that are missing in one place, and the share of all that are, up to which they are put back:
 # of a force that nobody knows for longer than this its own past says nothing.
 LONGEST_GAP, MOST_MISSING = 8, 0.01
 _WORTH_READING = 1000  # rows, about what a response can be read from
-# From here on the stamps' jitter is worth a warning.
 LOOP = "loop"  # what a warning of the topic "period" is about, where it doubts the loop's period
-NOTABLE_JITTER = 0.005
+NOTABLE_JITTER = 0.005  # of the stamps: from here on worth a warning
 
 
 def unusual_period(period_s: float) -> str | None:
@@ -60,7 +59,7 @@ class Timing:
 
 
 def sampling_period(
-    time_s: NDArray[np.float64] | None, period_s: float | None = None, where: str = "recording"
+    time_s: Floats | None, period_s: float | None = None, where: str = "recording"
 ) -> Timing:
     """The period that the time stamps show, or the one that was given.
 
@@ -107,7 +106,7 @@ def sampling_period(
     return Timing(float(period_s), stamps.jitter)
 
 
-def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
+def _from_stamps(time_s: Floats, where: str) -> Timing:
     if len(time_s) < 3:
         raise InputError(f"{where}: {len(time_s)} time stamps; a period needs at least 3")
     bad = np.flatnonzero(~(np.abs(time_s) < _LATEST))
@@ -151,7 +150,7 @@ def _from_stamps(time_s: NDArray[np.float64], where: str) -> Timing:
     return Timing(slope, jitter)
 
 
-def _uneven(where: str, steps: NDArray[np.float64], jitter: float) -> str:
+def _uneven(where: str, steps: Floats, jitter: float) -> str:
     return (
         f"{where}: time steps are not even: they vary by {100 * jitter:.0f} % (standard "
         f"deviation), from {steps.min():.6g} s to {steps.max():.6g} s; resample to an even "
@@ -159,7 +158,7 @@ def _uneven(where: str, steps: NDArray[np.float64], jitter: float) -> str:
     )
 
 
-def _clock(time_s: NDArray[np.float64]) -> tuple[float, float]:
+def _clock(time_s: Floats) -> tuple[float, float]:
     """Slope of the straight line through the stamps, and the largest distance from it.
 
     Where several rows share a stamp, the line goes through the first row of each: a line through
@@ -180,7 +179,7 @@ def _clock(time_s: NDArray[np.float64]) -> tuple[float, float]:
     return slope, float(np.abs(centred - slope * index).max())
 
 
-def _rounding(time_s: NDArray[np.float64]) -> float:
+def _rounding(time_s: Floats) -> float:
     """The power of ten to which the stamps were rounded; zero where there is none."""
     # What double precision itself leaves of a decimal number.
     dust = 4 * np.finfo(float).eps * float(np.abs(time_s).max())
@@ -192,7 +191,7 @@ def _rounding(time_s: NDArray[np.float64]) -> float:
     return 0.0
 
 
-def _grid(time_s: NDArray[np.float64], slope: float) -> float:
+def _grid(time_s: Floats, slope: float) -> float:
     """What stamps of few digits, as of single precision, were rounded to; zero where to nothing.
 
     Steps then have two to four lengths, one grid apart.  A grid as long as the period is that of
@@ -214,7 +213,7 @@ def _grid(time_s: NDArray[np.float64], slope: float) -> float:
     return float(np.mean(middles))
 
 
-def _gaps(time_s: NDArray[np.float64], period: float) -> NDArray[np.intp]:
+def _gaps(time_s: Floats, period: float) -> NDArray[np.intp]:
     """Samples after which some are missing; a late stamp that the next step makes up for is no gap.
 
     Where many steps are long, and of no whole number of periods, it is uneven sampling and no gap.
@@ -227,9 +226,7 @@ def _gaps(time_s: NDArray[np.float64], period: float) -> NDArray[np.intp]:
     return gaps if whole or len(gaps) <= max(3, len(steps) // 100) else gaps[:0]
 
 
-def _with_gaps(
-    time_s: NDArray[np.float64], gaps: NDArray[np.intp], period: float, where: str
-) -> Timing:
+def _with_gaps(time_s: Floats, gaps: NDArray[np.intp], period: float, where: str) -> Timing:
     """The period of stamps with short gaps, and which rows there are; long gaps are refused."""
     steps = np.diff(time_s)
     lost = np.zeros(len(time_s), dtype=np.intp)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
-from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
+from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.types import Complexes, Floats
 
@@ -66,7 +66,7 @@ def slopes_along(
     """
     here = coordinates(tryout.model)
     phi = here.coordinate(theta[None])[0]
-    moving = [not isinstance(one.effect, CommandEffect) for one in forces]
+    moving = [one.moves_a_mass for one in forces]
     if not any(moving):
         return np.zeros((len(phi), 0, len(tryout.at_lines.frequency_hz)), complex)
 

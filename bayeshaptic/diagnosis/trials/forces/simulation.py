@@ -143,7 +143,7 @@ class Simulation:
     ) -> Floats:
         """With no motion for those that move no mass."""
         every = np.zeros((len(forces), self.recording.samples))
-        own = np.array([not isinstance(one.effect, CommandEffect) for one in forces], bool)
+        own = np.array([one.moves_a_mass for one in forces], bool)
         if own.any():
             every[own] = added(own)
         return every
@@ -164,7 +164,7 @@ class Simulation:
     def driven(self, forces: tuple[Acting, ...], theta: Floats, added: Floats) -> Floats:
         """The sum of motions added, and what an actuator's forces do by the command's lack."""
         total = np.asarray(added.sum(axis=0))
-        if not any(isinstance(one.effect, CommandEffect) for one in forces):
+        if all(one.moves_a_mass for one in forces):
             return total
         system, period = self.model.system(theta), self.recording.period_s
         return np.asarray(total - linear_motion(system, self.lost(forces), period)[0])
@@ -177,7 +177,7 @@ class Simulation:
         What nothing known makes, the measured position less what the command does, and from a
         motion of the first kind to what each force that moves a mass adds.
         """
-        acting = _moving(forces)
+        acting = [one for one in forces if one.moves_a_mass]
         order = sorted(range(len(acting)), key=lambda i: acting[i].effect.sticks)
         places = _places(acting)
         laws = [one.effect.law(one.strength, self.model, theta) for one in acting]
@@ -253,11 +253,6 @@ class Simulation:
             return 0.0
         values = dict(zip(self.model.names, theta.tolist(), strict=True))
         return _between(stretched(taken, self.recording.period_s, values))
-
-
-def _moving(forces: Sequence[Acting]) -> list[Acting]:
-    """Those that move a mass."""
-    return [one for one in forces if not isinstance(one.effect, CommandEffect)]
 
 
 def _places(forces: Sequence[Acting]) -> tuple[Place, ...]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bayeshaptic.diagnosis.state import Change, share, weights
 from bayeshaptic.diagnosis.trials.forces.along import Along, slopes_along
 from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout, answered
-from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect
+from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
@@ -205,7 +205,7 @@ def linearised(
     strengths = ~form.shape
     at, nearest = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
     if along is None or not along.holds(at, nearest):
-        moving = [not isinstance(one.effect, CommandEffect) for one in forces]
+        moving = [one.moves_a_mass for one in forces]
         each = slopes_along(tryout, forces, theta, added, nearest * reach.linear)
         along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
     slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
