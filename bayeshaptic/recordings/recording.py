@@ -107,8 +107,13 @@ class Recording(Shown):
         """Its pieces, each a recording of its own; itself where it is one."""
         if not self.joints:
             return (self,)
+        return tuple(self.part(span.start, span.stop) for span in self.spans)
+
+    @property
+    def spans(self) -> tuple[slice, ...]:
+        """The samples of its pieces."""
         edges = (0, *self.joints, self.samples)
-        return tuple(self.part(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True))
+        return tuple(slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True))
 
     def part(self, start: int, stop: int) -> Recording:
         """The samples from `start` up to but without `stop`, as a recording of its own."""

@@ -51,12 +51,11 @@ class MassInLoop:
     period_s, bandwidth_hz : float
     shapes : ndarray, shape (WAVES, N)
         Of the force that changes along the way.
+    pieces : tuple of slice
     follower : Follower or None
         None until `led`.
     forces : MassForces
         Dry friction's law, and further ones.
-    joints : tuple of int
-        Where further pieces begin.
     hums : tuple of Hum
     name : str
         Of the recording, for messages.
@@ -67,9 +66,9 @@ class MassInLoop:
     period_s: float
     bandwidth_hz: float
     shapes: Floats = field(repr=False)
+    pieces: tuple[slice, ...]
     follower: Follower | None = None
     forces: MassForces = COULOMB
-    joints: tuple[int, ...] = ()
     hums: tuple[Hum, ...] = ()
     name: str = "recording"
 
@@ -90,8 +89,8 @@ class MassInLoop:
             recording.period_s,
             bandwidth_hz,
             waves(position, way),
+            recording.spans,
             forces=forces,
-            joints=recording.joints,
             hums=hums,
             name=recording.name,
         )
@@ -104,7 +103,7 @@ class MassInLoop:
     @property
     def _laws_from(self) -> int:
         """Where the numbers of the laws begin."""
-        return SHARED + self._own * (len(self.joints) + 1)
+        return SHARED + self._own * len(self.pieces)
 
     @property
     def _own(self) -> int:
@@ -134,12 +133,6 @@ class MassInLoop:
         found[FORCES] = _LARGEST * np.std(self.force)
         found[[own[1] for own in self.beginnings]] = np.std(np.diff(self.position)) / self.period_s
         return found
-
-    @property
-    def pieces(self) -> list[slice]:
-        """Where the pieces are."""
-        edges = (0, *self.joints, len(self.force))
-        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
 
     @property
     def beginnings(self) -> list[Ints]:

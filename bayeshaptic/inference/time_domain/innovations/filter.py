@@ -100,7 +100,7 @@ def innovations(
     values: Floats,
     follower: Follower,
     velocity: Floats,
-    pieces: Sequence[slice],
+    pieces: tuple[slice, ...],
     disturbed: Disturbance,
     period_s: float,
 ) -> Innovations:
@@ -118,7 +118,7 @@ def innovations(
         That led the motion.
     velocity : ndarray, shape (N,)
         Of that motion.
-    pieces : sequence of slice
+    pieces : tuple of slice
     disturbed : Disturbance
     period_s : float
     """
@@ -129,7 +129,7 @@ def innovations(
     unknown = _UNKNOWN * disturbed.position_sd / period_s
     sizes = np.array([disturbed.force_sd, disturbed.position_sd, dry, unknown])
     gains, variances = gains_of(motion, push, sizes, velocity, _rests(velocity), _starts(pieces))
-    return Innovations(motion, gains, variances, follower, tuple(pieces), period_s)
+    return Innovations(motion, gains, variances, follower, pieces, period_s)
 
 
 def _rests(velocity: Floats) -> NDArray[np.bool_]:
