@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.residuals.moved import coasting, slow_velocity
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
+from bayeshaptic.diagnosis.residuals.unforced import commanded_motions
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import (
     ALONG,
@@ -27,7 +28,6 @@ from bayeshaptic.effects.nonlinear.shapes import (
     VELOCITY,
 )
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -149,9 +149,8 @@ def _by_the_command(fit: Fit, recording: Recording, over: str) -> Floats | None:
     by_hand = fit.model.held and recording.reference is None
     if not by_hand or over not in (VELOCITY, LOAD_VELOCITY):
         return None
-    force = recording.force - recording.force.mean()
     mass = 1 if over == LOAD_VELOCITY else 0
-    return linear_motion(fit.model.system(fit.theta), force, recording.period_s, mass)[1]
+    return np.asarray(commanded_motions(fit, recording, (mass,))[0, 1])
 
 
 def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
@@ -162,13 +161,11 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
     _, velocity = driven_motion(fit, recording)
     position = recording.position - recording.position.mean()
     found = {VELOCITY: velocity, POSITION: position, ALONG: position}
-    force = recording.force - recording.force.mean()
-    system = fit.model.system(fit.theta)
-    if len(system.mechanism.masses) > 1:
-        motor, load = linear_motions(system, force, recording.period_s, (0, 1))
+    if len(fit.model.system(fit.theta).mechanism.masses) > 1:
+        motor, load = commanded_motions(fit, recording, (0, 1))
         found[STRETCH] = motor[0] - load[0]
         found[LOAD_VELOCITY] = load[1] + velocity - motor[1]  # what is slow moves both
-    found[COMMAND] = force
+    found[COMMAND] = recording.force - recording.force.mean()
     return found
 
 
@@ -191,13 +188,12 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
     and what a constant force does: friction has a sign where it slides along with that.  In closed
     loop the command answers to whatever moves the device besides, as to a hand.
     """
-    force = recording.force - recording.force.mean()
-    system = fit.model.system(fit.theta)
-    x, v = linear_motion(system, force, recording.period_s)
+    ((x, v),) = commanded_motions(fit, recording)
     if fit.model.held or recording.reference is not None:
         rest = recording.position - recording.position.mean() - x
         v = v + slow_velocity(rest, recording.period_s)
     else:
+        system = fit.model.system(fit.theta)
         v = v + coasting(system, recording.position - x, recording.period_s)[1]
     return x, v
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.unforced import coasting_motions, parts
+from bayeshaptic.diagnosis.residuals.unforced import coasting_motions, commanded_motions, parts
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import LinearSystem
-from bayeshaptic.models.response.motion import linear_motion
 from bayeshaptic.numerics.low_pass import low_pass, slow_share
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
@@ -57,10 +56,9 @@ def moved_besides(fit: Fit, recording: Recording) -> float:
     fit : Fit
     recording : Recording
     """
-    period_s, system = recording.period_s, fit.model.system(fit.theta)
-    x, v = linear_motion(system, recording.force - recording.force.mean(), period_s)
+    period_s, ((x, v),) = recording.period_s, commanded_motions(fit, recording)
     besides = recording.position - x
-    coasted, along = coasting(system, besides, period_s)
+    coasted, along = coasting(fit.model.system(fit.theta), besides, period_s)
     left = besides - coasted
     if recording.sensed is not None and recording.sensed.derivatives:
         power = _beside_noise(left, recording)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.linalg import lstsq
 
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.models.response.motion import linear_motion
+from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
@@ -58,6 +58,12 @@ def parts(columns: Floats, motion: Floats) -> Floats:
     return np.asarray(lstsq(alike, columns.T @ motion / size, rcond=_ALIKE)[0] / size)
 
 
+def commanded_motions(fit: Fit, recording: Recording, masses: tuple[int, ...] = (0,)) -> Floats:
+    """What the command alone does to masses: positions and velocities, shape (M, 2, N)."""
+    force = recording.force - recording.force.mean()
+    return linear_motions(fit.model.system(fit.theta), force, recording.period_s, masses)
+
+
 def fitted_motion(fit: Fit, recording: Recording, acted: Floats | float) -> Floats:
     """The motor's position without the encoder's noise, shape (N,).
 
@@ -69,11 +75,10 @@ def fitted_motion(fit: Fit, recording: Recording, acted: Floats | float) -> Floa
     acted : ndarray, shape (N,), or 0
         What they add to the position.
     """
-    system, period_s = fit.model.system(fit.theta), recording.period_s
-    known = linear_motion(system, recording.force - recording.force.mean(), period_s)[0]
+    known, period_s = commanded_motions(fit, recording)[0, 0], recording.period_s
     left = recording.position - known
     if fit.model.held:
         edge_hz = hand_edge_hz(recording.position + acted, period_s)
         return np.asarray(acted + known + low_pass(left, edge_hz, period_s))
-    columns = coasting_motions(system, len(left), period_s)
+    columns = coasting_motions(fit.model.system(fit.theta), len(left), period_s)
     return np.asarray(acted + known + columns @ parts(columns, left))

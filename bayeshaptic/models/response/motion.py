@@ -22,8 +22,8 @@ def linear_motions(
 ) -> Floats:
     """Position and velocity of masses, from rest, for one parameter vector.
 
-    Exact for a force held between the samples and delayed by the system's delay; filters in the
-    loop are left out of the sum over poles only if there are none.
+    Exact for a force held between the samples and delayed by the system's delay, with the filters
+    in the loop: their poles are among those that are summed over.
 
     Parameters
     ----------
