@@ -130,7 +130,7 @@ def _noise_of(fit: Fit, etfe: Etfe) -> _Noise | None:
     def together(power: Floats) -> Floats:
         return np.convolve(power[driven], np.ones(_TOGETHER), "valid")
 
-    middle = centre[driven][_TOGETHER // 2 : 1 - _TOGETHER // 2 - 1]
+    middle = centre[driven][_TOGETHER // 2 : -(_TOGETHER // 2)]
     noise = together(scatter * shape) / together(lines)
     floor = _floor(recording, etfe.band_hz)
     if floor is None:

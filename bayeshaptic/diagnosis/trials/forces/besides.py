@@ -228,8 +228,8 @@ def settled(
 def _mixture(motions: list[Floats], errors: list[Floats]) -> tuple[Floats, Floats]:
     """The mixture of motions that is least off, and by how much, to first order."""
     change = np.diff(errors, axis=0).T
-    parts = lstsq(change, errors[-1], rcond=1e-8)[0] if change.size else np.zeros(0)
-    return motions[-1] - parts @ np.diff(motions, axis=0), errors[-1] - change @ parts
+    share = lstsq(change, errors[-1], rcond=1e-8)[0] if change.size else np.zeros(0)
+    return motions[-1] - share @ np.diff(motions, axis=0), errors[-1] - change @ share
 
 
 def one_step(
