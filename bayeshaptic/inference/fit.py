@@ -128,7 +128,7 @@ class Fit(Shown):
         return replace(there, alike=self.alike, etfe=self.etfe)
 
     def response(self, frequency_hz: Floats) -> NDArray[np.complex128]:
-        """The fitted sampled response at frequencies of any shape, as it is measured."""
+        """The fitted sampled response at `frequency_hz`, of any shape, as it is measured."""
         found = self.model.response(self.theta, frequency_hz.ravel(), measured=True)
         return found.reshape(frequency_hz.shape)
 
