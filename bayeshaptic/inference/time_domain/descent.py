@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.inference.time_domain.linearised import Linearised, linearised
 from bayeshaptic.inference.time_domain.mass_in_loop import MASS, MassInLoop
-from bayeshaptic.inference.time_domain.uneven import WAVES
+from bayeshaptic.inference.time_domain.uneven import WAVES, Ridge
 from bayeshaptic.inference.time_domain.widths.of_values import covariance_of_values
 from bayeshaptic.types import Floats
 
@@ -20,21 +20,28 @@ _STUCK = 0.5  # of the error's power, that a settled fit does not promise to tak
 
 @dataclass(frozen=True)
 class Descended:
-    """A fit with one follower.
+    """A fit with one follower, without the slopes around it: of an hour these are a gigabyte.
 
     Attributes
     ----------
-    values : ndarray, shape (V,)
-        Of the `MassInLoop`: where the data put them, possible or not.
+    values, inside : ndarray, shape (V,)
+        Of the `MassInLoop`: where the data put them, and the best that are possible.
+    uneven : ndarray, shape (2 WAVES,)
+        The force that changes along the way.
     covariance : ndarray, shape (V, V)
-    there : Linearised
-        The loop about the best values that are possible.
+    error : ndarray, shape (N,)
+        Measured less simulated position.
+    found : Ridge
+        The linear problem around it.
     converged : bool
     """
 
     values: Floats
+    inside: Floats
+    uneven: Floats
     covariance: Floats
-    there: Linearised
+    error: Floats
+    found: Ridge
     converged: bool
 
 
@@ -54,8 +61,9 @@ def descend(loop: MassInLoop, start: Floats) -> Descended:
     promised = there.without(_within(there))
     # Where no step is any better, but a line promises much, it is stuck.
     stuck = not promised @ promised > (1 - _STUCK) * (there.error @ there.error)
-    best = values + there.found.solution[: loop.plain]
-    return Descended(best, covariance_of_values(there), there, converged and not stuck)
+    best, spread = values + there.found.solution[: loop.plain], covariance_of_values(there)
+    settled = converged and not stuck
+    return Descended(best, values, uneven, spread, there.error, there.found, settled)
 
 
 def _step(there: Linearised) -> tuple[Floats, Floats, float] | None:

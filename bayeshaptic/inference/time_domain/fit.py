@@ -161,27 +161,26 @@ def fit_motion(
     begun = loop.begun(by_inverse_dynamics(recording) if start is None else start)
     loop = loop.led(feedback, begun)
     first = descend(loop, begun)
-    there = first.there
     other = 0.4  # bandwidth of the second follower over that of the first
-    second = descend(loop.led(None, begun, other), there.values)
+    second = descend(loop.led(None, begun, other), first.inside)
     apart = _beyond_noise(first, second)
     spread = first.covariance + np.outer(apart, apart)
     assert loop.follower is not None
     return MotionFit(
         values=first.values[:SHARED],
-        covariance=covariance_of_shared(spread, there.found),
+        covariance=covariance_of_shared(spread, first.found),
         bandwidth_hz=width,
-        error_rms=float(np.sqrt(np.mean(there.error**2))),
-        uneven_rms=float(np.sqrt(np.mean((there.uneven.reshape(2, WAVES) @ loop.shapes) ** 2))),
+        error_rms=float(np.sqrt(np.mean(first.error**2))),
+        uneven_rms=float(np.sqrt(np.mean((first.uneven.reshape(2, WAVES) @ loop.shapes) ** 2))),
         converged=first.converged and second.converged,
-        simulated=loop.position - there.error,
-        uneven=there.uneven,
+        simulated=loop.position - first.error,
+        uneven=first.uneven,
         way=way,
         follower=loop.follower,
-        whole=there.values,
+        whole=first.inside,
         forces=forces,
         whole_sd=np.sqrt(np.diag(spread)),
-        hums=loop.hums_at(there.values),
+        hums=loop.hums_at(first.inside),
     )
 
 

@@ -101,8 +101,8 @@ def _by_innovations(motion: MotionFit, recording: Recording) -> MotionFit:
     return replace(
         motion,
         values=found.values[:SHARED],
-        covariance=covariance_of_shared(found.covariance, found.there.found),
-        whole=found.there.values,
+        covariance=covariance_of_shared(found.covariance, found.found),
+        whole=found.inside,
         whole_sd=np.sqrt(np.diag(found.covariance)),
         disturbed=disturbed,
     )
@@ -121,7 +121,7 @@ def _settled(loop: MassInLoop, values: Floats) -> tuple[Descended, Disturbance] 
         moved = (found.values - before)[:SHARED] / np.sqrt(np.diag(found.covariance)[:SHARED])
         if found.converged and np.max(np.abs(moved)) < _STILL:
             return found, disturbed
-        tried, values = _around(disturbed.force_sd, _CLOSER[0]), found.there.values
+        tried, values = _around(disturbed.force_sd, _CLOSER[0]), found.inside
         before = found.values
     return None
 
