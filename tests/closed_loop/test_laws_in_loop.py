@@ -169,12 +169,10 @@ def test_a_response_that_says_nothing_of_the_delay_is_refused(bench: Bench) -> N
 def test_a_law_with_which_no_motion_stays_near_leaves_the_mass_as_it_was(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def plain_alone(*arguments: Any) -> MotionFit:
-        if len(arguments) > 2:  # with other forces than Coulomb's
-            raise InputError("no motion of one mass stays near the measured one")
-        return fit_motion(*arguments)
+    def runs_away(*arguments: Any) -> MotionFit:
+        raise InputError("no motion of one mass stays near the measured one")
 
-    monkeypatch.setattr("bayeshaptic.diagnosis.feedback.lacking.fit_motion", plain_alone)
+    monkeypatch.setattr("bayeshaptic.diagnosis.feedback.refit.fit_motion", runs_away)
     recording = stepped(bench.with_effect("stribeck_friction", **STRIBECK), 4.0)
     motion, laws, _ = with_laws(recording, FOLLOWER)
     assert laws == ()
