@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -227,7 +228,8 @@ def test_drag_predicts_lines_and_a_load_that_were_not_fitted(measured: Find) -> 
     etfe = bh.estimate_etfe(bh.read_recording(path, columns=BENCH_COLUMNS))
     witness = bh.read_recording(path, columns=WITNESS_COLUMNS)
     windows, period = compress(with_floor(etfe, 0.002)), one_period(etfe)
-    load = one_period(etfe, witness.position)
+    beside = replace(etfe.recording, position=witness.position)
+    load = one_period(replace(etfe, recording=beside))
     out = share(windows, REPORT)
     fit = bh.least_squares(bh.free(), etfe)
     base = balance(fit.model, windows, period, (), fit.theta, fitted=~out)

@@ -96,14 +96,13 @@ def _within(density: Density, phi: Floats, widths: Floats) -> Floats:
     return phi + np.clip(own, low, here.high - _MARGIN * widths) - own
 
 
-def _climb(
-    density: Density, phi: Floats, free: NDArray[np.bool_], widths: Floats, steps: int = 30
-) -> Floats:
+def _climb(density: Density, phi: Floats, free: NDArray[np.bool_], widths: Floats) -> Floats:
     """Damped Newton steps up the log posterior in the free coordinates."""
     phi = phi.copy()
     value = float(density.beyond_walls(phi)[0])
     damping = 1e-3
     settled = 1e-2  # gain of log density that is none
+    steps = 30  # at most
     for _ in range(steps):
         gradient = _gradient(density, phi[None], widths)[0][free] * widths[free]
         scaled = np.outer(widths, widths) * _hessian(density, phi, widths)
