@@ -88,7 +88,9 @@ def test_its_slope_is_that_of_two_near_by(held) -> None:  # type: ignore[no-unty
     answer, step = bench.answer(theta), 1e-6
     more = np.random.default_rng(2).standard_normal() * added
     found = answer.growth(added, np.array([more]))[0]
-    near = [answer.louder(added + side * step * more, bench.frequency_hz) for side in (1, -1)]
+    near = [
+        answer.louder(added + side * step * more, bench.at_lines.frequency_hz) for side in (1, -1)
+    ]
     np.testing.assert_allclose(found, np.log(near[0] / near[1]) / (2 * step), atol=1e-6)
 
 
