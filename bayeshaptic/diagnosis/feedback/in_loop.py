@@ -77,9 +77,10 @@ def follow_in_loop(recording: Recording) -> InLoop | None:
 
 def _like_one_mass(motion: MotionFit, recording: Recording) -> MotionFit:
     """The fit with wider mass and damping, by what a single tone cannot tell from them."""
-    velocity = np.gradient(motion.simulated, recording.period_s)
+    velocity, period_s = motion.velocity(recording), recording.period_s
+    faster = np.concatenate([np.gradient(velocity[span], period_s) for span in recording.spans])
     spread, size = motion.covariance.copy(), UNSEEN * float(np.std(recording.force))
-    for index, moves in ((MASS, np.gradient(velocity, recording.period_s)), (DAMPING, velocity)):
+    for index, moves in ((MASS, faster), (DAMPING, velocity)):
         spread[index, index] += (size / float(np.std(moves))) ** 2
     return replace(motion, covariance=spread)
 
