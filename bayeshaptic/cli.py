@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import _thread
 import argparse
-import io
 import os
 import re
 import signal
@@ -24,6 +23,13 @@ from types import FrameType
 from typing import NoReturn
 
 from bayeshaptic.commands import COMMANDS
+from bayeshaptic.commands.streams import (
+    flush_output,
+    let_go,
+    nobody_reads,
+    open_what_is_closed,
+    write_what_can_be,
+)
 from bayeshaptic.commands.talk import complain
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import explained
@@ -53,6 +59,11 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """End when the help is written: at the end of Python nobody hears that it was not."""
+        flush_output()
+        super().exit(status, message)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -85,25 +96,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; never a traceback unless asked for."""
     one_thread_from_the_start()
     collect_garbage_rarely()
-    _open_what_is_closed()
-    _write_what_can_be()
-    parser = build_parser()
-    arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
-    if not hasattr(arguments, "run"):
-        parser.print_help(sys.stderr)
-        return 2
-    debug = arguments.debug or bool(os.environ.get("BAYESHAPTIC_DEBUG"))
+    open_what_is_closed()
+    write_what_can_be()
+    debug = bool(os.environ.get("BAYESHAPTIC_DEBUG"))
     try:
+        parser = build_parser()
+        arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
+        if not hasattr(arguments, "run"):
+            parser.print_help(sys.stderr)
+            return 2
+        debug = debug or arguments.debug
         with _warnings_in_one_line(), _stopped_in_order(alone=argv is None):
             status = arguments.run(arguments)
-            sys.stdout.flush()
+            flush_output()
             return status
     except (_Stopped, KeyboardInterrupt) as stop:
         number = signal.SIGTERM if signal.SIGTERM in stop.args else signal.SIGINT
         complain("terminated" if number == signal.SIGTERM else "interrupted")
         return 128 + number
     except (InputError, OSError) as error:
-        if isinstance(error, BrokenPipeError) and _nobody_reads():
+        if isinstance(error, BrokenPipeError) and nobody_reads():
             return 128 + 13  # as a program that SIGPIPE ends
         if debug:
             traceback.print_exc()
@@ -117,33 +129,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             "the output of the same command and --debug"
         )
         return 1
-
-
-def _open_what_is_closed() -> None:
-    """Give a process that was started without streams, as by a scheduler, ones that lead nowhere.
-
-    Their numbers would go to the next files that are opened, and what a library prints into those.
-    """
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
-
-
-def _nobody_reads() -> bool:
-    """Whether what read the output has ended, as ``head`` does; the rest then leads nowhere."""
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return True
-    return False
-
-
-def _write_what_can_be() -> None:
-    """Have terminals that lack a sign (µ, a bar of a picture) show another one in its place."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+    finally:
+        let_go()
 
 
 class _Stopped(BaseException):

@@ -99,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
             if as_json:
                 facts = {"source": entry.source, "state": entry.state, "error": entry.error}
                 more = {"seconds": entry.seconds, "done": done, "of": count}
-                print(json.dumps(facts | more), flush=True)
+                talk.write(json.dumps(facts | more))
             elif reports:
                 talk.tell(reports)
             elif entry.error is not None:

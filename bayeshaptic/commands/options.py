@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import ast
 import inspect
 import math
 from collections.abc import Mapping
@@ -149,7 +150,11 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
 
 def descriptions(kind: type) -> dict[str, str]:
     """What the docstring of a class says of each attribute, as help: lower case, no full stop."""
-    _, _, attributes = inspect.cleandoc(kind.__doc__ or "").partition("Attributes\n----------\n")
+    title = "Attributes\n----------\n"
+    said = inspect.cleandoc(kind.__doc__ or "")
+    if title not in said:  # ``python -OO`` leaves the docstring in the source alone
+        said = _docstring_in_source(kind)
+    _, _, attributes = said.partition(title)
     found: dict[str, list[str]] = {}
     names: list[str] = []
     for line in attributes.splitlines():
@@ -160,6 +165,11 @@ def descriptions(kind: type) -> dict[str, str]:
             names = line.partition(" :")[0].split(", ")
             found |= {name: [] for name in names}
     return {name: _as_help(" ".join(lines)) for name, lines in found.items()}
+
+
+def _docstring_in_source(kind: type) -> str:
+    (written,) = ast.parse(inspect.getsource(kind)).body
+    return isinstance(written, ast.ClassDef) and ast.get_docstring(written) or ""
 
 
 def _as_help(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.compiled import when_compiling
@@ -16,8 +17,12 @@ MOST_WARNINGS = 3
 
 
 def complain(message: str) -> None:
-    """One line on stderr, with the program's name before it."""
-    print(f"bayeshaptic: {one_line(message)}", file=sys.stderr)
+    """One line on stderr, with the program's name before it; lost where that cannot be written.
+
+    What it is about goes on, as Python does after a warning that is lost.
+    """
+    with suppress(OSError):
+        print(f"bayeshaptic: {one_line(message)}", file=sys.stderr)
 
 
 class Talk:
@@ -33,6 +38,7 @@ class Talk:
         self.quiet = quiet
         self._bar: Any = None
         self._compiled = False
+        self._unsaid: OSError | None = None
         if not quiet and sys.stderr.isatty():
             from tqdm import tqdm
 
@@ -45,10 +51,12 @@ class Talk:
         when_compiling(self._compiling)
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         when_compiling(None)
         if self._bar is not None:
             self._bar.close()
+        if kind is None and self._unsaid is not None:
+            raise self._unsaid
 
     def progress(self, share: float, word: str) -> None:
         """Show that a `share` (0 to 1) of the work is done, and a `word` about what comes now."""
@@ -59,7 +67,7 @@ class Talk:
     def say(self, line: str) -> None:
         """A line of the results."""
         if not self.quiet:
-            self._between_bars(lambda: print(line, flush=True))
+            self._between_bars(lambda: self.write(line))
 
     def complain(self, line: str) -> None:
         """A failure that does not end the command."""
@@ -83,6 +91,16 @@ class Talk:
                 self.say(f"  and {more} more in the report")
             self.say(f"  report: {reported.page}")
         return failed
+
+    def write(self, line: str) -> None:
+        """On stdout, quiet or not; where it is full the work goes on, and the end is an error."""
+        try:
+            print(line, flush=True)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            error.filename = "standard output"
+            self._unsaid = error
 
     def _compiling(self) -> None:
         """Say why the first run takes longer; once."""

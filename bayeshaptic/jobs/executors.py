@@ -21,6 +21,7 @@ from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -267,7 +268,8 @@ def usable_cores() -> int:
 
 
 def _in_one_line(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-    print(f"bayeshaptic: warning: {warned(message, category)}", file=sys.stderr)
+    with suppress(OSError):  # stderr that cannot be written is no reason to stop
+        print(f"bayeshaptic: warning: {warned(message, category)}", file=sys.stderr)
 
 
 def _attempt(job: Work, item: Any) -> Outcome:

@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import pickle
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -18,6 +19,7 @@ from bayeshaptic.commands.talk import Talk
 from bayeshaptic.errors import InputError
 from bayeshaptic.jobs import batch, executors
 from bayeshaptic.jobs.job import Job
+from bayeshaptic.jobs.manifest import read_manifest
 from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.report.headline import Headline
 from bayeshaptic.report.reported import Reported
@@ -203,3 +205,26 @@ def test_the_commands(
         assert cli.main(["status", str(out)]) == 1
         assert ("has ended" in capsys.readouterr().out) == ended
     assert cli.main(["status", str(tmp_path)]) == 2
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize(("stream", "status"), [("stdout", 2), ("stderr", 1)])
+@pytest.mark.parametrize("log", ["text", "json"])
+def test_a_log_that_is_full_stops_no_batch(
+    reports: Reports,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    stream: str,
+    status: int,
+    log: str,
+) -> None:
+    """The reports may be on another disk than what is said of them."""
+    out = tmp_path / "out"
+    with open("/dev/full", "w", buffering=1) as full, monkeypatch.context() as during:
+        during.setattr(sys, stream, full)
+        assert cli.main(["batch", str(folder), "-o", str(out), "--workers", "1", "--log", log]) == (
+            status
+        )
+    states = [one.state for one in read_manifest(out).values()]
+    assert states == ["done", "failed", "done"]

@@ -727,29 +727,6 @@ def test_names_that_are_no_utf_8(run: Run, phantom: Path, tmp_path: Path) -> Non
     assert run("status", "out")[0] == 0
 
 
-@pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX closes streams")
-@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
-def test_closed_streams_change_nothing(phantom: Path, tmp_path: Path, closed: str) -> None:
-    """As schedulers and services start programs."""
-    program = [sys.executable, "-m", "bayeshaptic", "inspect", phantom, "--write", "study.toml"]
-    line = f"{shlex.join(map(str, program))} {closed}"
-    done = subprocess.run(["sh", "-c", line], cwd=tmp_path, capture_output=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "study.toml").read_text(encoding="utf-8").startswith("# A study")
-
-
-@pytest.mark.skipif(os.name == "nt", reason="pipes of POSIX")
-@pytest.mark.parametrize("words", [[], ["feedback"]])
-def test_who_has_seen_enough_is_told_nothing(words: list[str]) -> None:
-    """As in ``bayeshaptic explain | head -1``."""
-    reading, writing = os.pipe()
-    os.close(reading)
-    line = [sys.executable, "-m", "bayeshaptic", "explain", *words]
-    done = subprocess.run(line, timeout=120, stdout=writing, stderr=subprocess.PIPE)
-    os.close(writing)
-    assert (done.returncode, done.stderr) == (141, b"")
-
-
 WRITING = {
     "recording": "simulate('phantom', '-o', 'a.h5')",
     "posterior": "write({'posterior': Group({'x': Variable(('d',), np.ones(99999))}, {})}, path)",

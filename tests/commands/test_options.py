@@ -18,6 +18,13 @@ STATISTICS = Path(__file__).parents[2] / "docs" / "statistics.md"
 RECORDING = Path(__file__).parents[2] / "data" / "recordings" / "phantom-free.csv.gz"
 
 
+def test_help_is_whole_without_docstrings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of ``python -OO``, or PYTHONOPTIMIZE=2."""
+    known = descriptions(Options)
+    monkeypatch.setattr(Options, "__doc__", "Options(delay_s: float | None = None)")  # dataclasses'
+    assert known["seed"] and descriptions(Options) == known
+
+
 @pytest.mark.parametrize(
     ("arguments", "options", "words"),
     [
