@@ -33,7 +33,7 @@ from bayeshaptic.commands.streams import (
 from bayeshaptic.commands.talk import complain
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import explained
-from bayeshaptic.own_process import collect_garbage_rarely
+from bayeshaptic.own_process import collect_garbage_rarely, draw_by_defaults
 from bayeshaptic.threads import one_thread_from_the_start
 from bayeshaptic.version import __version__
 
@@ -96,6 +96,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; never a traceback unless asked for."""
     one_thread_from_the_start()
     collect_garbage_rarely()
+    if argv is None:  # the process is ours
+        draw_by_defaults()
     open_what_is_closed()
     write_what_can_be()
     debug = bool(os.environ.get("BAYESHAPTIC_DEBUG"))
@@ -117,6 +119,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (InputError, OSError) as error:
         if isinstance(error, BrokenPipeError) and nobody_reads():
             return 128 + 13  # as a program that SIGPIPE ends
+        if isinstance(error, OSError) and error.filename is None and not _is_somewhere():
+            error.filename = "the working directory, change to another"
         if debug:
             traceback.print_exc()
         complain(f"error: {explained(error)}")
@@ -131,6 +135,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     finally:
         let_go()
+
+
+def _is_somewhere() -> bool:
+    """Whether there is a working directory: it may have been removed since."""
+    try:
+        return bool(os.getcwd())
+    except OSError:
+        return False
 
 
 class _Stopped(BaseException):

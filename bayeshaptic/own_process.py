@@ -1,13 +1,14 @@
 """What the command line and its workers do without, in processes that nobody else uses.
 
-Frequent garbage collection and one at the end, docstrings that libraries rewrite, and modules that
-they import for functions which no report calls.
+Frequent garbage collection and one at the end, docstrings that libraries rewrite, modules that they
+import for functions which no report calls, and settings for figures that are none of ours.
 """
 
 from __future__ import annotations
 
 import atexit
 import gc
+import os
 import sys
 from contextlib import suppress
 from functools import cache, partial
@@ -40,6 +41,15 @@ def collect_garbage_rarely(objects: int = 50_000) -> None:
     """
     gc.set_threshold(objects, 20, 20)
     atexit.register(gc.freeze)
+
+
+def draw_by_defaults() -> None:
+    """Have matplotlib leave alone what a user has set for figures of their own.
+
+    Reports are drawn by its defaults (`report/figures/drawing/look.py`).  A backend of another
+    version in MPLBACKEND kept it from being imported at all.  To be called before it is.
+    """
+    os.environ |= {"MATPLOTLIBRC": os.devnull, "MPLBACKEND": "agg"}
 
 
 @cache

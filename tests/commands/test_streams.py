@@ -66,6 +66,19 @@ def test_errors_that_cannot_be_told_leave_the_status(words: list[str], status: i
     assert (done.returncode, done.stdout) == (status, b"")
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that is used")
+def test_a_working_directory_that_is_gone_is_named(tmp_path: Path) -> None:
+    """As that of a shell whose folder somebody has removed: the error said no place."""
+    line = f"mkdir gone && cd gone && rmdir ../gone && exec {shlex.quote(sys.executable)} -c"
+    code = "from bayeshaptic.cli import main; raise SystemExit(main(['batch', 'x', '-o', 'y']))"
+    done = subprocess.run(
+        ["sh", "-c", f"{line} {shlex.quote(code)}"], cwd=tmp_path, capture_output=True, timeout=120
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith(b"bayeshaptic: error: the working directory, change to another:")
+    assert done.stderr.count(b"\n") == 1
+
+
 def program(words: list[str], unbuffered: str = "", **streams: Any) -> Any:
     """The command line in a process of its own."""
     line = [sys.executable, "-m", "bayeshaptic", *words]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+RECORDING = Path(__file__).parents[2] / "data" / "recordings" / "phantom-free.csv.gz"
 
 COMPUTE = """
 import matplotlib.figure, numpy as np
@@ -77,3 +81,18 @@ def test_nothing_is_collected_at_the_end() -> None:
         "collect_garbage_rarely()\n"
     )
     assert ended.split() == ["True"]
+
+
+def test_settings_for_other_figures_stop_no_report(tmp_path: Path) -> None:
+    """Qt4Agg is a backend of an older matplotlib, which a profile may still name."""
+    settings = tmp_path / "matplotlibrc"
+    settings.write_text("no.such: thing\nfont.size: 40\n", encoding="utf-8")
+    others = os.environ | {"MPLBACKEND": "Qt4Agg", "MATPLOTLIBRC": str(settings)}
+    pictures = []
+    for environment in (dict(os.environ), others):
+        path = tmp_path / f"{len(pictures)}.png"
+        line = [sys.executable, "-m", "bayeshaptic", "inspect", RECORDING, "--png", path]
+        done = subprocess.run(line, env=environment, capture_output=True, timeout=120)
+        assert (done.returncode, done.stderr) == (0, b"")
+        pictures.append(path.read_bytes())
+    assert pictures[0] == pictures[1]
