@@ -112,8 +112,16 @@ def owner() -> str:
 
 
 def host() -> str:
-    """This machine's name, as drafts have it."""
-    return re.sub(r"[^\w]", "_", socket.gethostname())
+    """Where processes have the numbers that they have here, as drafts name it.
+
+    The machine's name alone does not say it: containers may have that of their machine, and each
+    counts its processes by itself.
+    """
+    name = re.sub(r"[^\w]", "_", socket.gethostname())
+    try:
+        return f"{name}-{os.stat('/proc/self/ns/pid').st_ino}"
+    except OSError:  # no Linux
+        return name
 
 
 def is_alive(pid: int) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -223,3 +224,30 @@ def test_what_does_not_end_by_itself_is_ended(sign: int) -> None:
     process.send_signal(sign)
     assert process.wait(timeout=30) == 128 + sign
     process.stdout.close()
+
+
+def test_what_another_container_writes_is_left_alone(tmp_path: Path) -> None:
+    """It may have this machine's name, and its process a number that nobody has here."""
+    apart = ["unshare", "--pid", "--fork", "--mount-proc"]
+    if not shutil.which("unshare") or subprocess.run([*apart, "true"]).returncode:
+        pytest.skip("no container can be made")
+    code = f"""
+import os
+from pathlib import Path
+from bayeshaptic.files import remove_dead_drafts
+from bayeshaptic.report.draft import draft_in
+with draft_in(Path({str(tmp_path)!r})) as draft:
+    print(draft, flush=True)
+    input()
+"""
+    # Not 1, which lives everywhere.
+    line = [*apart, "sh", "-c", 'for _ in $(seq 300); do true & wait; done; "$0" -c "$1"; true']
+    with subprocess.Popen(
+        [*line, sys.executable, code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as there:
+        assert there.stdout is not None
+        draft = Path(there.stdout.readline().strip())
+        remove_dead_drafts(tmp_path)
+        assert draft.is_dir()
+        there.communicate("\n", timeout=60)
+    assert not draft.exists()
