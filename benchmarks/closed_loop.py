@@ -214,11 +214,11 @@ def limit_draws(truth: Floats, values: Floats, covariance: Floats, seed: int) ->
 
 
 def bound(case: Case) -> Floats:
-    """Least standard deviations of `NAMES` that any unbiased estimate can have: Cramer and Rao.
+    """Least covariance of `NAMES` that any unbiased estimate can have, (5, 5): Cramer and Rao.
 
     Of the innovations of a mass that a white force and the encoder's counts disturb: how the motion
     under the recorded command alone, whatever the controller, goes with the values, through the
-    steady Kalman filter.
+    steady Kalman filter.  Zero of a friction that is none.
     """
     recording = case.recording
     alone = Follower(np.zeros(1), np.ones(1))
@@ -231,9 +231,21 @@ def bound(case: Case) -> Floats:
     columns, size = innovations(case, columns[:, known])
     scale = np.linalg.norm(columns, axis=0)
     information = (columns / scale).T @ (columns / scale)
-    sd = np.full(loop.plain, np.nan)
-    sd[known] = np.sqrt(np.diag(np.linalg.inv(information))) / scale * size
-    return sd[: len(NAMES)]
+    least = np.zeros((loop.plain, loop.plain))
+    least[np.ix_(known, known)] = np.linalg.inv(information) / np.outer(scale, scale) * size**2
+    return least[: len(NAMES), : len(NAMES)]
+
+
+def with_limit(truth: Floats) -> Floats:
+    """Slopes of the values and of ln K_CR, Diaz and Gil (2010), equation (19), shape (6, 5)."""
+    of_limit = [0.0, 1 / truth[1], 0.0, 0.0, -1 / (PERIOD_S / 2 + truth[4])]
+    return np.vstack([np.eye(len(truth)), of_limit])
+
+
+def spreads(covariance: Floats, slopes: Floats) -> Floats:
+    """Standard deviations to first order; NaN where there is none."""
+    sd = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+    return np.where(sd > 0, sd, np.nan)
 
 
 def innovations(case: Case, columns: Floats) -> tuple[Floats, float]:
@@ -308,10 +320,12 @@ def beside_the_bound(count: int, noise: float, along_too: bool = False) -> None:
         except InputError as error:
             print(error)
             continue
-        least = bound(case)
-        widths.append(found.sd / least)
-        errors.append(np.abs(found.values - case.truth) / least)
-        inside.append(np.abs(found.values - case.truth) < reach * found.sd)
+        slopes = with_limit(case.truth)
+        least, sd = spreads(bound(case), slopes), spreads(found.covariance, slopes)
+        error = np.abs(slopes @ (found.values - case.truth))
+        widths.append(sd / least)
+        errors.append(error / least)
+        inside.append(error < reach * sd)
         white.append(found.disturbed is not None)
     known = np.array(white)
     beside = ", and one along the way in seven of ten" if along_too else ""
@@ -320,7 +334,7 @@ def beside_the_bound(count: int, noise: float, along_too: bool = False) -> None:
         middles = (np.nanmedian(np.array(one)[some], axis=0) for one in (widths, errors))
         held = np.mean(np.array(inside)[some], axis=0)
         print(f"{what} ({np.count_nonzero(some)}), medians of sd and |error| over the bound, held:")
-        for name, width, error, share in zip(NAMES, *middles, held, strict=True):
+        for name, width, error, share in zip((*NAMES, "ln K_CR"), *middles, held, strict=True):
             print(f"{name:8s} {width:.3g}  {error:.3g}  {100 * share:.0f} %")
 
 
