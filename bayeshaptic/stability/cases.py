@@ -35,7 +35,7 @@ class Case(Shown):
     draws : ndarray, shape (n, P)
         Equally weighted, in the order of `model.names`.
     limit : CriticalStiffness
-        Of these draws, in the same order.
+        Of these draws, in the same order; or one that was widened, of draws of its own.
     joint : str or None
         Cases with the same word here are drawn together: their draws of one number belong to one
         another, as those of several configurations of one device.
@@ -54,10 +54,11 @@ class Case(Shown):
         instance("limit", self.limit, CriticalStiffness, f"a CriticalStiffness (see {maker})")
         if self.group not in GROUPS:
             raise InputError(f"group is {self.group!r}; give one of {', '.join(GROUPS)}")
-        if np.shape(self.draws) != (len(self.limit.samples), self.model.size):
+        shape = np.shape(self.draws)  # a limit that is widened has draws of its own
+        if len(shape) != 2 or shape[1] != self.model.size:
             raise InputError(
-                f"draws have the shape {np.shape(self.draws)}; a case of this limit and model has "
-                f"{(len(self.limit.samples), self.model.size)}"
+                f"draws have the shape {shape}; of this model they have {self.model.size} columns, "
+                f"{', '.join(self.model.names)}"
             )
 
     def _lines(self) -> tuple[str, ...]:

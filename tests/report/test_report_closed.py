@@ -318,6 +318,19 @@ def test_the_curve_of_the_force_is_the_friction() -> None:
 # ---- files
 
 
+def test_a_limit_that_was_widened_has_draws_of_its_own(tmp_path: Path) -> None:
+    """What is left of the response bends it draw by draw, in as many as that takes."""
+    closed = fake_closed("unexplained", "linear")
+    limit = closed.analysis.limit
+    some = slice(0, len(limit.samples) // limit.chains // 3 * limit.chains)
+    parts = {name: getattr(limit, name)[some] for name in ("samples", "frequency_hz", "group")}
+    fewer = replace(limit, **parts)
+    vars(closed.analysis)["limit"] = fewer
+    page = write_report(closed, tmp_path / "out")
+    walls = json.loads((page.parent / "limits.json").read_text())
+    assert walls and page.stat().st_size > 0
+
+
 @pytest.mark.parametrize(
     ("state", "family"),
     [("consistent", "linear"), ("unexplained", "linear"), *(("explained", f) for f in FAMILIES)],
