@@ -26,18 +26,18 @@ FARED = {
 }
 FARED_HIDDEN = (91, 799)  # the same, two in three with an effect of any size, most of them unseen
 FARED_IN_LOOP = (
-    "Recorded in closed loop, and read through what the controller followed. How such intervals "
+    "Read as a closed loop, through what the controller followed. How such intervals "
     "fared: of 9 simulated devices that nobody held, 7 of the 90 % intervals held the true limit, "
     "and 2 missed it by less than 0.01 dB."
 )
 FARED_THROUGHOUT = (
-    "Recorded in closed loop, and read through noise in the command that the motion does not make. "
+    "Read as a closed loop, through noise in the command that the motion does not make. "
     "How such intervals fared: of 82 simulated loops with such noise that had a stiffness, in "
     "whichever way they were read, 76 of the 90 % intervals held the true limit, and three lay "
     "above it, by less than 0.05 dB."
 )
 FARED_DIRECT = (
-    "Recorded in closed loop. How such intervals fared: of 227 simulated loops that were read so, "
+    "Read as a closed loop. How such intervals fared: of 227 simulated loops that were read so, "
     "206 of the 90 % intervals held the true limit, and four stiffnesses lay above it (by 0.01, "
     "0.07, 0.5 and 15 %)."
 )
