@@ -82,12 +82,14 @@ class Period:
         return np.asarray(lines[..., self.excited - self.harmonics[0]] * self.scale)
 
 
-def one_period(etfe: Etfe) -> Period:
+def one_period(etfe: Etfe, witness: Floats | None = None) -> Period:
     """The averaged period of a periodic recording.
 
     Parameters
     ----------
     etfe : Etfe
+    witness : ndarray, shape (samples,), optional
+        Another position to average instead of the recording's.
 
     Raises
     ------
@@ -101,7 +103,7 @@ def one_period(etfe: Etfe) -> Period:
     samples = repetition.period
     stop = min(repetition.stop + 1, recording.samples)
     first = stop - spectra.periods * samples
-    position = recording.position[first:stop]
+    position = (recording.position if witness is None else witness)[first:stop]
     centres = position.reshape(-1, samples).mean(axis=1)
     creep = float(centres[-1] - centres[0]) / max((len(centres) - 1) * samples, 1)  # a sample
     position = position - creep * np.arange(len(position))
