@@ -322,10 +322,10 @@ def beside_the_bound(count: int, noise: float, along_too: bool = False) -> None:
             continue
         slopes = with_limit(case.truth)
         least, sd = spreads(bound(case), slopes), spreads(found.covariance, slopes)
-        error = np.abs(slopes @ (found.values - case.truth))
+        off = np.abs(slopes @ (found.values - case.truth))
         widths.append(sd / least)
-        errors.append(error / least)
-        inside.append(error < reach * sd)
+        errors.append(off / least)
+        inside.append(off < reach * sd)
         white.append(found.disturbed is not None)
     known = np.array(white)
     beside = ", and one along the way in seven of ten" if along_too else ""

@@ -33,13 +33,19 @@ def recorded(device: str, held: bool, seed: int) -> Recording:
     """The published device under the paper's noise."""
     bench = Bench.from_device(device, held, "grasped" if held else "free")
     made = simulate(bench, WhiteNoise(bench.force_rms, 400.0, 0.5, SECONDS), seed=seed)
-    units = {"force_unit": bench.force_unit, "position_unit": bench.position_unit}
-    return recording_from_arrays(made.force, made.position, bench.period_s, **units)
+    return recording_from_arrays(
+        made.force,
+        made.position,
+        bench.period_s,
+        force_unit=bench.force_unit,
+        position_unit=bench.position_unit,
+    )
 
 
 def of_the_devices(count: int) -> None:
     """Print how far the other two likelihoods are from that of the response."""
-    through, lines = [], []
+    through: list[Floats] = []
+    lines: list[Floats] = []
     for device in ("lhifam", "phantom"):
         for held in (False, True):
             name = "grasped" if held else "free"
