@@ -150,7 +150,7 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
         ),
         (
             lambda: bh.Case("a", "held", FREE_MODEL, np.ones((32, 5)), LIMIT),
-            "shape (32, 5); a case",
+            "shape (32, 5); of this model they have 6 columns, m1, ",
         ),
         (
             lambda: bh.Case("a", "held", FREE_MODEL, np.ones((32, 6)), 3),
