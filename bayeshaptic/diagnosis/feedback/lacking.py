@@ -35,7 +35,7 @@ from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 
 # Student's t of eight degrees of freedom: 1 in 1,000 for each of some twenty forces.  With what
-# `is_worth_it` asks, a law joins in 5 of 199 loops with a force along the way that is no law,
+# `is_worth_it` asks, a law joins in 5 of 200 loops with a force along the way that is no law,
 # something speaks against a limit in 6 (benchmarks/closed_loop.py); neither in any of 20 clean ones
 # of benchmarks/strangers.
 _SEEN = 5.04
