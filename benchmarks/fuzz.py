@@ -41,8 +41,8 @@ from bayeshaptic.inference.saved import checkpoint
 from bayeshaptic.recordings import read_frf, read_recording, read_study
 from bayeshaptic.recordings.readers import apart, reader_for
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-test_readers = importlib.import_module("test_readers")
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+every_format = importlib.import_module("every_format")
 
 MOST_SECONDS = 10.0
 MOST_KB = 2 << 20
@@ -94,9 +94,9 @@ report batch relay simulate population inspect a.csv study.toml none.csv . lhifa
 def doors(folder: Path) -> dict[str, tuple[bytes, str, Door]]:
     """A good file, its name, and what reads it, of each format."""
     found: dict[str, tuple[bytes, str, Door]] = {}
-    for name, write in test_readers.WRITERS.items():
+    for name, write in every_format.WRITERS.items():
         write(folder / name)
-        mapping = test_readers.mapping_of(name)
+        mapping = every_format.mapping_of(name)
         key = {"a.csv": "csv", "a.mat": "mat5", "b.mat": "mat73", "a.h5": "hdf5", "a.npz": "npz"}
         content = (folder / name).read_bytes()
         found[key.get(name, name)] = (
@@ -300,9 +300,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
         folder = Path(place)
         cases = doors(folder)
+        if unknown := set(arguments.formats) - set(cases):
+            parser.error(f"no format {', '.join(unknown)}; there are {', '.join(cases)}")
         for library in LIBRARIES:
             importlib.import_module(library)
-        test_readers.write_csv(folder / "a.csv")
+        every_format.write_csv(folder / "a.csv")
         (folder / "study.toml").write_text(STUDY)
         for name in arguments.formats or cases:
             began = time.perf_counter()

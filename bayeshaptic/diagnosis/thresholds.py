@@ -113,7 +113,7 @@ def convincing(gain_fit: float, gain_choose: float, size: int) -> bool:
 
     And explains what it was fitted to: these are twice as many windows, so that an effect that is
     worth less there has gained elsewhere by chance.  Of 46 recordings with promised effects
-    (``benchmarks/reports.py``) 45 are explained with that, or consistent, and of the 30 that
+    (``benchmarks/costs/reports.py``) 45 are explained with that, or consistent, and of the 30 that
     were run without it each is what it was.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Do intervals hold the truth?  The reduced version of benchmarks/posterior_coverage.py."""
+"""Do intervals hold the truth?  The reduced version of `benchmarks/coverage/`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from benchmarks.calibration import combined, one_recording, uniform
+from benchmarks.coverage.calibration import combined, one_recording, uniform
 
 # Grasped devices take three times as long: fewer of them here.
 JOBS = [(case, 300 + seed) for case in ("lhifam free", "phantom free") for seed in range(4)]

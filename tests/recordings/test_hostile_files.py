@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from every_format import WRITERS, mapping_of
 from hypothesis import HealthCheck, given, settings, strategies as st
-from test_readers import WRITERS, mapping_of
 
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_readers import WRITERS, mapping_of
+from every_format import WRITERS, mapping_of
 
 from bayeshaptic import cli
 from bayeshaptic.commands.inspect import lines

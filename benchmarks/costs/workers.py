@@ -1,7 +1,7 @@
 """How much sooner two workers end a batch than one: processes, and a local Dask cluster.
 
-    python -m benchmarks.workers                     24 recordings of 10 s
-    python -m benchmarks.workers --recordings 12
+    python -m benchmarks.costs.workers                     24 recordings of 10 s
+    python -m benchmarks.costs.workers --recordings 12
 
 The recordings are of both devices, free and held, every sixth one with dry friction; all runs are
 `bayeshaptic batch` with the defaults, one after the other. On a machine that does other work the

@@ -1,6 +1,6 @@
 """Calibration and information of the ETFE's windows, on simulated recordings.
 
-    python -m benchmarks.etfe_calibration [recordings] [--limit RECORDINGS]
+    python -m benchmarks.coverage.etfe_calibration [recordings] [--limit RECORDINGS]
 
 For each device and length: the rms of the pulls of a free scale and delay (1 is right), their
 widths over the Cramer-Rao bound with the noise known and nothing leaking (1 is the best there is),
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "references"))
 
 from linear_bench import (
     LHIFAM_FREE,
@@ -28,14 +28,14 @@ from linear_bench import (
     Device,
     tremor_density,
 )
-from test_windows import PERIOD, cramer_rao, record, scale_and_delay
+from scale_and_delay import PERIOD, cramer_rao, record, scale_and_delay
 
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability import etfe_critical_stiffness
-from benchmarks.calibration import CASES, truth_and_bench
+from benchmarks.coverage.calibration import CASES, truth_and_bench
 
 DEVICES = {
     "LHIfAM free": (LHIFAM_FREE, 1.0, 5e-7),

@@ -1,6 +1,6 @@
 """Does the sampler draw from the posterior?  Against a long run of emcee's plain stretch move.
 
-    python -m benchmarks.agreement [--steps 30000] [--cases lhifam-user phantom-free ...]
+    python -m benchmarks.coverage.agreement [--steps 30000] [--cases lhifam-user phantom-free ...]
 
 The stretch run has no adaptation that could be wrong.  Printed are the largest difference of a mean
 in standard deviations, the largest difference of a standard deviation, and what the stretch run
@@ -23,7 +23,7 @@ import bayeshaptic as bh  # noqa: E402
 from bayeshaptic.inference.coordinates import coordinates  # noqa: E402
 from bayeshaptic.inference.diagnostics import diagnose  # noqa: E402
 from bayeshaptic.inference.sampling.density import Density  # noqa: E402
-from benchmarks.speed import DATA, RECORDINGS  # noqa: E402
+from benchmarks.costs.speed import DATA, RECORDINGS  # noqa: E402
 
 WALKERS = 96
 RISKS = (0.05, 0.01, 0.001)

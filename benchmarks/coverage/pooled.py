@@ -1,6 +1,6 @@
 """Several short recordings of one device as one: how often the intervals hold what the bench was.
 
-    python -m benchmarks.pooled [COUNT]
+    python -m benchmarks.coverage.pooled [COUNT]
 
 Steps of a rigid device with dry friction under a PD controller, four recordings of 0.5 to 3 s;
 and white noise on free devices in open loop, eight recordings of 1 to 5 s.  In every other series
@@ -28,7 +28,8 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, run_loop, simulate
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
-from benchmarks.closed_loop import DRAWS, PERIOD_S, gains, limit_draws
+from benchmarks.closed_loop import DRAWS, limit_draws
+from benchmarks.recordings.one_mass import PERIOD_S, gains
 
 DAY_TO_DAY = 0.1  # of the friction, standard deviation
 

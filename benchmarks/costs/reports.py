@@ -1,6 +1,6 @@
 """CPU time of whole reports beside an older version of the package, recording by recording.
 
-    python -m benchmarks.reports [--old PATH] [--old-limit S] [--only new] [--count 60]
+    python -m benchmarks.costs.reports [--old PATH] [--old-limit S] [--only new] [--count 60]
                                  [--seconds S] [-o FILE]
 
 60 simulated recordings of 30 s, in an order that makes the first few like the rest: 14 clean, 30 of
@@ -96,7 +96,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin none after that")
     parser.add_argument("-o", "--output", type=Path, default=HERE / "reports.jsonl")
     asked = parser.parse_args()
-    versions = {"new": HERE.parent} | ({"old": asked.old.resolve()} if asked.old else {})
+    versions = {"new": HERE.parents[1]} | ({"old": asked.old.resolve()} if asked.old else {})
     versions = {name: at for name, at in versions.items() if asked.only in (None, name)}
     limits = {"new": MOST_S, "old": asked.old_limit}
     rows: dict[tuple[int, str], dict[str, Any]] = {}

@@ -1,6 +1,7 @@
 """Where the time of a report goes, and how many effective draws a second the sampler gives.
 
-    python -m benchmarks.speed [--recording FILE --device NAME] [--ess 8000] [--stretch-steps 2000]
+    python -m benchmarks.costs.speed [--recording FILE --device NAME] [--ess 8000]
+        [--stretch-steps 2000]
 
 First the whole command, `bayeshaptic report ... --no-loop`, as a process of its own, and the same
 work stage by stage; then the sampler beside emcee's plain stretch move on the same density, fit and
@@ -30,7 +31,7 @@ from bayeshaptic.inference.coordinates import coordinates  # noqa: E402
 from bayeshaptic.inference.diagnostics import diagnose  # noqa: E402
 from bayeshaptic.inference.sampling.density import Density  # noqa: E402
 
-DATA = Path(__file__).resolve().parents[1] / "data" / "recordings"
+DATA = Path(__file__).resolve().parents[2] / "data" / "recordings"
 RECORDINGS = (
     ("lhifam-free", "lhifam", bh.free),
     ("lhifam-user", "lhifam", bh.grasped),

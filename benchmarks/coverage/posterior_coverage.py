@@ -1,6 +1,6 @@
 """Do 90 % intervals cover the truth in 90 % of recordings, and are they as narrow as they can be?
 
-    python -m benchmarks.posterior_coverage [--recordings 25] [--ess 2000] [--processes 2]
+    python -m benchmarks.coverage.posterior_coverage [--recordings 25] [--ess 2000] [--processes 2]
         [--first 0] [--without-device] [--scatter 0.15] [--damper 0]
 
 Truths are drawn from the priors of both devices, or scattered around their tables, free and
@@ -17,7 +17,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from benchmarks.calibration import CASES, Outcome, Setting, calibrate, combined, uniform  # noqa: E402
+from benchmarks.coverage.calibration import CASES, Outcome, Setting, calibrate, combined, uniform  # noqa: E402
 
 
 def pooled(outcomes: list[Outcome], field: str) -> np.ndarray:

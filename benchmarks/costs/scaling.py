@@ -1,6 +1,6 @@
 """How the likelihood and K_CR cost more with more lines, poles and walkers; exponents of each.
 
-python -m benchmarks.scaling
+python -m benchmarks.costs.scaling
 """
 
 from __future__ import annotations
