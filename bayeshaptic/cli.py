@@ -33,7 +33,7 @@ from bayeshaptic.commands.streams import (
 from bayeshaptic.commands.talk import complain
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import explained
-from bayeshaptic.own_process import collect_garbage_rarely, draw_by_defaults
+from bayeshaptic.jobs.own_process import collect_garbage_rarely, draw_by_defaults
 from bayeshaptic.threads import one_thread_from_the_start
 from bayeshaptic.version import __version__
 

@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the reports; 0 where all came out, else 1."""
     import json
 
-    from bayeshaptic.own_process import lighten_imports
+    from bayeshaptic.jobs.own_process import lighten_imports
 
     lighten_imports()  # before what loads SciPy
     from bayeshaptic.commands.talk import Talk

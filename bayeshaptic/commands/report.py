@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; 0, or 1 where a recording of a study failed."""
-    from bayeshaptic.own_process import collect_garbage_rarely, lighten_imports
+    from bayeshaptic.jobs.own_process import collect_garbage_rarely, lighten_imports
 
     collect_garbage_rarely(1_000_000)
     lighten_imports()  # before what loads SciPy

@@ -29,7 +29,7 @@ from typing import Any
 
 from bayeshaptic.errors import InputError, describe, warned
 from bayeshaptic.faq import entry, explained
-from bayeshaptic.own_process import collect_garbage_rarely, lighten_imports
+from bayeshaptic.jobs.own_process import collect_garbage_rarely, lighten_imports
 from bayeshaptic.threads import THREADS
 from bayeshaptic.types import Executor, Work
 

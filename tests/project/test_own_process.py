@@ -26,7 +26,7 @@ print(float(stats.skew(x)), float(special.logsumexp(x)), linalg.expm(np.diag(x[:
 print(interpolate.CubicSpline(np.arange(60.0), x)(7.5).tolist(), fft.rfft(x)[3])
 print(elementwise.find_root(lambda t: t * t - 2, (0.0, 2.0)).x)
 """
-LEAVE = "from bayeshaptic.own_process import lighten_imports\nlighten_imports()\n"
+LEAVE = "from bayeshaptic.jobs.own_process import lighten_imports\nlighten_imports()\n"
 ASK = """
 print("nperseg" in signal.welch.__doc__, "facecolor" in str(matplotlib.figure.Figure.set.__doc__))
 """
@@ -77,7 +77,7 @@ def test_nothing_is_collected_at_the_end() -> None:
     ended = printed(
         "import atexit, gc\n"
         "atexit.register(lambda: print(gc.get_freeze_count() > 0))\n"
-        "from bayeshaptic.own_process import collect_garbage_rarely\n"
+        "from bayeshaptic.jobs.own_process import collect_garbage_rarely\n"
         "collect_garbage_rarely()\n"
     )
     assert ended.split() == ["True"]
