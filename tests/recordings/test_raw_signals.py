@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.raw_signals import clipping, count_of, increment_unit
 
 RNG = np.random.default_rng(0)
 MOTION = np.cumsum(np.cumsum(RNG.normal(size=5000)) * 1e-5 * np.hanning(5000))
@@ -39,6 +40,18 @@ def test_a_file_rounded_to_a_sixth_of_a_count() -> None:
     count = 5.992e-6
     reading = np.round(count * np.round(MOTION / count), 6)
     assert increment_unit(reading) == pytest.approx(count, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("seen", "declared", "known"),
+    [(2e-4, None, 2e-4), (0, 1e-4, 1e-4), (2e-4, 1e-4, 2e-4), (1e-5, 1e-4, 1e-4)],
+)
+def test_a_count_is_as_declared_or_coarser(
+    seen: float, declared: float | None, known: float
+) -> None:
+    reading = seen * np.round(MOTION / seen) if seen else MOTION
+    recording = Recording(reading, reading, 1e-3, encoder_resolution=declared)
+    assert count_of(recording) == pytest.approx(known, rel=1e-6)
 
 
 def test_clipping() -> None:

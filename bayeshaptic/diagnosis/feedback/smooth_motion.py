@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from bayeshaptic.numerics.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.raw_signals import count_of
 from bayeshaptic.types import Bools, Floats
 
 _BAND = 0.05  # of the sampling rate: in which the motion that laws are over is smooth
@@ -28,11 +28,6 @@ class SmoothMotion:
     velocity: Floats = field(repr=False)
     acceleration: Floats = field(repr=False)
     jerk: Floats = field(repr=False)
-
-
-def count_of(recording: Recording) -> float:
-    """One count of the encoder, as it is said or seen; zero where neither."""
-    return recording.encoder_resolution or increment_unit(recording.position) or 0.0
 
 
 def below_the_counts(recording: Recording) -> float:

@@ -15,7 +15,7 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe, RandomSpectra
 from bayeshaptic.recordings.response.local_polynomial import leakage_terms
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.raw_signals import count_of
 from bayeshaptic.types import Floats
 
 _LINES, _FEWEST = 60, 5  # lines in a stretch above the band, and stretches that tell a floor
@@ -175,9 +175,9 @@ def _floor_inside(centre_hz: Floats, noise: Floats) -> float:
 
 def _counts_a_sample(recording: Recording) -> float:
     """Mean increment in counts; infinite where there are none."""
-    unit = max(increment_unit(recording.position) or 0.0, recording.encoder_resolution or 0.0)
+    count = count_of(recording)
     steps = float(np.mean(np.abs(np.diff(recording.position))))
-    return steps / unit if unit > 0 else np.inf
+    return steps / count if count > 0 else np.inf
 
 
 def _of_the_sensor(recording: Recording, frequency_hz: NDArray[Any]) -> Floats:

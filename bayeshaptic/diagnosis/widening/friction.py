@@ -16,7 +16,7 @@ from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.structures import GROUND_DAMPERS
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.raw_signals import count_of
 from bayeshaptic.types import Floats
 
 # Share of the response that changes, in the slowest octave: 0.35 to 2.5 in eleven recordings
@@ -61,8 +61,7 @@ def _as_damper(fit: Fit, etfe: Etfe) -> float:
         return np.inf
     steps = np.diff(recording.position)
     # The difference of two rounded numbers.
-    rounding = max(increment_unit(recording.position) or 0.0, recording.encoder_resolution or 0.0)
-    moved = float(np.var(steps)) - rounding**2 / 6
+    moved = float(np.var(steps)) - count_of(recording) ** 2 / 6
     if not moved > 0:
         return np.inf
     friction = float(np.sqrt(changing_share(fit, etfe))) * float(np.std(recording.force))

@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.recordings.recording import Recording
+
 # A clipped extreme holds more samples than this, and this many times those of the level beside it.
 CLIPPED_SAMPLES = 30
 CLIPPED_RATIO = 3
+_COARSER = 1.05  # times a declared count: positions in steps up to this are in that
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,17 @@ def _refine(steps: NDArray[np.float64], unit: float) -> float | None:
             return unit if np.abs(part / unit - counts).mean() < 0.08 else None
         # Grow by what the unit's own error allows, but at least to the next increment.
         reach = max(2 * reach, 1.01 * float(steps[len(part)]) / unit)
+
+
+def count_of(recording: Recording) -> float:
+    """One count of the encoder: as declared, or what the position moves by where that is coarser.
+
+    Zero where it is neither declared nor seen.  Whoever asks what the positions are multiples of,
+    whatever was declared, asks `increment_unit`: where they were averaged they are of nothing.
+    """
+    declared = recording.encoder_resolution or 0.0
+    seen = increment_unit(recording.position) or 0.0
+    return seen if seen > _COARSER * declared else declared
 
 
 def clipping(signal: NDArray[Any]) -> Clipping:

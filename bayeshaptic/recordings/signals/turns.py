@@ -50,6 +50,7 @@ def unwrapped(
     if found is None:
         return position, ()
     jumps, size, most = found
+    # As declared it is exact, as a whole counter of it has to be.
     count = encoder_resolution or increment_unit(position)
     if count is not None and (bits := _bits(size / count, most / count)):
         text = f"The position jumps by {2**bits:,} counts, as a counter of {bits} bits does,"
