@@ -28,6 +28,7 @@ from bayeshaptic.recordings.response.local_polynomial import (
 )
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra
 from bayeshaptic.recordings.signals.excitation import find_repetition
+from bayeshaptic.recordings.signals.raw_signals import count_of
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
 from bayeshaptic.types import Bools, Complexes, Floats, Ints
 
@@ -138,7 +139,7 @@ def _between(etfe: Etfe) -> _Between | None:
     force = whole.force - whole.force.mean()
     settled = whole.position[samples - etfe.spectra.periods * repetition.period :]
     settled = settled.reshape(-1, repetition.period)
-    rounding = hidden_rounding(settled, number // periods, recording.encoder_resolution)
+    rounding = hidden_rounding(settled, number // periods, count_of(recording))
     found = _Between(number, frequency, position, rounding / len(settled), force, windows)
     return replace(found, position=found.without_leakage(position[:, None])[:, 0])
 

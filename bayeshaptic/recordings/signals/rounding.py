@@ -9,7 +9,7 @@ from bayeshaptic.types import Floats, Ints
 _ORDERS = np.arange(1, 100)  # of the rounding error's Fourier series
 
 
-def hidden_rounding(position: Floats, harmonics: Ints, count: float | None = None) -> Floats:
+def hidden_rounding(position: Floats, harmonics: Ints, count: float) -> Floats:
     r"""Variance that rounding adds to lines of the DFT and that the periods' scatter cannot show.
 
     Of a motion whose increments are normal, of mean square D over a lag, the rounding error has
@@ -26,8 +26,8 @@ def hidden_rounding(position: Floats, harmonics: Ints, count: float | None = Non
     position : ndarray, shape (M, p)
         M periods.
     harmonics : ndarray of int, shape (L,)
-    count : float, optional
-        One encoder count; the smallest increment of the position by default.
+    count : float
+        One encoder count; zero where there is none.
 
     Returns
     -------
@@ -35,10 +35,9 @@ def hidden_rounding(position: Floats, harmonics: Ints, count: float | None = Non
         For a DFT over the square root of the number of samples: what repeats gathers in the
         harmonics, hence M times its variance a sample.
     """
-    increments = np.abs(np.diff(position.ravel()))
-    if count is None:
-        count = float(np.min(increments[increments > 0], initial=np.inf))
     floating_point = (np.finfo(float).eps * np.abs(position).max()) ** 2
+    if not count > 0:
+        return np.full(len(harmonics), floating_point)
     scatter = float(np.mean(np.var(position, axis=0, ddof=1))) / count**2
     sigma, _ = _repeated()
     noise = float(np.interp(scatter, _scatter(), sigma))

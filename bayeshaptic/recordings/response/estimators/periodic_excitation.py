@@ -31,6 +31,7 @@ from bayeshaptic.recordings.signals.excitation import (
     find_repetition,
     noise_of,
 )
+from bayeshaptic.recordings.signals.raw_signals import count_of
 from bayeshaptic.recordings.signals.rounding import hidden_rounding
 from bayeshaptic.recordings.signals.sweeps import moves_until
 
@@ -195,7 +196,7 @@ def _spectra(
     shrink = 1 / np.sqrt(1 + leverage)
     freedom = width - LEAKAGE_TERMS + 1
     answer = (spectrum[line] - below) * shrink
-    rounding = hidden_rounding(position, harmonics, recording.encoder_resolution)
+    rounding = hidden_rounding(position, harmonics, count_of(recording))
     floor = rounding + (REPEATS_TO * np.abs(answer)) ** 2
     return PeriodicSpectra(
         frequency_hz=harmonics / (samples * recording.period_s),
