@@ -1,4 +1,7 @@
-"""The exact motion of a mass and a viscous damper under a force that is held."""
+"""The exact motion of a mass and a viscous damper under a force that is held.
+
+`kernels.py` beside it contains `integrated`, and is to be compiled anew where that is changed.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,19 @@ import numpy as np
 from bayeshaptic.types import Floats
 
 
-def over_span(mass: float, damping: float, span_s: float) -> tuple[Floats, Floats]:
-    """Position and velocity `span_s` later, (2, 2), and what a held unit force adds, (2,)."""
-    rate = damping / mass
+def integrated(rate: float, span_s: float) -> tuple[float, float, float]:
+    """What is kept of a velocity that fades at a rate, and its integrals, once and twice."""
     slight = 1e-6  # of a velocity, lost in the time: a series then is exact
     if rate * span_s > slight:
         kept = math.exp(-rate * span_s)
         once = (1 - kept) / rate
-        twice = (span_s - once) / rate
-    else:
-        kept = 1 - rate * span_s
-        once, twice = span_s * (1 - 0.5 * rate * span_s), 0.5 * span_s**2
+        return kept, once, (span_s - once) / rate
+    return 1 - rate * span_s, span_s * (1 - 0.5 * rate * span_s), 0.5 * span_s * span_s
+
+
+def over_span(mass: float, damping: float, span_s: float) -> tuple[Floats, Floats]:
+    """Position and velocity `span_s` later, (2, 2), and what a held unit force adds, (2,)."""
+    kept, once, twice = integrated(damping / mass, span_s)
     return np.array([[1.0, once], [0.0, kept]]), np.array([twice, once]) / mass
 
 

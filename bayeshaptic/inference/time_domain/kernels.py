@@ -1,4 +1,7 @@
-"""One mass with friction and other forces on it in a sampled loop, in one compiled pass."""
+"""One mass with friction and other forces on it in a sampled loop, in one compiled pass.
+
+It contains `integrated` of `held_force.py`, and is to be compiled anew where that is changed.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.compiled import kernel
+from bayeshaptic.inference.time_domain.held_force import integrated
 from bayeshaptic.types import Floats
 
 _REVERSALS = 4  # within one hold; the velocity then is next to nothing
+_integrated = kernel(inline=True)(integrated)
 
 
 @kernel(inline=True)
@@ -36,15 +41,8 @@ def _coast(
         pull = net / mass
         span = t
         for _ in range(2):  # to the end, or to where it comes to rest
-            if rate * span > 1e-6:
-                left = math.exp(-rate * span)
-                once = (1 - left) / rate
-                twice = (span - once) / rate
-            else:
-                left = 1 - rate * span
-                once = span * (1 - 0.5 * rate * span)
-                twice = 0.5 * span * span
-            end = v * left + pull * once
+            kept, once, twice = _integrated(rate, span)
+            end = v * kept + pull * once
             if span < t or v * end >= 0 or v == 0:
                 break
             share = -rate * v / pull
