@@ -18,9 +18,10 @@ from bayeshaptic.diagnosis.trials import beside
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.forces import called_for as tried, search, slopes
 from bayeshaptic.diagnosis.trials.forces.along import Along
+from bayeshaptic.diagnosis.trials.forces.form import Form
 from bayeshaptic.diagnosis.trials.forces.search import _damped, _scan
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
-from bayeshaptic.diagnosis.trials.forces.slopes import Form, Reach, linearised, nudges_of, spread
+from bayeshaptic.diagnosis.trials.forces.slopes import Reach, linearised, nudges_of, spread
 from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.diagnosis.trials.linear import linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
@@ -253,7 +254,7 @@ def test_what_a_step_along_a_ridge_leaves_is_foreseen() -> None:
         return of_windows.deviations(point.theta[None])[0] * np.sqrt(2 * weight[chosen])[:, None]
 
     reach = Reach(nudges_of(bench), np.full(1, 0.01))
-    residuals, start, _ = linearised(bench, Form.of(here), here, np.zeros(1), reach, FIT)
+    residuals, start, _ = linearised(bench, Form.of(here), here, reach, FIT)
     moved = np.append(search_box(state.model)[0].coordinate(there.theta[None])[0], np.log(1.5))
     foreseen = residuals(moved[None])[0].reshape(2, chosen.sum(), -1)[..., : left(here).shape[1]]
     error = np.linalg.norm(foreseen[0] + 1j * foreseen[1] - left(there))
@@ -310,7 +311,7 @@ def test_slopes_over_the_linear_parameters_are_taken_again_only_where_something_
         acting = replace(begun.forces[0], strength=np.exp(stronger) * begun.strength)
         found = bench.as_it_is((acting,), theta)
         reach = Reach(nudges, near)
-        *_, used = linearised(bench, form, found, np.zeros(1), reach, (0, 2), along=along)
+        *_, used = linearised(bench, form, found, reach, (0, 2), along=along)
         return len(simulated), used
 
     base = 2  # the motion itself, and with a little more of the force

@@ -12,7 +12,8 @@ import numpy as np
 
 from bayeshaptic.diagnosis.state import FIT, fit_part
 from bayeshaptic.diagnosis.trials.forces.along import Along
-from bayeshaptic.diagnosis.trials.forces.slopes import NUDGE, Form, Reach, linearised, nudges_of
+from bayeshaptic.diagnosis.trials.forces.form import Form
+from bayeshaptic.diagnosis.trials.forces.slopes import NUDGE, Reach, linearised, nudges_of
 from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
@@ -69,12 +70,12 @@ def fit_force(tryout: Tryout, found: Point) -> Point:
 def _fit(tryout: Tryout, found: Point) -> Point:
     """The best by Gauss and Newton's steps from `found`."""
     form, found = Form.of(found), _near(tryout, found, found.forces, found.theta)
-    first, before, best = form.logs(found), found, found
-    reach, furthest = Reach(nudges_of(tryout), np.ones(len(first))), 1.0
-    rounds = 20 if len(first) == 1 else 60  # ridges of several numbers are long
+    before, best, numbers = found, found, len(form.begun)
+    reach, furthest = Reach(nudges_of(tryout), np.ones(numbers)), 1.0
+    rounds = 20 if numbers == 1 else 60  # ridges of several numbers are long
     along: Along | None = None
     for _ in range(rounds):
-        step, along = _joint_step(tryout, form, best, form.logs(best) - first, reach, along)
+        step, along = _joint_step(tryout, form, best, reach, along)
         if not np.isfinite([*step.theta, *step.logs]).all():  # slopes of a motion that runs away
             break
         factor, point = _advanced(tryout, form, best, step)
@@ -88,7 +89,7 @@ def _fit(tryout: Tryout, found: Point) -> Point:
         elif furthest > _CLOSE and best.gain_fit > 0:
             # Once more, with slopes close by; not of what is worth nothing here: that is refused.
             furthest = _CLOSE
-            reach = replace(reach, near=np.full(len(first), _CLOSE))
+            reach = replace(reach, near=np.full(numbers, _CLOSE))
         else:
             break
     return best
@@ -170,17 +171,12 @@ def _onward(tryout: Tryout, form: Form, before: Point, best: Point) -> Point:
 
 
 def _joint_step(
-    tryout: Tryout,
-    form: Form,
-    best: Point,
-    moved: Floats,
-    reach: Reach,
-    along: Along | None,
+    tryout: Tryout, form: Form, best: Point, reach: Reach, along: Along | None
 ) -> tuple[_Step, Along]:
     """To the linear parameters, strength and shape that fit best together."""
-    residuals, start, along = linearised(tryout, form, best, moved, reach, FIT, along=along)
+    residuals, start, along = linearised(tryout, form, best, reach, FIT, along=along)
     here, low, high = search_box(tryout.model)
-    low = np.concatenate([low, np.full(len(moved), -_MOST)])
+    low = np.concatenate([low, np.full(len(form.begun), -_MOST)])
     high = np.concatenate([high, np.minimum(form.highest - form.logs(best), _MOST)])
     phi, _ = minimise(residuals, start, low, high, 20, 1e-4)
     size = tryout.model.size

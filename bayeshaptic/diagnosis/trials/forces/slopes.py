@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.state import Change, share, weights
 from bayeshaptic.diagnosis.trials.forces.along import Along, slopes_along
+from bayeshaptic.diagnosis.trials.forces.form import Form
 from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout, answered
-from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import search_box
 from bayeshaptic.inference.likelihood import Likelihood
@@ -31,46 +31,6 @@ _SDS, _LEAST, _FARTHEST = 5.0, 3e-3, 0.1  # the same of a linear parameter
 _ALL = (0, 1, 2, 3)  # windows
 Further = tuple[Floats, bool]  # a motion, and whether a force against the ground makes it
 _SMOOTH = 1e-3  # share of these distances where a sticking mass's motion goes smoothly
-
-
-@dataclass(frozen=True)
-class Form:
-    """What of forces is fitted: the logarithms of the strength and the tuned shape of each."""
-
-    forces: tuple[Acting, ...]
-    highest: Floats
-    """The largest logarithms, shape (J,)."""
-    shape: NDArray[np.bool_]
-    """Which of them are of a shape."""
-    grounded: NDArray[np.bool_]
-    """Which of them are of a force that acts against the ground."""
-
-    @classmethod
-    def of(cls, found: Point) -> Form:
-        bounds, shape, grounded = [], [], []
-        for effect in (one.effect for one in found.forces):
-            bounds += [np.inf, *(effect.most.get(name, np.inf) for name in effect.tuned)]
-            shape += [False, *(True for _ in effect.tuned)]
-            grounded += [effect.grounded] * (1 + len(effect.tuned))
-        numbers = np.array(shape, bool), np.array(grounded, bool)
-        return cls(found.forces, np.log(bounds), *numbers)
-
-    def logs(self, found: Point) -> Floats:
-        numbers = []
-        for one in found.forces:
-            numbers += [abs(one.strength), *(one.effect.shape[name] for name in one.effect.tuned)]
-        return np.asarray(np.log(numbers))
-
-    def at(self, logs: Floats) -> tuple[Acting, ...]:
-        """The forces."""
-        numbers = iter(np.exp(np.minimum(logs, self.highest)).tolist())
-        found = []
-        for one in self.forces:
-            strength = float(np.sign(one.strength)) * next(numbers)
-            tuned = {name: next(numbers) for name in one.effect.tuned}
-            effect = replace(one.effect, shape={**one.effect.shape, **tuned})
-            found.append(Acting(effect, strength))
-        return tuple(found)
 
 
 def spread(tryout: Tryout, found: Point) -> tuple[Floats, Floats]:
@@ -108,9 +68,8 @@ def slopes_of_all(
     over `further` motions; and which of the linear parameters are free.
     """
     form = Form.of(found)
-    none = 0 * form.logs(found)
-    reach = Reach(nudges_of(tryout), _SMOOTH + none)
-    residuals, start, _ = linearised(tryout, form, found, none, reach, _ALL, further)
+    reach = Reach(nudges_of(tryout), np.full(len(form.begun), _SMOOTH))
+    residuals, start, _ = linearised(tryout, form, found, reach, _ALL, further)
     here, size = residuals(start), tryout.model.size
     slopes = jacobian(residuals, start, here)[0]
     _, low, high = search_box(tryout.model)
@@ -150,7 +109,6 @@ def linearised(
     tryout: Tryout,
     form: Form,
     found: Point,
-    moved: Floats,
     reach: Reach,
     parts: tuple[int, ...],
     further: Sequence[Further] = (),
@@ -167,8 +125,6 @@ def linearised(
     form : Form
     found : Point
         Where the slopes are taken.
-    moved : ndarray, shape (J,)
-        How far the logarithms have come since the fit began.
     reach : Reach
     parts : tuple of int
         Which of the windows are fitted.
@@ -185,30 +141,10 @@ def linearised(
     along : Along
         The slopes over the linear parameters that were used.
     """
-    simulation = tryout.simulation
-    logs, theta, near = form.logs(found), found.theta, reach.near
-    forces = form.at(logs)
-    added = simulation.added(forces, theta, found.motion)
-
-    def driven(acting: tuple[Acting, ...]) -> Floats:
-        return simulation.driven(acting, theta, simulation.added_near(acting, theta, added))
-
-    total = driven(forces)  # as near as the others, so that differences are theirs
-
-    def slope(step: Floats, side: float) -> Floats:
-        return (driven(form.at(logs + side * step)) - total) / side
-
-    sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
-    slopes = [slope(unit, side) for side, unit in zip(sides, np.eye(len(logs)), strict=True)]
-    here = coordinates(tryout.model)
-    phi = here.coordinate(theta[None])[0]
-    strengths = ~form.shape
-    at, nearest = np.concatenate([phi, logs[strengths]]), float(near[strengths].max(initial=0.0))
-    if along is None or not along.holds(at, nearest):
-        moving = [one.moves_a_mass for one in forces]
-        each = slopes_along(tryout, forces, theta, added, nearest * reach.linear)
-        along = Along(each, np.flatnonzero(strengths)[moving], at, nearest)
-    slopes = [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
+    theta, forces = found.theta, form.at(form.logs(found))
+    added = tryout.simulation.added(forces, theta, found.motion)
+    slopes = _over_logarithms(tryout, form, found, added, reach.near)
+    along = _over_linear(tryout, form, found, added, reach, along)
     changes = tryout.changes(forces, added)
     etfe = tryout.without(changes, theta)
     columns = [
@@ -221,8 +157,42 @@ def linearised(
     if tryout.held and grounded.any():
         columns = _with_a_hand(tryout, changes, etfe, theta, columns, grounded)
     windows, weight = _weighed_windows(tryout, etfe, theta, columns, parts)
-    start = np.concatenate([phi, np.zeros(len(logs) + len(further))])[None]
+    phi = coordinates(tryout.model).coordinate(theta[None])[0]
+    start = np.concatenate([phi, np.zeros(len(slopes) + len(further))])[None]
+    moved = form.logs(found) - form.begun
     return _residuals(tryout.model, windows, weight, form.shape, moved, start, along), start, along
+
+
+def _over_logarithms(
+    tryout: Tryout, form: Form, found: Point, added: Floats, near: Floats
+) -> list[Floats]:
+    """Slopes of the motion over each logarithm of strength or shape; zero where it runs away."""
+    simulation, theta, logs = tryout.simulation, found.theta, form.logs(found)
+
+    def driven(logs: Floats) -> Floats:
+        acting = form.at(logs)
+        return simulation.driven(acting, theta, simulation.added_near(acting, theta, added))
+
+    total = driven(logs)  # as near as the others, so that differences are theirs
+    sides = near * np.where(np.isfinite(form.highest), -NUDGE, NUDGE)  # away from a bound
+    steps = zip(sides, np.eye(len(logs)), strict=True)
+    slopes = ((driven(logs + side * unit) - total) / side for side, unit in steps)
+    return [slope if np.isfinite(slope[0]) else np.zeros_like(slope) for slope in slopes]
+
+
+def _over_linear(
+    tryout: Tryout, form: Form, found: Point, added: Floats, reach: Reach, known: Along | None
+) -> Along:
+    """Slopes of the motion over the linear parameters: those `known`, where they hold."""
+    strengths, logs = ~form.shape, form.logs(found)
+    phi = coordinates(tryout.model).coordinate(found.theta[None])[0]
+    at, near = np.concatenate([phi, logs[strengths]]), reach.near[strengths].max(initial=0.0)
+    if known is not None and known.holds(at, float(near)):
+        return known
+    forces = form.at(logs)
+    moving = [one.moves_a_mass for one in forces]
+    slopes = slopes_along(tryout, forces, found.theta, added, near * reach.linear)
+    return Along(slopes, np.flatnonzero(strengths)[moving], at, float(near))
 
 
 def _with_a_hand(
