@@ -9,11 +9,11 @@ about as well (J. A. Hoeting et al., "Bayesian model averaging", Statistical Sci
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Bools, Floats
 
 SIMPLEST, LAG = "coulomb", "jerk"
 # Share of the held-out error, of both halves, that the simplest law must take away, and any other
@@ -59,6 +59,11 @@ class Regression:
     force: Floats
     start: Sequence[str]
     positive: Set[str] = frozenset()
+
+    def where(self, some: Bools) -> Regression:
+        """The same of some samples alone."""
+        columns = {name: column[some] for name, column in self.columns.items()}
+        return replace(self, columns=columns, force=self.force[some])
 
     def design(self, names: Sequence[str]) -> Floats:
         """The columns of these terms, shape (N, J)."""

@@ -32,7 +32,7 @@ from bayeshaptic.diagnosis.feedback.smooth_motion import (
     below_the_counts,
     smooth_motion,
 )
-from bayeshaptic.diagnosis.feedback.terms import Term, terms_of
+from bayeshaptic.diagnosis.feedback.terms import Column, Term, terms_of
 from bayeshaptic.errors import InputError
 from bayeshaptic.numerics.low_pass import low_pass
 from bayeshaptic.recordings.recording import Recording
@@ -130,40 +130,34 @@ def inverse_dynamics(
     path = smooth_motion(recording, cutoff_hz)
     start, library = terms_of(recording, path)
     known = {term.name: term for term in (*start, *library)}
-    column = {
-        name: (low.thin if term.linear else low.smooth)(term.column(path))
-        for name, term in known.items()
-    }
-    force = low.smooth(recording.force)
-    asked = Regression(
-        {name: one[moving] for name, one in column.items()},
-        force[moving],
+    whole = Regression(
+        {name: low.of(term, path) for name, term in known.items()},
+        low.smooth(recording.force),
         [term.name for term in start],
         {term.name for term in library if term.positive},
     )
+    asked = whole.where(moving)
     step_s = low.every * recording.period_s
     if terms is None:
         chosen, steps, tried = choose_terms(asked, step_s * np.count_nonzero(moving))
     else:
         chosen, steps, tried = _asked_for(asked, terms)
-    design = asked.design(chosen)
     block_s = 1.0  # residuals further apart are taken to be independent
-    value, sd = _solve(design, force[moving], int(block_s / step_s))
     late = low.smooth(np.concatenate([recording.force[:1], recording.force[:-1]]))[moving]
-    sd = np.hypot(sd, _LAG * (np.linalg.lstsq(design, late, rcond=None)[0] - value))
+    value, sd = _solve(asked.design(chosen), asked.force, late, int(block_s / step_s))
     if terms is None:
         sd = np.hypot(sd, between_sets(asked, chosen, value))
-    explained = np.stack([column[name] for name in chosen], axis=1) @ value
-    left = (force - explained)[moving]
+    explained = whole.design(chosen) @ value
+    left = (whole.force - explained)[moving]
     return InverseDynamics(
         tuple(Term(name, known[name].title, known[name].unit) for name in chosen),
         value,
         sd,
         tuple(steps),
         tuple(tried),
-        float(np.linalg.norm(left) / np.linalg.norm(force[moving])),
+        float(np.linalg.norm(left) / np.linalg.norm(asked.force)),
         low.picked(recording.period_s * np.arange(recording.samples)),
-        force,
+        whole.force,
         np.asarray(explained, dtype=np.float64),
         moving,
         SmoothMotion(*(low.thin(a) for a in astuple(path))),
@@ -202,6 +196,10 @@ class _LowPass:
     def smooth(self, signal: Floats) -> Floats:
         return self.thin(low_pass(signal, self.cutoff_hz, self.period_s))
 
+    def of(self, term: Column, path: SmoothMotion) -> Floats:
+        """The column of a term."""
+        return (self.thin if term.linear else self.smooth)(term.column(path))
+
 
 def _moving(recording: Recording, low: _LowPass) -> Bools:
     """Where the device moves, of the samples that are kept; refused where that is too seldom."""
@@ -233,10 +231,11 @@ def _asked_for(
     return chosen, steps, []
 
 
-def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:
-    """Coefficients, and standard deviations that allow for correlation within blocks.
+def _solve(design: Floats, force: Floats, late: Floats, block: int) -> tuple[Floats, Floats]:
+    """Coefficients, and standard deviations that allow for correlation within blocks, and for lag.
 
     Sandwich of the scores summed over blocks (K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986).
+    `late` is the force of a sample before.
     """
     value = np.linalg.lstsq(design, force, rcond=None)[0]
     blocks_a_term = 5  # of a recording that has fewer seconds, shorter blocks
@@ -249,4 +248,5 @@ def _solve(design: Floats, force: Floats, block: int) -> tuple[Floats, Floats]:
     # No less than without correlation.
     left = force - design @ value
     sd = np.maximum(sd, np.sqrt(np.diag(bread) * (left @ left) / (len(force) - design.shape[1])))
+    sd = np.hypot(sd, _LAG * (np.linalg.lstsq(design, late, rcond=None)[0] - value))
     return np.asarray(value, dtype=np.float64), np.asarray(sd, dtype=np.float64)
