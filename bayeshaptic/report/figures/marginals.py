@@ -34,15 +34,8 @@ def draw(result: Result) -> Figure:
             _marginal(axes, analysis, index)
         else:
             axes.axis("off")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside upper center",
-        ncols=3,
-        frameon=False,
-        fontsize=style.SMALL + 0.5,
-    )
+    handles, _ = panels[0].get_legend_handles_labels()
+    style.shared_legend(figure, handles, "upper center", 3)
     return figure
 
 

@@ -92,6 +92,12 @@ def legend(axes: Axes, **options: Any) -> None:
     axes.legend(**settings)
 
 
+def shared_legend(figure: Figure, handles: Sequence[Any], place: str, columns: int) -> None:
+    """The same of all panels, at a side of the figure."""
+    settings: dict[str, Any] = {"loc": f"outside {place}", "ncols": columns}
+    figure.legend(handles=handles, fontsize=SMALL + 0.5, frameon=False, **settings)
+
+
 def rows(axes: Axes, names: Sequence[str], right: Sequence[str] = ()) -> None:
     """A row a name, the first one on top; `right` stands beside the rows' other end."""
     from matplotlib.ticker import FixedFormatter, FixedLocator

@@ -31,13 +31,8 @@ def draw(guidance: Guidance) -> Figure:
     _shares(left, guidance.shares)
     _elasticities(right, found, names)
     if len(found) > 1:
-        figure.legend(
-            *right.get_legend_handles_labels(),
-            loc="outside lower right",
-            ncols=2,
-            fontsize=style.SMALL + 0.5,
-            frameon=False,
-        )
+        handles, _ = right.get_legend_handles_labels()
+        style.shared_legend(figure, handles, "lower right", 2)
     return figure
 
 

@@ -100,10 +100,4 @@ def _legend(figure: Figure, kinds: list[str], jumps: bool) -> None:
     if jumps:
         dots = Line2D([], [], color=style.OTHER, linestyle=":", label="another crossing binds")
         handles.append(dots)
-    figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=len(handles),
-        fontsize=style.SMALL + 0.5,
-        frameon=False,
-    )
+    style.shared_legend(figure, handles, "lower center", len(handles))

@@ -63,15 +63,8 @@ def draw(closed: Closed) -> Figure:
     for axes, (over, row) in zip(panels, curves.items(), strict=True):
         _panel(axes, closed, over, row, force.factor, steps=4 if len(curves) < 5 else 2)
     panels[0].set_ylabel(f"force, {force.unit}", fontsize=style.FONT)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside upper left",
-        ncols=1,
-        frameon=False,
-        fontsize=style.SMALL + 0.5,
-    )
+    handles, _ = panels[0].get_legend_handles_labels()
+    style.shared_legend(figure, handles, "upper left", 1)
     return figure
 
 

@@ -57,13 +57,9 @@ def draw(table: LimitTable) -> Figure:
     left.set_ylim(-0.02, 1.02)
     _reach(left, right, [samples for _, samples in curves], row.factor)
     if len(curves) > 1:
-        figure.legend(
-            *left.get_legend_handles_labels(),
-            loc="outside lower center",
-            ncols=_columns(label for label, _ in curves),
-            fontsize=style.SMALL + 0.5,
-            frameon=False,
-        )
+        handles, _ = left.get_legend_handles_labels()
+        columns = _columns(label for label, _ in curves)
+        style.shared_legend(figure, handles, "lower center", columns)
     return figure
 
 

@@ -31,15 +31,8 @@ def draw(table: LimitTable, rules: Rules | None) -> Figure:
     panels = np.atleast_1d(figure.subplots(1, count, sharey=False))
     for axes, part in zip(panels, table.filters, strict=True):
         draw_on(axes, part, table, rules)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside lower center",
-        ncols=3,
-        fontsize=style.SMALL + 0.5,
-        frameon=False,
-    )
+    handles, _ = panels[0].get_legend_handles_labels()
+    style.shared_legend(figure, handles, "lower center", 3)
     return figure
 
 
