@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.periodic.answering import STEP, Chain, Settled, total
-from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
-from bayeshaptic.diagnosis.periodic.joint import Basis, Joint
+from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance, turn
+from bayeshaptic.diagnosis.periodic.joint import Basis, Joint, unit_forces
 from bayeshaptic.diagnosis.periodic.period import Period
 from bayeshaptic.diagnosis.periodic.steady_motion import (
     Applied,
     Following,
     Responses,
     Steady,
-    apply,
     no_force,
     places_of,
     steady_motion,
@@ -59,18 +58,13 @@ def settled(
     period, forces = joint.period, joint.forces
     steady, following = Steady(joint.model.system(theta), period, applied.places), Following()
     for _ in range(_TURNS):
-        motions = steady(applied)
-        total = {place: np.zeros(period.samples) for place in applied.places}
-        for basis, size in zip(forces, strength, strict=True):
-            total[basis.place] += size * basis.mean(motions[basis.place], period)
-        applied = apply(period, following.toward(total), motions)
+        _, applied = turn(steady, forces, strength, applied, following)
         if following.is_within(exact):
             break
     else:
         return None
     motions = steady(applied)
-    unit = [period.transform(b.mean(motions[b.place], period)) for b in forces]
-    here = joint.with_unit(np.array(unit))
+    here = joint.with_unit(unit_forces(forces, motions, period))
     left = here.residual(theta, strength)[here.own]
     return Settled(theta, strength, motions, applied, here, _real(left))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.diagnosis.periodic.joint import Basis, Joint
+from bayeshaptic.diagnosis.periodic.joint import Basis, Joint, unit_forces
 from bayeshaptic.diagnosis.periodic.period import Period
 from bayeshaptic.diagnosis.periodic.steady_motion import (
     Applied,
@@ -118,8 +118,7 @@ def balance(
         motions, applied = _settle(
             model.system(theta), period, forces, strength, applied, following
         )
-        unit = [period.transform(basis.mean(motions[basis.place], period)) for basis in forces]
-        joint = Joint(model, windows, period, forces, np.array(unit), own)
+        joint = Joint(model, windows, period, forces, unit_forces(forces, motions, period), own)
         new_theta, new_strength = joint.solve(theta, strength)
         sds = joint.sds(new_theta) * max(joint.rms(new_theta, new_strength), 1.0)
         change = np.max(np.abs(new_strength - strength) / sds, initial=0.0)
@@ -152,9 +151,8 @@ def promise(
     with noise as large as what is left.  It is cheap, and tells which forces are worth a balance.
     """
     forces = (*part.forces, basis)
-    unit = [period.transform(b.mean(part.motions[b.place], period)) for b in forces]
-    own = np.flatnonzero(fitted)
-    joint = Joint(part.model, windows, period, forces, np.array(unit), own)
+    unit, own = unit_forces(forces, part.motions, period), np.flatnonzero(fitted)
+    joint = Joint(part.model, windows, period, forces, unit, own)
     left, slope = joint.linearised(part.theta, np.append(part.strength, 0.0))
     along = np.linalg.qr(slope)[0].T @ left  # the new force is the last column
     without = float(left @ left - along[:-1] @ along[:-1])
@@ -173,9 +171,20 @@ def _settle(
     """Motion from forces and forces from motion, in turn, for given parameters and strengths."""
     turns, steady = 3, Steady(system, period, applied.places)
     for _ in range(turns if forces else 1):
-        motions = steady(applied)
-        total = {place: np.zeros(period.samples) for place in applied.places}
-        for basis, size in zip(forces, strength, strict=True):
-            total[basis.place] += size * basis.mean(motions[basis.place], period)
-        applied = apply(period, following.toward(total), motions)
+        motions, applied = turn(steady, forces, strength, applied, following)
     return motions, applied
+
+
+def turn(
+    steady: Steady,
+    forces: tuple[Basis, ...],
+    strength: Floats,
+    applied: Applied,
+    following: Following,
+) -> tuple[dict[Place, Motion], Applied]:
+    """The motion under forces, and the forces that this motion asks for."""
+    period, motions = steady.period, steady(applied)
+    total = {place: np.zeros(period.samples) for place in applied.places}
+    for basis, size in zip(forces, strength, strict=True):
+        total[basis.place] += size * basis.mean(motions[basis.place], period)
+    return motions, apply(period, following.toward(total), motions)

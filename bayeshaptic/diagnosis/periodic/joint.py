@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 
@@ -55,6 +55,13 @@ class Basis:
             motion.command,
         )
         return np.asarray(self.force(each).mean(axis=0))
+
+
+def unit_forces(
+    forces: Sequence[Basis], motions: Mapping[Place, Motion], period: Period
+) -> Complexes:
+    """Harmonics of a unit of each force that follows from the motions, shape (J, H)."""
+    return np.array([period.transform(one.mean(motions[one.place], period)) for one in forces])
 
 
 class Joint:
