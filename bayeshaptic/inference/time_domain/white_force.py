@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.counts.fit import by_counts
@@ -26,7 +25,7 @@ from bayeshaptic.inference.time_domain.innovations.filter import (
 )
 from bayeshaptic.inference.time_domain.mass_in_loop import SHARED, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES
-from bayeshaptic.inference.time_domain.whiteness import FEWEST, LAGS, by_chance
+from bayeshaptic.inference.time_domain.whiteness import FEWEST, LAGS, by_chance, correlated
 from bayeshaptic.inference.time_domain.widths.of_values import covariance_of_shared
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
@@ -199,8 +198,8 @@ def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
     plain = _unexplained(error, columns[:, : loop.plain])
     with_waves = _unexplained(error, columns)
     along = moving * (plain @ plain / (with_waves @ with_waves) - 1)
-    correlated = _correlated(plain, clear)
-    return bool(correlated < by_chance(LAGS) and along < by_chance(2 * WAVES))
+    white = correlated(np.where(clear, plain, 0.0)) < by_chance(LAGS)
+    return bool(white and along < by_chance(2 * WAVES))
 
 
 def told_apart(columns: Floats) -> bool:
@@ -212,15 +211,3 @@ def told_apart(columns: Floats) -> bool:
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     inflated = np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True))
     return bool(np.max(inflated[:SHARED]) < _APART)
-
-
-def _correlated(left: Floats, clear: NDArray[np.bool_]) -> float:
-    """Box and Pierce's sum of squared correlations of `LAGS` lags, of the clear samples.
-
-    G. E. P. Box and D. A. Pierce, Journal of the American Statistical Association 65, 1970.
-    """
-    noise = np.where(clear, left, 0.0)
-    noise /= np.sqrt(np.mean(noise[clear] ** 2))
-    known = clear.astype(float)
-    lags = range(1, LAGS + 1)
-    return float(sum((noise[k:] @ noise[:-k]) ** 2 / (known[k:] @ known[:-k]) for k in lags))

@@ -24,7 +24,7 @@ from bayeshaptic.inference.time_domain.innovations.filter import Disturbance
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB
 from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, DELAY, MASS, SHARED
 from bayeshaptic.inference.time_domain.uneven import WAVES, Way, waves
-from bayeshaptic.inference.time_domain.whiteness import FEWEST, LAGS, by_chance
+from bayeshaptic.inference.time_domain.whiteness import FEWEST, LAGS, by_chance, correlated
 from bayeshaptic.inference.time_domain.widths.correlated import SURELY
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
@@ -98,14 +98,7 @@ def _like_noise(found: Likeliest) -> bool:
 
 
 def _correlated(found: Likeliest) -> float:
-    """Sum of squared correlations of `LAGS` lags, each over what its own products vary by.
-
-    So their sizes may differ, as where the mass rests (R. S. Deo, Journal of Econometrics 99,
-    2000, of the test of Box and Pierce).
-    """
-    new = after(found.counts, found.point).innovations
-    products = (new[k:] * new[:-k] for k in range(1, LAGS + 1))
-    return float(sum(np.sum(one) ** 2 / np.maximum(one @ one, 1e-300) for one in products))
+    return correlated(after(found.counts, found.point).innovations)
 
 
 def _along(found: Likeliest) -> float:
