@@ -36,7 +36,10 @@ _SIZES = 10.0 ** np.arange(-6.0, 0.1, 0.4)  # of the command, that a white force
 # large the disturbance is in these.
 _CLOSER = (0.2, 0.05, 0.012, 0.003)
 _ROUNDS = 10  # fits at most, each with the filter of the last; most settle in three
-_STILL = 0.1  # standard deviations, that no value moves by where they have settled
+# Standard deviations, that no value moves by where they have settled.  So far values may be from
+# those of their own filter; with less, fits that would have settled run out of rounds, and those of
+# equal weights stay.
+_STILL = 0.1
 # Variance over that with all other values known (variance inflation).  Of 17 series of steps in
 # which it is larger one would have mass, damping and delay 13 standard deviations off.
 _APART = 100.0

@@ -30,7 +30,9 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
-# Times that, with few cells, from which on more of them do not make it white.
+# Times what chance makes of a white series.  With few cells innovations seem less white than they
+# are; beyond this many more cells do not make them white, and are not tried.  A larger number costs
+# time with loops that are refused in the end, a smaller one leaves some that would do to a filter.
 _HOPELESS = 10.0
 # Of a count, that the white force moves the mass by within a sample.  With less nearly every count
 # is certain, and what is fitted is the few that are not; with more a velocity that is cut at zero

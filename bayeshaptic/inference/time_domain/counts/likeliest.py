@@ -14,12 +14,15 @@ WHITE = SHARED  # in a point: behind the values, the logarithm of the white forc
 ROUGH = 4  # cells of a count, with which values are looked for at first
 _FINER = (8, 16, 32)  # cells, where fewer are not enough
 # Squared changes of the samples' log likelihoods with twice the cells, added: with less than this
-# likelihoods are as smooth with fewer.
+# likelihoods are as smooth with fewer.  A smaller number takes more cells, or finds none enough;
+# with a larger one the likelihood is that of the cells, too.
 _ENOUGH = 4.0
-_WORK = 5e6  # normals that are added in one of some 150 passes: half a minute in all
+# Normals that are added in one of some 150 passes: half a minute in all.  What takes more is left
+# to a filter; with a larger number a long recording would take minutes.
+_WORK = 5e6
 _LOWEST = np.array([1e-12, 0.0, 0.0, -np.inf, 0.0, -np.inf])
 _SIZES = 10.0 ** np.arange(-4.0, 0.6, 0.25)  # of the command, that a white force may have
-_STEPS, _TRIALS = 30, 8
+_STEPS, _TRIALS = 30, 8  # of an ascent, and of a step, at most: what takes more has not settled
 _FEW = 8  # steps, after which it shows whether more are worth while
 # Of the standard deviation, that slopes are taken over.  Over more than one, what single counts say
 # of a value that they know well counts several times.
@@ -28,7 +31,7 @@ _RIDGE = 1e-10  # of the information: what two values share that nothing tells a
 _ABOUT = 0.1  # log likelihood that a step gains at the end, where it is only looked for
 _SETTLED = 0.03  # the same, where it is found
 _AWAY = 2.0  # standard deviations off, where the likelihood is looked at
-_AGAIN = 3  # ascents from what was found there
+_AGAIN = 3  # ascents from what was found there: after them nothing has settled
 
 
 @dataclass(frozen=True, eq=False)
