@@ -18,7 +18,7 @@ from bayeshaptic.inference.population.infer import (
     prior_moments,
     study_coordinates,
 )
-from bayeshaptic.inference.population.reweighting import _from_own, _sampled
+from bayeshaptic.inference.population.reweighting import Wanted, from_own, sampled
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.types import Floats
@@ -133,10 +133,11 @@ def test_all_ways_to_one_recording_agree(posteriors: list[Posterior]) -> None:
     phi, _ = found.chains.in_order(2000)
     rng = np.random.default_rng(5)
     rest = cavity(found._hierarchy, 1, phi, rng)
-    ways = [found.recordings[1], _from_own(posteriors[1], "ben", rest, here, 4000, rng)]
-    sampled = _sampled(posteriors[1], "ben", rest, here, 4000, rng, np.random.SeedSequence(6))
-    assert sampled is not None and sampled.good
-    x = here.coordinate(sampled.draws)
+    wanted = Wanted(posteriors[1], "ben", here, 4000, rng)
+    ways = [found.recordings[1], from_own(wanted, rest)]
+    exact = sampled(wanted, rest, np.random.SeedSequence(6))
+    assert exact is not None and exact.good
+    x = here.coordinate(exact.draws)
     for way in ways:
         other = here.coordinate(way.draws)
         # A thousand effective draws: 0.04 standard deviations of a difference of means.

@@ -13,7 +13,7 @@ likelihood times what the others say (`cavity.py`):
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -97,12 +97,11 @@ def reweight(
     here : Coordinates
     seed : numpy.random.SeedSequence
     """
-    return tuple(
-        _one(posterior, user, r, hierarchy, below, phi, here, own)
-        for r, (posterior, user, own) in enumerate(
-            zip(posteriors, users, seed.spawn(len(users)), strict=True)
-        )
-    )
+    count, found = len(below.recordings), []
+    for r, own in enumerate(seed.spawn(len(users))):
+        wanted = Wanted(posteriors[r], users[r], here, count, np.random.default_rng(own))
+        found.append(_by_the_cheapest(wanted, r, hierarchy, below, phi, own))
+    return tuple(found)
 
 
 def redescribed(
@@ -132,161 +131,143 @@ def redescribed(
     return replace(hierarchy, likelihoods=tuple(found)) if changed else hierarchy
 
 
-def _one(
-    posterior: Posterior,
-    user: str,
+@dataclass(frozen=True)
+class Wanted:
+    """A recording, and what of it is wanted.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        Of the recording by itself.
+    user : str
+    here : Coordinates
+        Of the study.
+    count : int
+        Draws that are wanted.
+    rng : numpy.random.Generator
+    """
+
+    posterior: Posterior
+    user: str
+    here: Coordinates
+    count: int
+    rng: np.random.Generator
+
+    def own(self, most: int) -> Floats:
+        """No more than so many of the recording's own draws, shape (n, D)."""
+        every = -(-len(self.posterior.draws) // most)
+        return self.here.coordinate(self.posterior.draws[::every])
+
+    def own_weight(self, rest: Cavity, x: Floats) -> Floats:
+        """Of the recording's own draws: log density of the cavity over that of its own prior."""
+        prior = self.posterior.model.log_prior(self.here.natural(x)) + self.here.log_jacobian(x)
+        return np.asarray(rest(x) - prior, float)
+
+    @property
+    def cut_off(self) -> bool:
+        """Whether its own draws end at a wall beyond which `here` goes on."""
+        x, here, model = self.own(_FEW), self.here, self.posterior.model
+        end = here.coordinate(np.array([model.prior(name).support[0] for name in model.names]))
+        leans = 3.0  # standard deviations
+        return bool(np.any((end > here.lowest) & (x.mean(axis=0) - end < leans * x.std(axis=0))))
+
+    def resampled(self, x: Floats, log_weight: Floats, how: str) -> Reweighted:
+        """Each of `x` as often as its weight says (systematic resampling)."""
+        weight = normalised(log_weight)
+        number = effective(weight)
+        # No more than there are to choose from: what comes again and again would count as many.
+        count = int(np.ceil(min(self.count, number, _MOST)))
+        steps = (np.arange(count) + self.rng.uniform()) / count
+        chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(x) - 1)
+        draws = self.here.natural(x[self.rng.permutation(chosen)])
+        k = pareto_k(log_weight[np.isfinite(log_weight)])
+        return Reweighted(self.user, draws, number, k, how, number / len(x))
+
+    def enough(self, found: Reweighted) -> bool:
+        """Whether nothing better is worth looking for: 20 draws below 0.1 % risk are enough."""
+        least = _ENOUGH if self.count > _ENOUGH else _HARMLESS * self.count
+        return found.good and found.effective >= least
+
+    def alone(self) -> Reweighted:
+        """The recording by itself."""
+        draws = self.posterior.draws[:: -(-len(self.posterior.draws) // self.count)]
+        return Reweighted(self.user, draws, float(self.posterior.effective), float("nan"), ALONE)
+
+
+def _by_the_cheapest(
+    wanted: Wanted,
     r: int,
     hierarchy: Hierarchy,
     below: Below,
     phi: Floats,
-    here: Coordinates,
     seed: np.random.SeedSequence,
 ) -> Reweighted:
     """Recording `r` by the cheapest way that is good enough, else by the best of all three."""
-    rng = np.random.default_rng(seed)
-    count = len(below.recordings)
-    first = _from_levels(posterior, user, r, hierarchy, below, here, rng)
-    if posterior.windows is None or (first is not None and _enough(first, count)):
-        return first or _alone(posterior, user, count)
-    rest = cavity(hierarchy, r, phi, rng)
-    second = (
-        None if _cut_off(posterior, here) else _from_own(posterior, user, rest, here, count, rng)
-    )
-    if second is not None and _enough(second, count):
+    first = from_levels(wanted, below.recordings[:, r], hierarchy.likelihoods[r])
+    if wanted.posterior.windows is None or (first is not None and wanted.enough(first)):
+        return first or wanted.alone()
+    rest = cavity(hierarchy, r, phi, wanted.rng)
+    second = None if wanted.cut_off else from_own(wanted, rest)
+    if second is not None and wanted.enough(second):
         return second
-    third = _sampled(posterior, user, rest, here, count, rng, seed.spawn(1)[0])
+    third = sampled(wanted, rest, seed.spawn(1)[0])
     good = [one for one in (first, second, third) if one is not None and one.good]
-    return max(good, key=lambda one: one.effective, default=_alone(posterior, user, count))
+    return max(good, key=lambda one: one.effective, default=wanted.alone())
 
 
-def _enough(found: Reweighted, count: int) -> bool:
-    """Whether nothing better is worth looking for: 20 draws below 0.1 % risk are enough."""
-    wanted = _ENOUGH if count > _ENOUGH else _HARMLESS * count
-    return found.good and found.effective >= wanted
-
-
-def _from_levels(
-    posterior: Posterior,
-    user: str,
-    r: int,
-    hierarchy: Hierarchy,
-    below: Below,
-    here: Coordinates,
-    rng: np.random.Generator,
+def from_levels(
+    wanted: Wanted, x: Floats, description: Callable[[Floats], Floats]
 ) -> Reweighted | None:
     """Draws of the levels inside the walls, weighed by exact over described likelihood."""
-    x = below.recordings[:, r]
-    x = x[np.all(x >= here.lowest, axis=1)]
-    exact = exact_likelihood(posterior, here, x) if len(x) else None
-    if posterior.windows is not None and (exact is None or not np.isfinite(exact).any()):
+    x = x[np.all(x >= wanted.here.lowest, axis=1)]
+    exact = exact_likelihood(wanted.posterior, wanted.here, x) if len(x) else None
+    if wanted.posterior.windows is not None and (exact is None or not np.isfinite(exact).any()):
         return None
-    log_weight = np.zeros(len(x)) if exact is None else exact - hierarchy.likelihoods[r](x)
-    return _resampled(x, log_weight, user, here, len(below.recordings), rng, DESCRIBED)
+    log_weight = np.zeros(len(x)) if exact is None else exact - description(x)
+    return wanted.resampled(x, log_weight, DESCRIBED)
 
 
-def _from_own(
-    posterior: Posterior,
-    user: str,
-    rest: Cavity,
-    here: Coordinates,
-    count: int,
-    rng: np.random.Generator,
-) -> Reweighted:
+def from_own(wanted: Wanted, rest: Cavity) -> Reweighted:
     """The recording's own draws, weighed by the cavity over its own prior."""
     most_own = 40_000
-    x = _own(posterior, here, most_own)
-    return _resampled(x, _own_weight(posterior, rest, here, x), user, here, count, rng, OWN)
+    x = wanted.own(most_own)
+    return wanted.resampled(x, wanted.own_weight(rest, x), OWN)
 
 
-def _own(posterior: Posterior, here: Coordinates, most: int) -> Floats:
-    every = -(-len(posterior.draws) // most)
-    return here.coordinate(posterior.draws[::every])
-
-
-def _cut_off(posterior: Posterior, here: Coordinates) -> bool:
-    """Whether its own draws end at a wall beyond which `here` goes on."""
-    x = _own(posterior, here, _FEW)
-    model = posterior.model
-    end = here.coordinate(np.array([model.prior(name).support[0] for name in model.names]))
-    leans = 3.0  # standard deviations
-    return bool(np.any((end > here.lowest) & (x.mean(axis=0) - end < leans * x.std(axis=0))))
-
-
-def _own_weight(posterior: Posterior, rest: Cavity, here: Coordinates, x: Floats) -> Floats:
-    prior = posterior.model.log_prior(here.natural(x)) + here.log_jacobian(x)
-    return np.asarray(rest(x) - prior, float)
-
-
-def _resampled(
-    x: Floats,
-    log_weight: Floats,
-    user: str,
-    here: Coordinates,
-    count: int,
-    rng: np.random.Generator,
-    how: str,
-) -> Reweighted:
-    """Each of `x` as often as its weight says (systematic resampling)."""
-    weight = normalised(log_weight)
-    number = effective(weight)
-    # No more than there are to choose from: draws that come again and again would count as many.
-    count = int(np.ceil(min(count, number, _MOST)))
-    steps = (np.arange(count) + rng.uniform()) / count
-    chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(x) - 1)
-    draws = here.natural(x[rng.permutation(chosen)])
-    k = pareto_k(log_weight[np.isfinite(log_weight)])
-    return Reweighted(user, draws, number, k, how, number / len(x))
-
-
-def _sampled(
-    posterior: Posterior,
-    user: str,
-    rest: Cavity,
-    here: Coordinates,
-    count: int,
-    rng: np.random.Generator,
-    seed: np.random.SeedSequence,
-) -> Reweighted | None:
+def sampled(wanted: Wanted, rest: Cavity, seed: np.random.SeedSequence) -> Reweighted | None:
     """Draws from exact likelihood times cavity; None where the sampler does not converge."""
-    low = here.lowest
+    low, rng = wanted.here.lowest, wanted.rng
 
     def density(x: Floats) -> Floats:
         value = np.full(len(x), -np.inf)
         inside = np.all((x >= low) & (np.abs(x) < 600), axis=1)
         if inside.any():
-            exact = exact_likelihood(posterior, here, x[inside])
+            exact = exact_likelihood(wanted.posterior, wanted.here, x[inside])
             assert exact is not None
             value[inside] = exact + rest(x[inside])
         return value
 
     start = 3000
-    x = _own(posterior, here, start)
-    weight = tempered(_own_weight(posterior, rest, here, x), 0.05 * len(x))
+    x = wanted.own(start)
+    weight = tempered(wanted.own_weight(rest, x), 0.05 * len(x))
     mean = weight @ x
     off = x - mean
     first = student(mean, (weight[:, None] * off).T @ off, 8.0)
     ensembles = warmed_up(density, first, seed, x[int(np.argmax(density(x)))])
     proposal = ensembles.proposal
     proposed = 2.0  # draws of a proposal for each that is wanted
-    y = proposal.mixture.sample(rng, int(proposed * count))
+    y = proposal.mixture.sample(rng, int(proposed * wanted.count))
     x = proposal.straightening.bent(y)
-    found = _resampled(
-        x, density(x) - proposal.mixture.log_density(y), user, here, count, rng, SAMPLED
-    )
+    found = wanted.resampled(x, density(x) - proposal.mixture.log_density(y), SAMPLED)
     if found.good:
         return found
-    sampled = 2000.0  # effective draws to sample
-    chains = run_ensembles(ensembles, np.random.default_rng(seed.spawn(1)[0]), sampled)
-    if chains.diagnostics.rhat.max() > TOLERABLE or chains.diagnostics.ess < _FEW:
+    enough = 2000.0  # effective draws to sample
+    chains = run_ensembles(ensembles, np.random.default_rng(seed.spawn(1)[0]), enough)
+    ess = chains.diagnostics.ess
+    if chains.diagnostics.rhat.max() > TOLERABLE or ess < _FEW:
         return None
-    draws = here.natural(chains.thinned(min(count, int(chains.diagnostics.ess)), rng))
-    return Reweighted(user, draws, chains.diagnostics.ess, float("nan"), SAMPLED)
-
-
-def _alone(posterior: Posterior, user: str, count: int) -> Reweighted:
-    """The recording by itself."""
-    draws = posterior.draws[:: -(-len(posterior.draws) // count)]
-    return Reweighted(user, draws, float(posterior.effective), float("nan"), ALONE)
+    draws = wanted.here.natural(chains.thinned(min(wanted.count, int(ess)), rng))
+    return Reweighted(wanted.user, draws, ess, float("nan"), SAMPLED)
 
 
 def inside(x: Floats, here: Coordinates) -> Floats:
