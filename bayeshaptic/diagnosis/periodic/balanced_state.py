@@ -8,8 +8,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced
-from bayeshaptic.diagnosis.state import Accepted, Change, Estimate, State
-from bayeshaptic.effects.effect import LinearEffect
+from bayeshaptic.diagnosis.state import Accepted, Estimate, State
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
@@ -27,21 +26,6 @@ class BalancedState(State):
 
     part: Balanced = field(kw_only=True)
     whole: Balanced = field(kw_only=True)
-
-
-def as_linear(effect: LinearEffect) -> tuple[int, Accepted]:
-    """The number of a linear effect's parameters, and the effect as it would be accepted."""
-    names = tuple(parameter.name for parameter in effect.parameters)
-    accepted = Accepted(
-        effect.name,
-        effect.title,
-        effect.family,
-        "",
-        parameters=names,
-        told_apart_by=effect.told_apart_by,
-        change=Change(effect),
-    )
-    return len(names), accepted
 
 
 def sized(accepted: tuple[Accepted, ...], whole: Balanced) -> tuple[Accepted, ...]:

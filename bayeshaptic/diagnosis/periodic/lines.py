@@ -16,7 +16,7 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.acceptance import needless
 from bayeshaptic.diagnosis.battery import residual_tests
-from bayeshaptic.diagnosis.periodic.balanced_state import BalancedState, as_linear, sized
+from bayeshaptic.diagnosis.periodic.balanced_state import BalancedState, sized
 from bayeshaptic.diagnosis.periodic.descent import likeliest
 from bayeshaptic.diagnosis.periodic.force_tests import force_tests
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
@@ -33,7 +33,7 @@ from bayeshaptic.diagnosis.state import (
     log_likelihoods,
     share,
 )
-from bayeshaptic.diagnosis.trials.linear import sieve
+from bayeshaptic.diagnosis.trials.linear import accepted_with, sieve
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.inference.fit import Fit
@@ -110,7 +110,8 @@ class LineTrials:
             with suppress(np.linalg.LinAlgError):  # a motion that runs away has no balance
                 tried = self._with_linear(state.part, one.effect, one.starts, rest)
                 best = max(best, self._gained(state.part, tried))
-                trial = self._judged(state, tried, *as_linear(one.effect))
+                size = len(one.effect.parameters)
+                trial = self._judged(state, tried, size, accepted_with(one.effect))
                 self._keep(found, (one.effect.name, None), trial)
         for basis in self._promising(state.part, best):
             if meter.affords(basis.title):

@@ -215,20 +215,20 @@ def _looked_further(sight: Sight, meter: Meter) -> Mapping[int, Optimum]:
     return found.optima
 
 
-def accepted_with(effect: LinearEffect, gain_choose: float) -> Accepted:
+def accepted_with(effect: LinearEffect, gain_choose: float | None = None) -> Accepted:
     """What an effect would be as a part of the explanation.
 
     Parameters
     ----------
     effect : LinearEffect
-    gain_choose : float
-        In log likelihood, on the windows to choose by.
+    gain_choose : float, optional
+        In log likelihood, on the windows to choose by: the evidence for it.
     """
     return Accepted(
         effect.name,
         effect.title,
         effect.family,
-        describe_gain(gain_choose),
+        "" if gain_choose is None else describe_gain(gain_choose),
         parameters=tuple(parameter.name for parameter in effect.parameters),
         told_apart_by=effect.told_apart_by,
         change=Change(effect),
