@@ -48,6 +48,12 @@ def _differences(shifted: Floats, at: Floats) -> Floats:
     return shifted
 
 
+def lengths(columns: Floats) -> Floats:
+    """Of columns, shape (C,), to divide them by: one of a column of zeros."""
+    found = np.linalg.norm(columns, axis=0)
+    return np.where(found > 0, found, 1.0)
+
+
 def root_of_covariance(slope: Floats, widest: float = 1.0) -> Floats:
     """A root of the covariance of parameters, shape (P, P): root @ root.T.
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayeshaptic.numerics.gauss_newton import lengths
 from bayeshaptic.types import Bools, Floats
 
 SIMPLEST, LAG = "coulomb", "jerk"
@@ -77,7 +78,7 @@ class Regression:
     def says_more(self, chosen: Sequence[str], name: str) -> bool:
         """Whether a column is more than a combination of those chosen."""
         design, column = self.design(chosen), self.columns[name]
-        design = design / (np.linalg.norm(design, axis=0) + np.finfo(float).tiny)
+        design = design / lengths(design)
         left = column - design @ np.linalg.lstsq(design, column, rcond=None)[0]
         return bool(left @ left > _ITS_OWN * (column @ column))
 
@@ -160,7 +161,7 @@ def between_sets(asked: Regression, chosen: Sequence[str], value: Floats) -> Flo
     for one in sorted(sets, key=sorted):
         names = [*asked.start, *sorted(one)]
         design = asked.design(names)
-        scale = np.linalg.norm(design, axis=0) + np.finfo(float).tiny
+        scale = lengths(design)
         if np.linalg.cond(design / scale) > 1 / _ITS_OWN**2:
             continue
         fit = np.linalg.lstsq(design / scale, asked.force, rcond=None)[0] / scale

@@ -29,6 +29,7 @@ from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.inference.coordinates import reach
 from bayeshaptic.models import Model
+from bayeshaptic.numerics.gauss_newton import lengths
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
@@ -173,7 +174,7 @@ def _attempt(joint: Joint, applied: Applied, theta: Floats, strength: Floats) ->
 
 def _step(slope: Floats, residual: Floats, damping: float) -> Floats:
     """Damped, of at most `_FAR` in each coordinate."""
-    scale = np.linalg.norm(slope, axis=0) + 1e-300
+    scale = lengths(slope)
     rows = np.concatenate([slope / scale, np.sqrt(damping) * np.eye(len(scale))])
     target = np.concatenate([residual, np.zeros(len(scale))])
     step = np.linalg.lstsq(rows, target, rcond=None)[0] / scale

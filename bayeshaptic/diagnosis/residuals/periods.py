@@ -19,7 +19,7 @@ from bayeshaptic.diagnosis.residuals.drift import SHAPES
 from bayeshaptic.diagnosis.residuals.residual import Test, chi_square_score, hats
 from bayeshaptic.inference.coordinates import coordinates
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.numerics.gauss_newton import jacobian
+from bayeshaptic.numerics.gauss_newton import jacobian, lengths
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.local_polynomial import (
     leakage_terms,
@@ -213,8 +213,7 @@ def _score(found: _Between, begun: Complexes, columns: Complexes) -> tuple[float
 
 def _basis(columns: Floats) -> Floats:
     """An orthonormal basis of columns of whatever sizes, shape (N, at most C)."""
-    size = np.linalg.norm(columns, axis=0)
-    basis, sizes, _ = np.linalg.svd(columns / np.where(size > 0, size, 1.0), full_matrices=False)
+    basis, sizes, _ = np.linalg.svd(columns / lengths(columns), full_matrices=False)
     return np.asarray(basis[:, sizes > _SAME * sizes[0]])
 
 

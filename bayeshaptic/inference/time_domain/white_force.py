@@ -27,6 +27,7 @@ from bayeshaptic.inference.time_domain.mass_in_loop import SHARED, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES
 from bayeshaptic.inference.time_domain.whiteness import FEWEST, LAGS, by_chance, correlated
 from bayeshaptic.inference.time_domain.widths.of_values import covariance_of_shared
+from bayeshaptic.numerics.gauss_newton import lengths
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
@@ -179,9 +180,8 @@ def _left(filtered: Innovations, values: Floats, error: Floats, slopes: Floats) 
 
 def _unexplained(series: Floats, columns: Floats) -> Floats:
     """What is left of a series where columns are fitted to it, shape (N,)."""
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale == 0] = 1.0
-    return np.asarray(series - columns / scale @ np.linalg.lstsq(columns / scale, series)[0])
+    scaled = columns / lengths(columns)
+    return np.asarray(series - scaled @ np.linalg.lstsq(scaled, series)[0])
 
 
 def _like_noise(loop: WhitenedLoop, values: Floats) -> bool:
@@ -211,6 +211,6 @@ def told_apart(columns: Floats) -> bool:
     A controller takes a mass from rest to rest in moves that many masses, dampings and delays
     share: then what little counts differ by would decide.
     """
-    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    scaled = columns / lengths(columns)
     inflated = np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True))
     return bool(np.max(inflated[:SHARED]) < _APART)

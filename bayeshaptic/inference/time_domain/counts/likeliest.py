@@ -8,6 +8,7 @@ import numpy as np
 
 from bayeshaptic.inference.time_domain.counts.filter import Counts, Followed
 from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, DELAY, MASS, SHARED
+from bayeshaptic.numerics.gauss_newton import lengths
 from bayeshaptic.types import Floats
 
 WHITE = SHARED  # in a point: behind the values, the logarithm of the white force's sd
@@ -142,8 +143,7 @@ def _inverse(slopes: Floats) -> Floats:
     E. K. Berndt, B. H. Hall, R. E. Hall and J. A. Hausman, Annals of Economic and Social
     Measurement 3, 1974.
     """
-    scale = np.linalg.norm(slopes, axis=0)
-    scale[scale == 0] = 1.0
+    scale = lengths(slopes)
     scaled = slopes / scale
     inverse = np.linalg.inv(scaled.T @ scaled + _RIDGE * np.eye(len(scale)))
     return np.asarray(inverse / np.outer(scale, scale))
@@ -198,8 +198,7 @@ def _ascend(counts: Counts, start: Floats, settled: float, steps: int = _STEPS) 
 
 def _moved(point: Floats, slopes: Floats, damped: float) -> Floats:
     """A damped step that keeps to what is possible: values at their bounds do not pull others."""
-    scale = np.linalg.norm(slopes, axis=0)
-    scale[scale == 0] = 1.0
+    scale = lengths(slopes)
     scaled = slopes / scale
     free = np.ones(len(point), dtype=bool)
     step = np.zeros(len(point))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayeshaptic.inference.time_domain.uneven import Ridge
+from bayeshaptic.numerics.gauss_newton import lengths
 from bayeshaptic.types import Floats, Ints
 
 
@@ -61,11 +62,11 @@ def _alone(
 ) -> tuple[Floats, Floats]:
     """A piece's own coefficients less those of all, and their variances; shapes (D,), (D,)."""
     design = columns[piece][:, np.append(differ, own)]
-    scale = np.linalg.norm(design, axis=0)
-    scale[scale == 0] = 1.0
-    inverse = np.linalg.pinv((design / scale).T @ (design / scale), hermitian=True)
-    value = inverse @ (design / scale).T @ residual[piece]
-    left = residual[piece] - design / scale @ value
+    scale = lengths(design)
+    scaled = design / scale
+    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
+    value = inverse @ scaled.T @ residual[piece]
+    left = residual[piece] - scaled @ value
     known = np.diag(inverse)
     variance = np.where(known > 0, thin * np.mean(left**2) * known / scale**2, np.inf)
     kept = slice(0, len(differ))
