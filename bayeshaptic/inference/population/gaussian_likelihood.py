@@ -9,7 +9,9 @@ carry the prior along and know nothing of dampers that cannot be negative.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,6 +48,23 @@ class GaussianLikelihood:
         """Log likelihood of points of shape (B, D); shape (B,)."""
         off = x - self.mean
         return self.constant - 0.5 * np.einsum("bi,ij,bj->b", off, self.precision, off)
+
+
+class Stacked:
+    """Likelihoods of R recordings, as arrays over them."""
+
+    likelihoods: Sequence[GaussianLikelihood]
+    prior_mean: Floats
+
+    @cached_property
+    def mean(self) -> Floats:
+        """Their peaks, less the prior's mean; shape (R, D)."""
+        return np.stack([one.mean for one in self.likelihoods]) - self.prior_mean
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Their covariances V_r, shape (R, D, D)."""
+        return np.stack([one.covariance for one in self.likelihoods])
 
 
 def gaussian_likelihood(posterior: Posterior, here: Coordinates) -> GaussianLikelihood:

@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood
+from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, Stacked
 from bayeshaptic.inference.population.hyperparameters import Hyperparameters, Unknowns
 from bayeshaptic.types import Floats, Ints
 
@@ -28,7 +28,7 @@ _SCATTER = (0.05, 1.0)  # of hands, that a first guess stays within
 
 
 @dataclass(frozen=True)
-class Hierarchy:
+class Hierarchy(Stacked):
     """The recordings of a study, described, and how they share their parameters.
 
     Attributes
@@ -58,16 +58,6 @@ class Hierarchy:
         """Where each hyperparameter stands in phi, Q of them."""
         repeated = len(self.user) > len(np.unique(self.user))
         return Unknowns(len(self.hand), len(self.device), repeated)
-
-    @cached_property
-    def mean(self) -> Floats:
-        """Peaks of the likelihoods, less the prior's mean; shape (R, D)."""
-        return np.stack([one.mean for one in self.likelihoods]) - self.prior_mean
-
-    @cached_property
-    def covariance(self) -> Floats:
-        """Covariances V_r of the likelihoods; shape (R, D, D)."""
-        return np.stack([one.covariance for one in self.likelihoods])
 
     @cached_property
     def design(self) -> Floats:

@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood
+from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, Stacked
 from bayeshaptic.inference.population.hierarchy import inverse_and_log_det
 from bayeshaptic.inference.population.hyperparameters import DEVICE_SPREAD
 from bayeshaptic.types import Bools, Floats
@@ -33,7 +33,7 @@ HAND_SCATTER = (0.1, 1.0)
 
 
 @dataclass(frozen=True)
-class Trend:
+class Trend(Stacked):
     """Described recordings along a coordinate.
 
     Attributes
@@ -68,16 +68,6 @@ class Trend:
     def members(self) -> Floats:
         """Which recordings are in which configuration, shape (C, R)."""
         return np.equal.outer(self.places, self.coordinate).astype(float)
-
-    @cached_property
-    def mean(self) -> Floats:
-        """Peaks of the likelihoods, less the prior's mean; shape (R, D)."""
-        return np.stack([one.mean for one in self.likelihoods]) - self.prior_mean
-
-    @cached_property
-    def covariance(self) -> Floats:
-        """Covariances of the likelihoods; shape (R, D, D)."""
-        return np.stack([one.covariance for one in self.likelihoods])
 
     def guess(self) -> tuple[Floats, Floats]:
         """Middle and width of the prior of phi (logarithms of a, s and the length); (2 D + 1,)."""
