@@ -43,8 +43,17 @@ class Excitation(Protocol):
         """
 
 
+class _Lasting:
+    """What lasts as many seconds as was said."""
+
+    seconds: float
+
+    def samples(self, period_s: float) -> int:
+        return sample_count(self.seconds, period_s)
+
+
 @dataclass(frozen=True)
-class WhiteNoise:
+class WhiteNoise(_Lasting):
     """Gaussian noise with a flat spectrum between two frequencies.
 
     Attributes
@@ -60,9 +69,6 @@ class WhiteNoise:
     upper_hz: float
     lower_hz: float = 0.0
     seconds: float = 30.0
-
-    def samples(self, period_s: float) -> int:
-        return sample_count(self.seconds, period_s)
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         if not 0 <= self.lower_hz < self.upper_hz:
@@ -152,7 +158,7 @@ class Multisine:
 
 
 @dataclass(frozen=True)
-class Chirp:
+class Chirp(_Lasting):
     """A sine whose frequency grows by the same factor every second, up to the end of the record.
 
     Attributes
@@ -169,9 +175,6 @@ class Chirp:
     high_hz: float
     seconds: float = 30.0
 
-    def samples(self, period_s: float) -> int:
-        return sample_count(self.seconds, period_s)
-
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         low = max(self.low_hz, 1.0 / self.seconds)
         if not low < self.high_hz <= 0.5 / period_s:
@@ -186,7 +189,7 @@ class Chirp:
 
 
 @dataclass(frozen=True)
-class BinaryNoise:
+class BinaryNoise(_Lasting):
     """A pseudo-random binary sequence (of maximal length) between -rms and rms.
 
     Attributes
@@ -202,9 +205,6 @@ class BinaryNoise:
     upper_hz: float
     seconds: float = 30.0
 
-    def samples(self, period_s: float) -> int:
-        return sample_count(self.seconds, period_s)
-
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         from scipy.signal import max_len_seq
 
@@ -218,7 +218,7 @@ class BinaryNoise:
 
 
 @dataclass(frozen=True)
-class Steps:
+class Steps(_Lasting):
     """Steps between rms and -rms.
 
     Attributes
@@ -233,9 +233,6 @@ class Steps:
     rms: float
     hold_s: float = 0.5
     seconds: float = 30.0
-
-    def samples(self, period_s: float) -> int:
-        return sample_count(self.seconds, period_s)
 
     def force(self, lead: int, period_s: float, rng: np.random.Generator) -> Array:
         step = np.floor(np.arange(self.samples(period_s)) * period_s / self.hold_s + 1e-9)
