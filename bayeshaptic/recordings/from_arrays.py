@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -83,42 +83,37 @@ def recording_from_arrays(
     force, force_unit, _ = _in_base_unit(force, "force", force_unit, where)
     position, position_unit, factor = _in_base_unit(position, "position", position_unit, where)
     encoder_resolution = None if encoder_resolution is None else factor * encoder_resolution
-    held = held_for(force)
+    held, signals = held_for(force), _Signals(force, position, followed)
     each, first = written_each((force,))
     if each > 1 and stamps is not None and _is_period(period_s, stamps, each):
-        force, position = force[first::each], position[first::each]
-        stamps, held = stamps[first::each], 1
-        followed = None if followed is None else followed[first::each]
+        signals, stamps, held = signals[first::each], stamps[first::each], 1
     timing = sampling_period(stamps, period_s, where)
     unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind, where)
     angle = unit_of_position == "rad"
-    position, notices = unwrapped(position, angle, encoder_resolution, where)
+    position, notices = unwrapped(signals.position, angle, encoder_resolution, where)
+    signals = replace(signals, position=position)
     if timing.rows is not None:
         from bayeshaptic.recordings.signals.gaps import put_back
 
-        force, position, followed = put_back(force, position, followed, timing.rows, where)
-    position, jumps = without_jumps(position)
-    notices += (*timing.notices, *jumps)
-    start, stop = moving_part(force, position, increment_unit(position) or 0.0)
-    if (start, stop) != (0, len(force)):
-        notices += (_at_rest(start, stop, len(force)),)
-        force, position = force[start:stop], position[start:stop]
-        followed = None if followed is None else followed[start:stop]
-    often, first = written_each((force, position))
+        every = put_back(signals.force, position, signals.reference, timing.rows, where)
+        signals = _Signals(*every)
+    position, jumps = without_jumps(signals.position)
+    start, stop = moving_part(signals.force, position, increment_unit(position) or 0.0)
+    notices += (*timing.notices, *jumps, *_at_rest(start, stop, len(position)))
+    signals = replace(signals, position=position)[start:stop]
+    often, first = written_each((signals.force, signals.position))
+    loop_s = often * timing.period_s
     if often > 1:
-        force, position = (signal[first % often :: often] for signal in (force, position))
-        followed = None if followed is None else followed[first % often :: often]
-        timing = replace(timing, period_s=often * timing.period_s)
-        notices += (_written_each(often, timing.period_s),)
+        signals = signals[first % often :: often]
+        notices += (_written_each(often, loop_s),)
     elif held > 1 and (stamps is None or period_s is None):
-        notices += (_held(force, held, timing.period_s, stamps is not None),)
-    elif (late := held_for(position)) > 1:
-        notices += (_read_late(late, timing.period_s),)
+        notices += (_held(signals.force, held, loop_s, stamps is not None),)
+    elif (late := held_for(signals.position)) > 1:
+        notices += (_read_late(late, loop_s),)
     notices += assumed_units(force_unit, position_unit, unit_of_force, unit_of_position)
     return Recording(
-        force=force,
-        position=position,
-        period_s=timing.period_s,
+        **vars(signals),
+        period_s=loop_s,
         force_unit=unit_of_force,
         position_unit=unit_of_position,
         name=name,
@@ -126,8 +121,20 @@ def recording_from_arrays(
         time_jitter=timing.jitter,
         source=source,
         notices=notices,
-        reference=followed,
     )
+
+
+@dataclass(frozen=True)
+class _Signals:
+    """What is recorded at each sample; the reference where there is one."""
+
+    force: Floats
+    position: Floats
+    reference: Floats | None
+
+    def __getitem__(self, rows: slice) -> _Signals:
+        followed = None if self.reference is None else self.reference[rows]
+        return _Signals(self.force[rows], self.position[rows], followed)
 
 
 def _in_base_unit(
@@ -184,14 +191,16 @@ def _read_late(rows: int, period_s: float) -> Notice:
     return Notice("warning", "held position", text)
 
 
-def _at_rest(start: int, stop: int, samples: int) -> Notice:
+def _at_rest(start: int, stop: int, samples: int) -> tuple[Notice, ...]:
+    if (start, stop) == (0, samples):
+        return ()
     ends = [f"{a + 1} to {b}" for a, b in ((0, start), (stop, samples)) if b > a]
     text = (
         f"The position stands still in rows {' and '.join(ends)} while the force goes on, as "
         "before an amplifier is switched on, after it is switched off, or behind a brake: these "
         "rows were left out."
     )
-    return Notice("warning", "standstill", text)
+    return (Notice("warning", "standstill", text),)
 
 
 def _written_each(often: int, period_s: float) -> Notice:
