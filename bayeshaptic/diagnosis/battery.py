@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.causal import causal_tests
+from bayeshaptic.diagnosis.residuals.columns import speed_tests
 from bayeshaptic.diagnosis.residuals.drift import drift_tests
 from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
 from bayeshaptic.diagnosis.residuals.periods import change_tests
@@ -61,6 +62,7 @@ def model_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
         *drift_tests(fit, etfe),
         *excess_noise_test(fit, etfe),
         *ripple_tests(fit, etfe),
+        *speed_tests(fit, etfe),
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.diagnosis.base.alignment import LATER, MOVED
+from bayeshaptic.diagnosis.residuals.columns import SPEED
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
@@ -52,6 +53,12 @@ _MOSTLY = 10.0
 # Of a sampling period: so much less delay than was told is no wrong number, but another sample.  An
 # extra delay is named in eight of 510 strangers' recordings; none is refused for this.
 _LESS = 0.5
+_NO_LAW = {
+    GAIN.test: "the gain of the actuator ripples along the way, which was not taken off, and where "
+    "it is largest the limit is lower by that",
+    SPEED: "the actuator gives another share of the command the faster it moves, and what the "
+    "model takes for damping may be that",
+}
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 
 
@@ -82,11 +89,7 @@ def _of_the_loop(closed: Closed) -> list[str]:
         )
     reasons = (held_still(closed), stand_ins(closed), beyond_band(closed))
     found += [why for why in reasons if why]
-    if GAIN.test in _left(closed):
-        found.append(
-            "the gain of the actuator ripples along the way, which was not taken off, and where it "
-            "is largest the limit is lower by that"
-        )
+    found += [why for test, why in _NO_LAW.items() if test in _left(closed)]
     if closed.may_be_held_by_friction:
         found.append(
             "beside the force that was found the device makes noise of its own, as one does that "
