@@ -39,6 +39,7 @@ def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, 
         _model(analysis, closed),
         *_widening(closed),
         *_noise(analysis),
+        *_force_sensor(analysis),
         *_sampling(analysis),
     )
 
@@ -89,6 +90,18 @@ def _noise(analysis: Analysis) -> tuple[str, ...]:
         f"Frequencies from {interval(*etfe.band_hz, 'Hz')} decide; outside this band the model "
         "extrapolates.",
         " ".join(said),
+    )
+
+
+def _force_sensor(analysis: Analysis) -> tuple[str, ...]:
+    """What a command must not be made of; of a mass that is followed nobody holds it."""
+    if analysis.in_loop is not None or analysis.etfe.recording is None:
+        return ()
+    return (
+        "No force that a sensor measured between hand and device was in the command (power "
+        "assist, admittance control). It tells of the hand before the motion does, so that the "
+        "response holds the hand's force, too: the limit is then another, lower or higher, and "
+        "nothing in command and position shows it.",
     )
 
 

@@ -61,6 +61,7 @@ def test_the_limit_of_a_loop_whose_reference_nobody_knows(held):
         closed = close_loop(recording, hidden=False, held=held, delay_s=bench.delay_s)
         assert closed.analysis.etfe.direct
         assert closed.verdict == "consistent"
+        assert any("power assist" in notice.text for notice in closed.analysis.notices)
         low, high = (float(closed.analysis.limit.quantile(p)) for p in (0.05, 0.95))
         inside += low <= truth <= high
     assert inside >= 2

@@ -245,6 +245,13 @@ def test_assumptions_say_that_a_force_in_no_column_belongs_to_the_device() -> No
     assert "without virtual damping the limit may be far lower" in text
 
 
+def test_assumptions_say_that_no_sensor_of_the_hand_drove_the_device() -> None:
+    analysis = fake_closed().analysis
+    assert "power assist, admittance control" in " ".join(assumptions(analysis))
+    analysis.etfe = replace(analysis.etfe, recording=None)  # a table of a response
+    assert "power assist" not in " ".join(assumptions(analysis))
+
+
 def test_assumptions_say_that_a_sweep_hides_what_changes() -> None:
     analysis = fake_closed().analysis
     recording = analysis.etfe.recording

@@ -18,7 +18,8 @@ AGAINST = "direct"  # the topic of what speaks against such a fit
 _WHATEVER = (
     "whatever controller made it: all lines of the spectrum are fitted, up to the Nyquist "
     "frequency, whose sum feedback does not bias. The measured response is biased then, and shown "
-    "for comparison only."
+    "for comparison only. A force that a sensor measured at the hand must not be in the command "
+    "(power assist, admittance control): the limit would be another, and nothing here shows it."
 )
 
 
