@@ -44,6 +44,10 @@ HELD = 10.0
 """Samples that repeat the one before although the device moved on, less those off by chance."""
 LOST, WILD = 4.0, 4.0
 """Missing rows, and wild samples by how far off they are; each is beyond doubt (faults)."""
+OUTSIDE = 10.0
+"""Mean square of the errors in the least clear of a few moments, over the usual one (outside).
+
+Of 160 clean recordings and 992 others two are above (docs/effects.md); the largest other is 7.3."""
 JITTER, JITTER_STAMPED = 7.0, 2.5
 """Rise of the noise with the speed, in standard deviations from blocks of samples; the second
 where the time stamps show jitter already."""

@@ -1,4 +1,4 @@
-"""Effects of encoder, clock and logger: the data or the noise change, the device does not.
+"""Effects of encoder, clock, logger and bystanders: the data change, the device does not.
 
 They have no parameters in the model. `bayeshaptic.diagnosis.samples.mend` finds them in the samples
 and, where that can be done, mends the recording.
@@ -86,3 +86,12 @@ class WildSamples(MeasurementEffect):
 
     name = "wild_samples"
     title = "single wild samples of the position"
+
+
+@register
+class OutsideForce(MeasurementEffect):
+    """Moments in which a bump or a touch moved the device, or its command did not arrive."""
+
+    name = "outside_force"
+    title = "force from outside for a moment"
+    told_apart_by = "who or what was beside the device then, and what the amplifier sent"

@@ -53,6 +53,8 @@ SINGLE: dict[str, tuple[str, set[str]]] = {
     "eccentric_encoder": ("nonlinear", {UNKNOWN}),
     "end_stops": ("nonlinear", {UNKNOWN}),
     "tighter_away": ("nonlinear", {"damping_along_the_way"}),
+    "bump": ("measurement", {"outside_force"}),
+    "lost_command": ("measurement", {"outside_force"}),
 }
 LISTED = 15  # the first of them are those that the library promises
 PAIRS = (

@@ -11,6 +11,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.samples.faults import Faults
 from bayeshaptic.diagnosis.samples.jitter import Jitter
+from bayeshaptic.diagnosis.samples.outside import Outside
 from bayeshaptic.diagnosis.samples.prediction import Bools
 from bayeshaptic.diagnosis.samples.resolution import Resolution
 from bayeshaptic.diagnosis.samples.sinusoids import Tones, in_words
@@ -20,6 +21,7 @@ from bayeshaptic.effects.measurement import (
     HeldSamples,
     MainsTone,
     MeasurementEffect,
+    OutsideForce,
     PositionClipping,
     Quantisation,
     SampleJitter,
@@ -149,6 +151,24 @@ def of_wild(found: Faults) -> Finding:
     return Finding(
         WildSamples, found.wild_score, thresholds.WILD, text, {"share": _share(found.wild)}
     )
+
+
+def of_outside(found: Outside, recording: Recording) -> Finding:
+    """Moments in which something else moved the device."""
+    text, estimates = "nothing else than the command moved the device for a moment", {}
+    if found.moments:
+        clock = recording.period_s
+        spans = [(clock * moment.start, clock * moment.stop) for moment in found.moments]
+        times = ", ".join(f"{begin:.2f} to {end:.2f} s" for begin, end in spans)
+        text = (
+            f"from {times} something else moved the device, or the command did not arrive; what "
+            "pushed was added to the command"
+        )
+        estimates["share"] = _share(found.acts)
+        for number, (begin, end) in enumerate(spans, 1):
+            estimates[f"begin_{number}_s"] = Estimate(begin, 0.0, "s")
+            estimates[f"end_{number}_s"] = Estimate(end, 0.0, "s")
+    return Finding(OutsideForce, found.statistic, thresholds.OUTSIDE, text, estimates)
 
 
 def of_jitter(found: Jitter, period_s: float) -> Finding:

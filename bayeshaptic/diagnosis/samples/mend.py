@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.samples import findings
 from bayeshaptic.diagnosis.samples.clipped import clipped
@@ -15,9 +17,11 @@ from bayeshaptic.diagnosis.samples.faults import faults
 from bayeshaptic.diagnosis.samples.filled import discounted
 from bayeshaptic.diagnosis.samples.findings import Finding
 from bayeshaptic.diagnosis.samples.jitter import jitter
+from bayeshaptic.diagnosis.samples.outside import outside
 from bayeshaptic.diagnosis.samples.prediction import Samples, as_recorded
 from bayeshaptic.diagnosis.samples.repeated import held
 from bayeshaptic.diagnosis.samples.resolution import resolution
+from bayeshaptic.diagnosis.samples.slow_push import slow_push
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.inference.fit import Fit
@@ -26,6 +30,8 @@ from bayeshaptic.inference.screening import starting_bases
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
+
+_SLOWER = 2  # fits with more of what pushed the device slowly, each by the one before
 
 
 def measurement_tests(fit: Fit, etfe: Etfe, look: SampleLook | None = None) -> tuple[Test, ...]:
@@ -49,7 +55,8 @@ def repair_measurement(state: State, look: SampleLook | None = None) -> State:
     """The state with the measurement effects that the samples show, the recording mended.
 
     Clipped, held, wild and missing samples are filled in from what all others and the force
-    predict, tones are subtracted; the ETFE is estimated again in the same band and fitted again.
+    predict, what else moved the device is added to its command, tones are subtracted; the ETFE is
+    estimated again in the same band and fitted again.
 
     Returns
     -------
@@ -76,11 +83,21 @@ def _fitted_again(state: State, found: Inspection) -> State:
 
     From the device's own values, too: clipping may have led the current fit far away.
     """
-    etfe = estimate_etfe(found.mended, state.etfe.band_hz)
-    etfe = discounted(replace(etfe, notices=state.etfe.notices), found.measured)
-    fit = state.fit
+    fit, mended = state.fit, found.mended
+
+    def estimated() -> Etfe:
+        etfe = replace(estimate_etfe(mended, state.etfe.band_hz), notices=state.etfe.notices)
+        return discounted(etfe, found.measured)
+
     starts = starting_bases(fit.model, fit.theta, fit.elsewhere)
-    return replace(state, etfe=etfe, fit=least_squares(fit.model, etfe, start=starts))
+    etfe = estimated()
+    fit = least_squares(fit.model, etfe, start=starts)
+    for _ in range(_SLOWER if found.moments else 0):
+        slow = slow_push(fit, etfe, mended, found.moments)
+        mended = replace(mended, force=mended.force + slow)
+        etfe = estimated()
+        fit = least_squares(fit.model, etfe, start=fit.theta)
+    return replace(state, etfe=etfe, fit=fit)
 
 
 @dataclass(frozen=True)
@@ -96,12 +113,18 @@ class SampleLook:
         With what is wrong among them marked; None where nothing can be looked at.
     resolution : float or None
         Counts of the position, as far as they are known.
+    measured : float
+        Share of the samples whose position and force are as they were recorded.
+    moments : tuple of slice
+        In which something else moved the device.
     """
 
     recording: Recording
     findings: tuple[Finding, ...]
     samples: Samples | None
     resolution: float | None
+    measured: float = 1.0
+    moments: tuple[slice, ...] = ()
 
     @property
     def wrong(self) -> bool:
@@ -126,19 +149,22 @@ class Inspection:
     mended : Recording
         Without what could be mended.
     measured : float
-        Share of its samples that was not filled in.
+        Share of its samples that are as they were recorded.
+    moments : tuple of slice
+        In which a force that was found was added to the command.
     """
 
     findings: list[Finding]
     mended: Recording
     measured: float
+    moments: tuple[slice, ...] = ()
 
 
 def look_at_samples(recording: Recording, etfe: Etfe) -> SampleLook:
     """Look at every sample, and mark what is wrong.
 
-    In this order, because each hides the next: clipping, held samples, missing rows, jitter, wild
-    samples.
+    In this order, because each hides the next: clipping, held samples, missing rows, what else
+    moved the device, jitter, wild samples.
     """
     samples = as_recorded(recording)
     counts = resolution(samples, etfe)
@@ -156,13 +182,20 @@ def look_at_samples(recording: Recording, etfe: Etfe) -> SampleLook:
     faulty = faults(samples)
     missing = findings.of_missing(faulty)
     samples = faulty.samples
+    besides = outside(samples.without(faulty.wild))
+    moved = findings.of_outside(besides, recording)
+    if moved.flagged:
+        own = samples.recording
+        samples = replace(samples, recording=replace(own, force=own.force + besides.force))
     late = findings.of_jitter(jitter(samples), recording.period_s)
     if late.flagged:  # then samples far off are not wild
         faulty = replace(faulty, wild_score=0.0)
     wild = findings.of_wild(faulty)
     if wild.flagged:
         samples = samples.without(faulty.wild)
-    return SampleLook(recording, (coarse, cut, repeated, missing, late, wild), samples, count)
+    found = (coarse, cut, repeated, missing, moved, late, wild)
+    measured = 1 - float(np.mean(samples.missing | besides.acts))
+    return SampleLook(recording, found, samples, count, measured, besides.moments)
 
 
 def inspect(
@@ -180,5 +213,5 @@ def inspect(
     lines = find_tones(mended, etfe.band_hz, fit.response)
     humming = findings.of_tones(lines, recording.position_unit)
     mended = replace(mended, position=lines.taken_off(mended), encoder_resolution=own.resolution)
-    measured = getattr(etfe.spectra, "measured", 1.0) * (1 - float(own.samples.missing.mean()))
-    return Inspection([*own.findings, humming], mended, measured)
+    measured = getattr(etfe.spectra, "measured", 1.0) * own.measured
+    return Inspection([*own.findings, humming], mended, measured, own.moments)

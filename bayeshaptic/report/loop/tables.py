@@ -30,6 +30,7 @@ _UNITS = {
     "held_samples": ", count",
     "dropped_samples": ", count",
     "wild_samples": ", count",
+    "outside_force": ", over the usual errors",
     "mains_tone": ", \N{MINUS SIGN}log10 of its chance",
 }
 

@@ -1,6 +1,6 @@
 """Effects that can be added to a bench: importing this package registers them all."""
 
-from bayeshaptic.rig.effects.command import ActuatorSaturation, GainDrift
+from bayeshaptic.rig.effects.command import ActuatorSaturation, Bump, GainDrift, LostCommand
 from bayeshaptic.rig.effects.dynamics import (
     ActuatorLag,
     BaseCompliance,
@@ -37,6 +37,7 @@ __all__ = [
     "ActuatorSaturation",
     "Backlash",
     "BaseCompliance",
+    "Bump",
     "CentringStiffness",
     "ConstantForce",
     "CoulombFriction",
@@ -52,6 +53,7 @@ __all__ = [
     "HardeningConnection",
     "HardeningSpring",
     "HeldSamples",
+    "LostCommand",
     "MainsTone",
     "PositionClipping",
     "PositionFilter",
