@@ -15,20 +15,24 @@ from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
 from bayeshaptic.diagnosis.limit_known import LimitKnown, asked_of_sampler
 from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.diagnosis.residuals.columns import SPENT, speed_tests
 from bayeshaptic.diagnosis.samples.sinusoids import in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.effects.measurement import MainsTone
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.inference.sampler import sample_around
 from bayeshaptic.inference.time_domain.likelihood import in_loop_fit
 from bayeshaptic.inference.time_domain.mass_in_loop import DRY
 from bayeshaptic.inference.time_domain.model import rigid_with_friction
+from bayeshaptic.models import build_model
 from bayeshaptic.models.parameter import unit_of
 from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.checks.sufficiency import TOO_LITTLE, few_tones, told_too_little
+from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.critical import CriticalStiffness
@@ -79,7 +83,7 @@ def analyse_one_mass(begun: Opened, options: Options) -> Analysis | None:
     model = rigid_with_friction(recording, found.motion, begun.device, *delay, options.prior)
     fit = in_loop_fit(model, begun.etfe, found.motion, found.misfit)
     posterior, limit = _sampled(fit, begun.etfe, options)
-    doubts = found.doubts + contradictions(found.motion, posterior)
+    doubts = found.doubts + contradictions(found.motion, posterior) + _if_open(begun, options)
     if open_loop and doubts:
         return None
     questions = open_questions(found, posterior, limit, begun.one_mass)
@@ -103,6 +107,20 @@ def analyse_one_mass(begun: Opened, options: Options) -> Analysis | None:
         lever_m=begun.lever_m,
         in_loop=replace(found, doubts=doubts, questions=questions),
     )
+
+
+def _if_open(begun: Opened, options: Options) -> tuple[str, ...]:
+    """What would speak against the limit in open loop, where feedback is only a doubt.
+
+    An actuator that is spent on speed is what new force and past position have in common.  Under
+    the motion of one mass its damping hides it but for less than the encoder's counts.
+    """
+    if is_certain(begun.notices) or not has_feedback(begun.notices):
+        return ()
+    delay = options.delay_s, options.delay_sd_s
+    model = build_model("rigid", begun.device, *delay, begun.etfe.period_s)
+    fit = least_squares(model, begun.etfe, options.seed)
+    return tuple(SPENT for test in speed_tests(fit, begun.etfe) if test.flagged)
 
 
 def _sampled(fit: Fit, etfe: Etfe, options: Options) -> tuple[Posterior, CriticalStiffness]:

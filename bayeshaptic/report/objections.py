@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.diagnosis.base.alignment import LATER, MOVED
-from bayeshaptic.diagnosis.residuals.columns import SPEED
+from bayeshaptic.diagnosis.residuals.columns import SPEED, SPENT
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
@@ -56,8 +56,7 @@ _LESS = 0.5
 _NO_LAW = {
     GAIN.test: "the gain of the actuator ripples along the way, which was not taken off, and where "
     "it is largest the limit is lower by that",
-    SPEED: "the actuator gives another share of the command the faster it moves, and what the "
-    "model takes for damping may be that",
+    SPEED: SPENT,
 }
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 

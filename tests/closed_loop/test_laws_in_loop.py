@@ -116,8 +116,13 @@ def test_a_score_is_the_strength_that_a_fit_finds(bench: Bench) -> None:
     (found,) = scores(motion, faint, [-velocity * np.abs(velocity)])
     assert found is not None
     assert abs(found.strength - 5.0) < _REACH * found.sd
-    # A column that is there already says nothing.
-    assert scores(motion, faint, [np.zeros(faint.samples)]) == [None]
+    # A column that is there already says nothing, as the size of a command of two levels.
+    two_levels = 0.7 * np.where(np.arange(faint.samples) % 7 < 3, 1.0, -1.0)
+    assert scores(motion, faint, [np.zeros(faint.samples), np.abs(two_levels)]) == [None, None]
+    # The constant force beside another changes nothing.
+    (pushed,) = scores(motion, faint, [40.0 - velocity * np.abs(velocity)])
+    assert pushed is not None
+    assert pushed.strength == pytest.approx(found.strength, abs=0.1 * found.sd)
 
 
 def test_half_a_recording_predicts_the_other_from_wherever_it_begins() -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bayeshaptic.diagnosis.residuals.columns import SPENT
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
@@ -32,6 +33,7 @@ def unlike_one_mass(recording: Recording, velocity: Floats) -> Iterator[tuple[st
     yield from _fading(velocity)
     yield from _changing(recording, velocity)
     yield from _out_of_proportion(recording.force)
+    yield _spent_on_speed(recording.force, velocity)
 
 
 def _fading(velocity: Floats) -> Iterator[tuple[str, Floats]]:
@@ -59,6 +61,12 @@ def _changing(recording: Recording, velocity: Floats) -> Iterator[tuple[str, Flo
         ("gain from force to motion", recording.force),
     ):
         yield f"the {name} changes in the course of the recording", grows * force
+
+
+def _spent_on_speed(command: Floats, velocity: Floats) -> tuple[str, Floats]:
+    """What a motor gives less of a command the faster it moves, which passes for damping."""
+    usual = max(float(np.sqrt(np.mean(velocity**2))), _TINY)
+    return SPENT, command * np.abs(velocity) / usual
 
 
 def _out_of_proportion(command: Floats) -> Iterator[tuple[str, Floats]]:

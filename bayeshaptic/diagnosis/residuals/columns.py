@@ -42,6 +42,11 @@ ROUNDING = 1e-6
 # It bounds a strength's standard deviation, and no score, so it raises no alarm.
 WEAK = 0.05
 SPEED = "u |v|"  # the test for a gain that goes with the speed
+SPENT = (
+    "the actuator gives another share of the command the faster it moves, and what the model takes "
+    "for damping may be that"
+)
+"""What is said where that test is flagged."""
 
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:

@@ -39,6 +39,9 @@ class Score:
 def scores(motion: MotionFit, recording: Recording, forces: Sequence[Floats]) -> list[Score | None]:
     """A score for every force; None for one that says nothing here.
 
+    A force's mean is the constant force, which is fitted with everything else: what scores is the
+    rest, and a force without one (the size of a command of two levels) says nothing.
+
     Parameters
     ----------
     motion : MotionFit
@@ -51,11 +54,15 @@ def scores(motion: MotionFit, recording: Recording, forces: Sequence[Floats]) ->
     columns, found = there.columns, there.found
     left = there.without(found.solution)
     scored: list[Score | None] = []
+    its_own = 1e-9  # share of a force, and of an answer's power: less is rounding
     for force in forces:
-        answer = there.loop.answer(there.values, there.uneven, there.error, force)
+        rest = force - np.mean(force)
+        if not np.std(rest) > its_own * np.max(np.abs(force)):
+            scored.append(None)
+            continue
+        answer = there.loop.answer(there.values, there.uneven, there.error, rest)
         along = columns.T @ answer
         own = answer - columns @ (found.inverse @ along)  # what no other column does
-        its_own = 1e-9  # of its power: less is rounding
         power = float(own @ answer)
         if not power > its_own * float(answer @ answer):
             scored.append(None)
