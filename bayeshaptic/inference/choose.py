@@ -2,7 +2,8 @@
 
 A third mass looks like a hand: what tells them apart is that an arm holds the hand to the ground,
 and what hands are like.  So a chain is among the candidates, and the hand of a grasped device
-counts by how far it is from any, as five more residuals.
+counts by how far it is from any, as five more residuals.  Where no transmission shows, a grasped
+device counts as one mass in a hand.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from bayeshaptic.inference.loop_response import fitted_to_the_loop
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.build import with_force_sensor
 from bayeshaptic.models.prior_table import refuse_unknown
+from bayeshaptic.models.structures import GRASPED, ONE_IN_A_HAND
 from bayeshaptic.quantities import pure
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.shown import Shown, data_frame
@@ -57,12 +59,15 @@ class ScoredFit:
         there is no hand.
     etfe : Etfe or None
         What it was fitted to: of some measurements each model makes its own.
+    as_one_mass : bool
+        Whether it is a grasped device that scores as one mass in a hand.
     """
 
     fit: Fit
     score: float
     from_a_hand: float = 0.0
     etfe: Etfe | None = field(default=None, repr=False)
+    as_one_mass: bool = False
 
     @property
     def held(self) -> bool:
@@ -188,6 +193,9 @@ def choose_model(
         # Where a simpler one leaves noise, no deeper valley of a richer one would be chosen.
         noise_reached = any(fit.reduced_chi_square < _NOISE for fit in fits.values())
         fit_to(name, most_sets=1 if noise_reached else SETS)
+    one_mass = ONE_IN_A_HAND.name
+    if held is None and device is None and _may_be_one_mass(fits):
+        fit_to(one_mass, most_sets=1)
     best, candidates, noise = _compared(fits)
     # Where two masses that nobody holds explain it, a third has nothing to explain.
     if held is None and (fits[best].misfits or candidates[best].held):
@@ -208,7 +216,23 @@ def _compared(fits: Mapping[str, Fit]) -> tuple[str, dict[str, ScoredFit], float
         name: ScoredFit(fit, information_criterion(fit, noise), deviance(fit, noise)[1])
         for name, fit in fits.items()
     }
+    simpler = candidates.pop(ONE_IN_A_HAND.name, None)
+    if simpler is not None and simpler.score < candidates[GRASPED.name].score:
+        # Its fit stays: a limit wants to know of a mode that the band does not show.
+        candidates[GRASPED.name] = replace(simpler, fit=fits[GRASPED.name], as_one_mass=True)
     return _best(candidates, noise), candidates, noise
+
+
+def _may_be_one_mass(fits: Mapping[str, Fit]) -> bool:
+    """Whether the parameters that one mass in a hand saves could make a grasped device the best."""
+    _, candidates, _ = _compared(fits)
+    grasped = candidates[GRASPED.name]
+    if grasped.fit.misfits:
+        return False
+    saved = len(GRASPED.names) - len(ONE_IN_A_HAND.names)
+    most = saved * float(np.log(2 * len(grasped.fit.residual))) + grasped.from_a_hand
+    least = min(one.score for one in candidates.values())
+    return grasped.score - least < most + UNDECIDED
 
 
 def _from_the_hand(chain: Fit, grasped: Fit, etfe: Etfe) -> Fit:
@@ -254,6 +278,8 @@ def _reason(best: str, candidates: Mapping[str, ScoredFit], noise: float, held: 
             f"{_left(other.fit, ' ', ', and')} an information criterion (BIC) "
             f"{_plain(abs(behind))} {'worse' if behind > 0 else 'better'}."
         )
+    if any(one.as_one_mass for one in candidates.values()):
+        text += " Grasped counts as one mass in a hand (7 parameters) here: no transmission shows."
     if noise >= MISFIT:
         text += (
             f" No candidate reaches the noise: the criterion takes {_plain(noise)} times its "

@@ -11,7 +11,7 @@ from bayeshaptic.models.hand import KILOGRAMS, hand_priors
 from bayeshaptic.models.model import Model
 from bayeshaptic.models.prior import LogNormal, Prior, draw
 from bayeshaptic.models.prior_of_zero import SPIKE, SPIKE_OF_MOTOR, MaybeZero
-from bayeshaptic.models.structures import GROUND_DAMPERS, HAND, MOTOR_DAMPERS
+from bayeshaptic.models.structures import GROUND_DAMPERS, HAND, MOTOR_DAMPERS, ONE_IN_A_HAND
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
 
@@ -158,8 +158,9 @@ def _plausible(
 
     mass = found.mass * factor(0.3, 3.0)
     ground = mass * rate(0.3 * found.low_hz, 10 * found.low_hz)
+    rigid = {"m": mass, "b": ground}
     if name == "rigid":
-        return {"m": mass, "b": ground}
+        return rigid
     share = 1 / (1 + np.exp(rng.uniform(-3.5, 3.5, count)))
     m1, m2 = share * mass, (1 - share) * mass
     mode = rate(3 * found.low_hz, 1.2 * found.high_hz)
@@ -175,7 +176,8 @@ def _plausible(
         "b1": ground * rng.uniform(size=count),
         "b2": ground * rng.uniform(size=count),
     }
-    if not name.startswith("grasped"):
+    in_a_hand = name == ONE_IN_A_HAND.name
+    if not (in_a_hand or name.startswith("grasped")):
         return device
     mh = mass * factor(0.1, 3.0)
     grip, arm = rate(3 * found.low_hz, found.high_hz), rate(0.3 * found.low_hz, 10 * found.low_hz)
@@ -186,4 +188,4 @@ def _plausible(
         "kh": mh * arm**2,
         "bh": 2 * factor(0.1, 3.0) * mh * arm,
     }
-    return device | hand
+    return (rigid if in_a_hand else device) | hand

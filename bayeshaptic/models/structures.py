@@ -88,6 +88,10 @@ def _grasped(v: Values) -> Mechanism:
     return _in_a_hand(_free(v), v)
 
 
+def _one_in_a_hand(v: Values) -> Mechanism:
+    return _in_a_hand(_rigid(v), v)
+
+
 def _in_a_hand(device: Mechanism, v: Values) -> Mechanism:
     """The device with a hand on its last mass."""
     hand = len(device.masses)
@@ -103,6 +107,11 @@ FREE = Structure(
     "two masses and a transmission, nobody holds it, equation (3)",
 )
 GRASPED = Structure("grasped", FREE.names + HAND, _grasped, "held by a user, equation (11)")
+# What "grasped" is where the transmission does not show: for the choice of a model alone, because a
+# limit wants to know of a mode that the band does not show.
+ONE_IN_A_HAND = Structure(
+    "one-in-a-hand", RIGID.names + HAND, _one_in_a_hand, "one mass, held by a user"
+)
 STRUCTURES = {structure.name: structure for structure in (RIGID, FREE, GRASPED)}
 
 
@@ -159,6 +168,8 @@ def structure_named(name: str) -> Structure:
         number = name.removeprefix(kind)
         if number != name and number.isdecimal():
             return chain(int(number), held=kind == _HELD_CHAIN)
+    if name == ONE_IN_A_HAND.name:
+        return ONE_IN_A_HAND
     if name not in STRUCTURES:
         there = ", ".join((*STRUCTURES, f"{_CHAIN}N"))
         raise InputError(f"no model {name!r}; there are {there}, and {_HELD_CHAIN}N.")

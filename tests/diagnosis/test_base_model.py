@@ -341,6 +341,21 @@ def test_a_third_mass_is_no_hand(tmp_path) -> None:
     assert grasped.score > choice.candidates["chain-2"].score + UNDECIDED
 
 
+def test_one_mass_in_a_hand_is_a_held_device(tmp_path) -> None:
+    """No transmission shows: with one of its own it was taken for three masses in a row."""
+    model = bh.grasped(delay_s=3e-4, period_s=1e-3)
+    values = {"m1": 0.05, "b1": 0.1, "bc": 50.0, "kc": 1e8, "m2": 0.05, "b2": 0.1}
+    values |= {"bs": 16.9, "ks": 3410.0, "mh": 0.185, "bh": 7.83, "kh": 82.3}
+    theta = np.array([values[name] for name in model.names])
+    frequency = np.geomspace(2.0, 200.0, 300)
+    table = noisy_table(tmp_path, frequency, model.response(theta, frequency), 0.01, seed=3)
+    choice = choose.choose_model(table, delay_s=3e-4)
+    assert choice.fit.model.name == "grasped"
+    assert choice.undecided == ()
+    assert choice.candidates["grasped"].as_one_mass
+    assert "one mass in a hand" in choice.reason
+
+
 @pytest.mark.parametrize(("spent", "loops"), [(0.3, 3), (0.6, 2), (1.1, 1)])
 def test_loops_that_are_closed_again_share_one_budget(monkeypatch, spent, loops) -> None:
     """What lies between the samples may change with every loop, and none is without an end."""
