@@ -167,7 +167,7 @@ def test_sizes_of_another_recording_are_read_off_its_evidence() -> None:
     assert own.of(size, shape) == pytest.approx(log)
     others = own.of(np.array([0.5, 8.0, 2.0, -0.5]), np.full((4, 1), 9.0))
     assert others == pytest.approx([-0.025, -6.4, -0.4, 0.05])
-    assert own.with_more([own, own]) == pytest.approx(np.log(0.2 * np.exp(3 * log + 0.1).sum()))
+    assert own.with_more(2 * log) == pytest.approx(np.log(0.2 * np.exp(3 * log + 0.1).sum()))
 
 
 def test_two_recordings_rule_out_what_one_cannot(rigid: Posterior) -> None:

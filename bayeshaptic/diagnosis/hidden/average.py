@@ -13,12 +13,27 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import logsumexp
 
-from bayeshaptic.diagnosis.hidden.evidence import Evidence, sum_of
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.hidden.regression import Around
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed
 from bayeshaptic.numerics.weights import systematic
 from bayeshaptic.types import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Told:
+    """What other recordings say of an effect.
+
+    Attributes
+    ----------
+    kept : ndarray, shape (KEPT,)
+        Of the sizes of its draws.
+    every : ndarray, shape (C,)
+        Of the sizes that its evidence is of.
+    """
+
+    kept: Floats
+    every: Floats
 
 
 @dataclass(frozen=True)
@@ -29,33 +44,35 @@ class Looked:
     ----------
     weighed : tuple of Weighed
         E effects, at one place each.
-    meeting : ndarray, shape (E, E, D, D)
-        Log weight of each two draws, over that of either alone.
+    taken_up : ndarray, shape (E, D, F)
+        What the parameters take up of the changes of each effect.
     gain : ndarray, shape (E, E)
-        The log of its mean: what the evidence of two has beyond the sum of theirs.
+        What the evidence of two has beyond the sum of theirs.
     """
 
     weighed: tuple[Weighed, ...]
-    meeting: Floats = field(repr=False)
+    taken_up: Floats = field(repr=False)
     gain: Floats = field(repr=False)
 
-    def with_more(self, told: Mapping[int, Sequence[Evidence]], rng: np.random.Generator) -> Looked:
+    def meeting(self, one: int, other: int) -> Floats:
+        """Log weight of each two draws of two effects, over that of either alone, (D, D)."""
+        own, others = self.weighed[one].changes, self.weighed[other].changes
+        return _meeting(own, others, self.taken_up[one], self.taken_up[other])
+
+    def with_more(self, told: Mapping[int, Told], rng: np.random.Generator) -> Looked:
         """The same with what other recordings say of the sizes of some effects, by their number.
 
         Draws are drawn again by that evidence; those for which two effects share something stay
         among the old ones.
         """
-        weighed, meeting = list(self.weighed), self.meeting.copy()
-        for number, others in told.items():
-            one = self.weighed[number]
-            log = sum_of(others, one.size, one.shape)
-            rows = _drawn_again(log[::PAIRED], rng)
-            kept = _drawn_again(log, rng)
+        weighed, taken_up = list(self.weighed), self.taken_up.copy()
+        for number, said in told.items():
+            rows = _drawn_again(said.kept[::PAIRED], rng)
+            kept = _drawn_again(said.kept, rng)
             kept[::PAIRED] = PAIRED * rows
-            weighed[number] = one.with_more(others, kept)
-            meeting[number] = meeting[number][:, rows]
-            meeting[:, number] = meeting[:, number][:, :, rows]
-        return Looked(tuple(weighed), meeting, _gain(meeting))
+            weighed[number] = self.weighed[number].with_more(said.every, kept)
+            taken_up[number] = taken_up[number][rows]
+        return Looked(tuple(weighed), taken_up, _gain(weighed, taken_up))
 
 
 def _drawn_again(log_weight: Floats, rng: np.random.Generator) -> Ints:
@@ -64,19 +81,25 @@ def _drawn_again(log_weight: Floats, rng: np.random.Generator) -> Ints:
     return rng.permutation(systematic(weight, len(weight), rng))
 
 
-def _gain(meeting: Floats) -> Floats:
-    draws = meeting.shape[2] * meeting.shape[3]
-    return np.asarray(logsumexp(meeting, axis=(2, 3)) - np.log(draws))
+def _meeting(one: Floats, other: Floats, taken_up: Floats, other_taken_up: Floats) -> Floats:
+    """See `Looked.meeting`: of changes (A, N), (B, N) and what is taken up of them; (A, B)."""
+    most_gain = 3.0  # log evidence that two effects may gain by cancelling each other
+    return np.minimum(taken_up @ other_taken_up.T - one @ other.T, most_gain)
+
+
+def _gain(weighed: Sequence[Weighed], taken_up: Floats) -> Floats:
+    """The log of the mean weight of all draws of each two effects."""
+    changes = np.concatenate([one.changes for one in weighed])
+    count, draws, _ = taken_up.shape
+    flat = taken_up.reshape(count * draws, -1)
+    meeting = _meeting(changes, changes, flat, flat).reshape(count, draws, count, draws)
+    return np.asarray(logsumexp(meeting, axis=(1, 3)) - np.log(draws * draws))
 
 
 def looked_at(weighed: Sequence[Weighed], known: Around) -> Looked:
     """The effects with what each two of them share, to first order in both."""
-    every = np.concatenate([one.changes for one in weighed])
-    count, draws = len(weighed), len(weighed[0].changes)
-    shared = known.overlap(every, every).reshape(count, draws, count, draws)
-    most_gain = 3.0  # log evidence that two effects may gain by cancelling each other
-    meeting = np.minimum(-shared.transpose(0, 2, 1, 3), most_gain)
-    return Looked(tuple(weighed), meeting, _gain(meeting))
+    taken_up = np.stack([known.taken_up(one.changes) for one in weighed])
+    return Looked(tuple(weighed), taken_up, _gain(weighed, taken_up))
 
 
 @dataclass(frozen=True)
@@ -118,7 +141,7 @@ class Average:
         for number, (a, b) in enumerate(zip(first, second, strict=True), start=len(factors) + 1):
             rows, size = slice(edges[number], edges[number + 1]), edges[number + 1] - edges[number]
             if size:
-                weight = np.exp(self.looked.meeting[a, b])
+                weight = np.exp(self.looked.meeting(int(a), int(b)))
                 i, j = np.divmod(
                     rng.permutation(systematic(weight.ravel(), size, rng)), len(weight)
                 )

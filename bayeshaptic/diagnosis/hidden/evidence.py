@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,10 +35,9 @@ class Evidence:
     log: Floats = field(repr=False)
     by_data: Floats = field(repr=False)
 
-    def with_more(self, others: Sequence[Evidence]) -> float:
-        """Log evidence of the effect together with what others say of its sizes."""
-        log = self.log + sum_of(others, self.size, self.shape)
-        return float(logsumexp(log, b=self.weight))
+    def with_more(self, said: Floats) -> float:
+        """Log evidence of the effect together with what others say of its sizes, shape (C,)."""
+        return float(logsumexp(self.log + said, b=self.weight))
 
     def of(self, size: Floats, shape: Floats) -> Floats:
         """What the data say of other sizes (D,) with the shapes (D, K) that come closest, (D,).
@@ -59,11 +57,6 @@ class Evidence:
                         np.abs(size[asked]), np.abs(self.size[known]), self.by_data[known]
                     )
         return out
-
-
-def sum_of(several: Sequence[Evidence], size: Floats, shape: Floats) -> Floats:
-    """What several recordings' data say of the sizes (D,) with the shapes (D, K), (D,)."""
-    return np.sum([one.of(size, shape) for one in several], axis=0)
 
 
 def _nearest(kinds: Floats, shape: Floats) -> Floats:

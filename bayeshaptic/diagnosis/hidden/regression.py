@@ -112,13 +112,13 @@ class Around:
 
     def power(self, changes: Floats) -> Floats:
         """Squares of what the parameters cannot take up, shape (C,)."""
-        absorbed = changes @ self.pull.T
+        absorbed = self.taken_up(changes)
         power = np.einsum("cn,cn->c", changes, changes) - np.einsum("cf,cf->c", absorbed, absorbed)
         return np.maximum(power, 0.0)
 
     def moved(self, changes: Floats) -> Floats:
         """How far the parameters give way, in `here`, shape (C, P); no further than makes sense."""
-        there = self.centre - (changes @ self.pull.T) @ self.root
+        there = self.centre - self.taken_up(changes) @ self.root
         least, most = 1e-3, 30.0  # times its value: no parameter gives way further than that
         far = np.abs(self.centre) * np.array([[least], [most]])
         low = np.where(self.here.log, self.centre - np.log(most), np.maximum(far[0], self.here.low))
@@ -130,9 +130,9 @@ class Around:
         apart = np.sum(((one - other) @ self.slope.T) ** 2, axis=1)
         return bool(np.all(apart < 1e-3))
 
-    def overlap(self, one: Floats, other: Floats) -> Floats:
-        """What two effects at once take off the sum of their log evidences, shape (A, B)."""
-        return one @ other.T - (one @ self.pull.T) @ (other @ self.pull.T).T
+    def taken_up(self, changes: Floats) -> Floats:
+        """What the parameters take up of changes, (C, N), in independent directions; (C, F)."""
+        return changes @ self.pull.T
 
 
 def log_limits(model: Model, vectors: Floats) -> Floats:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayeshaptic.diagnosis.hidden.evidence import Evidence
+from bayeshaptic.diagnosis.hidden.average import Told
 from bayeshaptic.diagnosis.hidden.hidden import Hidden, HiddenEffect, averaged
 from bayeshaptic.diagnosis.hidden.weighed import Weighed
 from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.types import Ints
 
 
 @dataclass(frozen=True)
@@ -66,37 +67,51 @@ def all_together(
     -------
     list of (CriticalStiffness, Hidden), tuple of Together
     """
+    told = _told(every, configurations)
     found, shared = [], set()
     for number, one in enumerate(every):
         rng = np.random.default_rng([seed, 15, number])
-        told = {
-            which: others
-            for which, weighed in enumerate(one.looked.weighed)
-            if (others := _others(weighed, number, every, configurations))
-        }
-        shared |= {one.looked.weighed[which].name for which in told}
-        found.append(averaged(one.declared, one.looked.with_more(told, rng), one.prior, rng))
+        shared |= {one.looked.weighed[which].name for which in told[number]}
+        looked = one.looked.with_more(told[number], rng)
+        found.append(averaged(one.declared, looked, one.prior, rng))
     return found, _table(every, [hidden for _, hidden in found], shared)
 
 
-def _others(
-    own: Weighed, number: int, every: Sequence[Hidden], configurations: Sequence[Hashable]
-) -> list[Evidence]:
-    """What all other recordings say of the same effect at the same place."""
-    if own.evidence is None:
-        return []
-    alike = [
-        one
-        for other, one in enumerate(every)
-        if other != number
-        and (own.shared == "device" or configurations[other] == configurations[number])
-    ]
-    return [
-        weighed.evidence
-        for one in alike
-        for weighed in one.looked.weighed
-        if (weighed.name, weighed.place) == (own.name, own.place) and weighed.evidence is not None
-    ]
+def _told(every: Sequence[Hidden], configurations: Sequence[Hashable]) -> list[dict[int, Told]]:
+    """What all other recordings say of the same effect at the same place, by its number."""
+    groups: dict[Hashable, list[tuple[int, int]]] = {}
+    for number, one in enumerate(every):
+        for which, own in enumerate(one.looked.weighed):
+            if own.evidence is not None:
+                where = None if own.shared == "device" else (configurations[number],)
+                groups.setdefault((own.name, own.place, where), []).append((number, which))
+    told: list[dict[int, Told]] = [{} for _ in every]
+    for members in groups.values():
+        if len({number for number, _ in members}) > 1:
+            weighed = [every[number].looked.weighed[which] for number, which in members]
+            said = _by_others(weighed, np.array([number for number, _ in members]))
+            for (number, which), others in zip(members, said, strict=True):
+                told[number][which] = others
+    return [dict(sorted(own.items())) for own in told]
+
+
+def _by_others(weighed: Sequence[Weighed], number: Ints) -> list[Told]:
+    """What the others say of one effect, of each recording; `number` is whose each is.
+
+    Each recording is asked once for the sizes of all: the work in Python would otherwise grow as
+    the square of their number.
+    """
+    evidence = [one.evidence for one in weighed if one.evidence is not None]
+    pairs = list(zip(weighed, evidence, strict=True))
+    size = np.concatenate([part for one, own in pairs for part in (one.size, own.size)])
+    shape = np.concatenate([part for one, own in pairs for part in (one.shape, own.shape)])
+    asks = np.repeat(number, [len(one.size) + len(own.size) for one, own in pairs])
+    said = np.zeros(len(size))
+    for own, whose in zip(evidence, number, strict=True):
+        said += np.where(asks == whose, 0.0, own.of(size, shape))
+    ends = np.cumsum([len(part) for one, own in pairs for part in (one.size, own.size)])
+    parts = np.split(said, ends[:-1])
+    return [Told(*both) for both in zip(parts[::2], parts[1::2], strict=True)]
 
 
 def _table(

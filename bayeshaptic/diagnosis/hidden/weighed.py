@@ -8,7 +8,6 @@ the evidence against nothing more (D. J. C. MacKay, "Bayesian interpolation", Ne
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,14 +78,15 @@ class Weighed:
     shape: Floats = field(repr=False)
     evidence: Evidence | None = field(default=None, repr=False)
 
-    def with_more(self, others: Sequence[Evidence], kept: Ints) -> Weighed:
-        """The same with what other recordings say of its sizes; `kept` are the draws left."""
+    def with_more(self, said: Floats, kept: Ints) -> Weighed:
+        """The same with what others say of every size; `kept` are the draws left, in pairs too."""
         assert self.evidence is not None
         return replace(
             self,
-            log_evidence=self.evidence.with_more(others),
+            log_evidence=self.evidence.with_more(said),
             strength=self.strength[kept],
             log_factor=self.log_factor[kept],
+            changes=self.changes[kept[::PAIRED] // PAIRED],
             size=self.size[kept],
             shape=self.shape[kept],
         )
