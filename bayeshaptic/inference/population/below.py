@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bayeshaptic.inference.population.hierarchy import Conditionals, Hierarchy, inverse_and_log_det
+from bayeshaptic.inference.population.hierarchy import Hierarchy, inverse_and_log_det
 from bayeshaptic.inference.population.hyperparameters import Hyperparameters
 from bayeshaptic.numerics.truncated_normal import draw_above
 from bayeshaptic.types import Bools, Floats
@@ -64,11 +64,11 @@ def draw_below(
     """
     spike = np.zeros(len(walls)) if spike is None else spike
     chunk = 256
-    parts = [
-        _draw(hierarchy, phi[start : start + chunk], walls, rng, spike)
-        for start in range(0, len(phi), chunk)
-    ]
-    beta, recordings = (np.concatenate(part) for part in zip(*parts, strict=True))
+    beta = np.empty((len(phi), len(hierarchy.beta_sd)))
+    recordings = np.empty((len(phi), *hierarchy.mean.shape))
+    for start in range(0, len(phi), chunk):
+        own = slice(start, start + chunk)
+        beta[own], recordings[own] = _draw(hierarchy, phi[own], walls, rng, spike)
     return Below(hierarchy.layout.read(phi), beta, recordings)
 
 
@@ -89,15 +89,16 @@ def _draw(
     guess = x + sd * rng.standard_normal(x.shape)
     roots = np.linalg.cholesky(hierarchy.covariance)
     noise = np.einsum("rij,brj->bri", roots, rng.standard_normal(x.shape))
-    off = np.einsum("brij,brj->bri", given.weight, hierarchy.mean - guess - noise)
+    weight = hierarchy.weight(given.spread)
+    off = np.einsum("brij,brj->bri", weight, hierarchy.mean - guess - noise)
     x = guess + given.spread[:, None, :] * off
     if spike.any():
         at_wall = np.einsum("rip,bp->bri", hierarchy.design, np.where(beta == low, 1.0, 0.0)) > 0
-        x = _at_walls(x, at_wall, walls - hierarchy.prior_mean, given)
+        x = _at_walls(x, at_wall, walls - hierarchy.prior_mean, given.spread, weight)
     return beta + hierarchy.prior_mean[order], x + hierarchy.prior_mean
 
 
-def _at_walls(x: Floats, at_wall: Bools, low: Floats, given: Conditionals) -> Floats:
+def _at_walls(x: Floats, at_wall: Bools, low: Floats, spread: Floats, weight: Floats) -> Floats:
     """Recordings with some coordinates moved to their walls, the others conditioned on that.
 
     Parameters
@@ -108,11 +109,11 @@ def _at_walls(x: Floats, at_wall: Bools, low: Floats, given: Conditionals) -> Fl
         Which of them are at their walls.
     low : ndarray, shape (D,)
         The walls, less the prior's mean.
-    given : Conditionals
-        What the recordings say below the same hyperparameters.
+    spread, weight : ndarray, shape (B, D), (B, R, D, D)
+        Of the levels above the recordings, and what these say (`Hierarchy.weight`).
     """
-    spread = given.spread[:, None, :]
-    left = -spread[..., None] * given.weight * spread[:, :, None, :]
+    spread = spread[:, None, :]
+    left = -spread[..., None] * weight * spread[:, :, None, :]
     left += spread[..., None] * np.eye(x.shape[2])  # covariance about the levels, (B, R, D, D)
     for i in np.flatnonzero(at_wall.any(axis=(0, 1))):
         gain = left[..., i] / left[..., i, i][..., None] * at_wall[..., i, None]

@@ -71,15 +71,15 @@ class Hierarchy(Stacked):
         return design
 
     @cached_property
+    def entry(self) -> Ints:
+        """Which entry of beta each coordinate of a recording is; shape (R, D)."""
+        return self.design.argmax(axis=2)
+
+    @cached_property
     def beta_sd(self) -> Floats:
         """Prior standard deviation of beta, whose mean is the origin; shape (q,)."""
         places = int(self.place.max()) + 1
         return np.concatenate([self.prior_sd[self.hand], *[self.prior_sd[self.device]] * places])
-
-    @cached_property
-    def members(self) -> Floats:
-        """Which recordings are whose, shape (U, R)."""
-        return np.equal.outer(np.arange(int(self.user.max()) + 1), self.user).astype(float)
 
     def guess(self) -> tuple[Floats, Floats]:
         """Middle and width of phi by the scatter of the recordings' own estimates; (Q,) each."""
@@ -93,10 +93,10 @@ class Hierarchy(Stacked):
         spread[:, self.device] = level.device_sd**2
         return spread
 
-    def _by_user(self, values: Floats) -> Floats:
-        """Values of recordings, shape (B, R, ...), summed over those of each user."""
-        flat = self.members @ values.reshape(*values.shape[:2], -1)
-        return flat.reshape(len(values), len(self.members), *values.shape[2:])
+    def weight(self, spread: Floats) -> Floats:
+        """Inverses of V_r + T for spreads of shape (B, D); shape (B, R, D, D)."""
+        marginal = self.covariance + spread[:, None, :, None] * np.eye(spread.shape[1])
+        return inverse_and_log_det(marginal)[0]
 
     def log_density(self, phi: Floats) -> Floats:
         """Log posterior density of hyperparameters phi of shape (B, Q), up to a constant."""
@@ -119,11 +119,11 @@ class Hierarchy(Stacked):
         mean, covariance : ndarray, shape (R, D), (R, D, D)
         """
         given = self.given(phi[None])
-        spread = given.spread[0]
+        spread, weight = given.spread[0], self.weight(given.spread)[0]
         means, covariances = [], []
         for r, seen in enumerate(self.mean):
             mean, covariance = (part[0] for part in self.before(given, r))
-            gain = spread[:, None] * given.weight[0, r]
+            gain = spread[:, None] * weight[r]
             kept = np.eye(len(spread)) - gain
             means.append(mean + gain @ (seen - mean))
             covariances.append(kept @ covariance @ kept.T + kept * spread)
@@ -153,6 +153,20 @@ class Hierarchy(Stacked):
         covariance[:, self.hand[:, None], self.hand] += own
         return mean, covariance
 
+    def _summed(self, spread: Floats, people: int) -> list[Floats]:
+        """What recordings say with spreads of shape (B, D): see `positive_kernel.summed`."""
+        from bayeshaptic.inference.population.positive_kernel import LANES, summed
+
+        count = len(spread)
+        rows = np.minimum(np.arange(-(-count // LANES) * LANES), count - 1)  # the last may be short
+        lanes = spread[rows].reshape(-1, LANES, spread.shape[1]).transpose(0, 2, 1)
+        recordings = self.covariance, self.mean, np.ascontiguousarray(lanes), self.entry
+        found = summed(*recordings, self.user, self.hand, people, self.design.shape[2])
+        out = [np.moveaxis(x, -1, 1).reshape(-1, *x.shape[1:-1])[:count] for x in found]
+        if np.isnan(out[3]).any():
+            raise np.linalg.LinAlgError("Matrix is not positive definite")
+        return out
+
     def given(self, phi: Floats) -> Conditionals:
         """Everything below given hyperparameters, integrated in closed form.
 
@@ -166,20 +180,10 @@ class Hierarchy(Stacked):
         """
         level = self.layout.read(phi)
         spread = self.spread(level)
-        marginal = self.covariance + spread[:, None, :, None] * np.eye(spread.shape[1])
-        weight, log_dets = inverse_and_log_det(marginal)  # (B, R, D, D), (B, R)
-        log_det = log_dets.sum(axis=1)
-        pull = (weight @ self.mean[:, :, None])[..., 0]
-        seen = weight @ self.design  # (B, R, D, q)
-        count, people, hand = len(phi), len(self.members), len(self.hand)
-        flat = self.design.reshape(-1, self.design.shape[2])
-        precision = flat.T @ seen.reshape(count, *flat.shape)
-        score = pull.reshape(count, -1) @ flat
-        chi = pull.reshape(count, -1) @ self.mean.ravel()
+        count, people, hand = len(phi), int(self.user.max()) + 1, len(self.hand)
+        precision, score, chi, log_det, own, own_score, own_seen = self._summed(spread, people)
         # People: v_u has precision K_u and, given beta, the mean K_u^-1 (score_u - seen_u beta).
-        own = self._by_user(weight[:, :, self.hand][..., self.hand]) + level.precision[:, None]
-        own_score = self._by_user(pull[..., self.hand])
-        own_seen = self._by_user(seen[:, :, self.hand])
+        own += level.precision[:, None]
         own_covariance, own_log_dets = inverse_and_log_det(own)
         gain = own_covariance @ own_seen
         gains = gain.reshape(count, people * hand, -1).transpose(0, 2, 1)
@@ -192,9 +196,7 @@ class Hierarchy(Stacked):
         log_det += 2 * people * np.log(root_diagonal).sum(axis=1)
         log_det += own_log_dets.sum(axis=1) + np.linalg.slogdet(precision)[1]
         value = level.log_prior - 0.5 * (log_det + chi - np.sum(score * beta, axis=1))
-        return Conditionals(
-            level, spread, weight, precision, beta, own_covariance, own_score, gain, value
-        )
+        return Conditionals(level, spread, precision, beta, own_covariance, own_score, gain, value)
 
 
 @dataclass(frozen=True)
@@ -207,8 +209,6 @@ class Conditionals:
         The hyperparameters by name.
     spread : ndarray, shape (B, D)
         Diagonal of T.
-    weight : ndarray, shape (B, R, D, D)
-        Inverse of V_r + T.
     precision, beta : ndarray, shape (B, q, q), (B, q)
         Of beta, whose prior mean is the origin: precision and mean.
     own_covariance, own_score, gain : ndarray, shape (B, U, H, H), (B, U, H), (B, U, H, q)
@@ -219,7 +219,6 @@ class Conditionals:
 
     level: Hyperparameters
     spread: Floats
-    weight: Floats
     precision: Floats
     beta: Floats
     own_covariance: Floats

@@ -1,11 +1,66 @@
-"""Many small positive definite matrices: what is asked of each, from one Cholesky factor."""
+"""Many small positive definite matrices: what is asked of each, from one Cholesky factor.
+
+Eight of them go together: of one alone each sum waits for the one before.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bayeshaptic.compiled import kernel
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
+
+LANES = 8  # matrices at a time: the last axis of all that stands for several
+
+
+@kernel(inline=True)
+def _invert(matrix: Floats, root: Floats, back: Floats, inverse: Floats, log_det: Floats) -> None:
+    """Write the inverses of matrices (n, n, LANES), and add logarithms of their determinants.
+
+    `root` and `back` are room for the Cholesky factors, and for the inverses of these.
+    """
+    n = matrix.shape[0]
+    for j in range(n):
+        diagonal = root[j, j]
+        for x in range(LANES):
+            diagonal[x] = matrix[j, j, x]
+        for k in range(j):
+            for x in range(LANES):
+                diagonal[x] -= root[j, k, x] * root[j, k, x]
+        for x in range(LANES):
+            diagonal[x] = np.sqrt(diagonal[x])
+            log_det[x] += 2.0 * np.log(diagonal[x])
+        for i in range(j + 1, n):
+            value = root[i, j]
+            for x in range(LANES):
+                value[x] = matrix[i, j, x]
+            for k in range(j):
+                for x in range(LANES):
+                    value[x] -= root[i, k, x] * root[j, k, x]
+            for x in range(LANES):
+                value[x] /= diagonal[x]
+    for j in range(n):
+        for x in range(LANES):
+            back[j, j, x] = 1.0 / root[j, j, x]
+        for i in range(j + 1, n):
+            value = back[i, j]
+            for x in range(LANES):
+                value[x] = 0.0
+            for k in range(j, i):
+                for x in range(LANES):
+                    value[x] -= root[i, k, x] * back[k, j, x]
+            for x in range(LANES):
+                value[x] /= root[i, i, x]
+    for i in range(n):
+        for j in range(i + 1):
+            value = inverse[i, j]
+            for x in range(LANES):
+                value[x] = 0.0
+            for k in range(i, n):
+                for x in range(LANES):
+                    value[x] += back[k, i, x] * back[k, j, x]
+            for x in range(LANES):
+                inverse[j, i, x] = value[x]
 
 
 @kernel
@@ -25,32 +80,97 @@ def inverses(matrices: Floats) -> tuple[Floats, Floats]:
     """
     count, n = matrices.shape[0], matrices.shape[1]
     inverse, log_det = np.empty((count, n, n)), np.empty(count)
-    root, back = np.empty((n, n)), np.empty((n, n))
-    for b in range(count):
-        total = 0.0
-        for j in range(n):
-            square = matrices[b, j, j]
-            for k in range(j):
-                square -= root[j, k] * root[j, k]
-            root[j, j] = np.sqrt(square)
-            total += np.log(root[j, j])
-            for i in range(j + 1, n):
-                value = matrices[b, i, j]
-                for k in range(j):
-                    value -= root[i, k] * root[j, k]
-                root[i, j] = value / root[j, j]
-        for j in range(n):  # the inverse of the factor
-            back[j, j] = 1.0 / root[j, j]
-            for i in range(j + 1, n):
-                value = 0.0
-                for k in range(j, i):
-                    value -= root[i, k] * back[k, j]
-                back[i, j] = value / root[i, i]
-        for i in range(n):
-            for j in range(i + 1):
-                value = 0.0
-                for k in range(i, n):
-                    value += back[k, i] * back[k, j]
-                inverse[b, i, j] = inverse[b, j, i] = value
-        log_det[b] = 2.0 * total
+    matrix, found = np.empty((n, n, LANES)), np.empty((n, n, LANES))
+    root, back = np.empty((n, n, LANES)), np.empty((n, n, LANES))
+    logs = np.empty(LANES)
+    for first in range(0, count, LANES):
+        for x in range(LANES):
+            logs[x] = 0.0
+            matrix[:, :, x] = matrices[min(first + x, count - 1)]
+        _invert(matrix, root, back, found, logs)
+        for x in range(min(LANES, count - first)):
+            inverse[first + x] = found[:, :, x]
+            log_det[first + x] = logs[x]
     return inverse, log_det
+
+
+@kernel
+def summed(
+    covariance: Floats,
+    mean: Floats,
+    spread: Floats,
+    entry: Ints,
+    user: Ints,
+    hand: Ints,
+    people: int,
+    size: int,
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]:
+    """What R recordings say, summed over all of them and over those of each of U users.
+
+    W is the inverse of a recording's covariance with a spread on its diagonal.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (R, D, D)
+    mean : ndarray, shape (R, D)
+    spread : ndarray, shape (B, D, LANES)
+    entry : ndarray of int, shape (R, D)
+        Which entry of beta each coordinate is.
+    user : ndarray of int, shape (R,)
+    hand : ndarray of int, shape (H,)
+        Which coordinates are the hand's.
+    people, size : int
+        U, and the number q of entries of beta.
+
+    Returns
+    -------
+    precision, score : ndarray, shape (B, q, q, LANES), (B, q, LANES)
+        Of beta: W, and W times the mean.
+    chi, log_det : ndarray, shape (B, LANES)
+        Squares of the means by W, and log determinants of the inverses of W: nan where one is not
+        positive definite.
+    own, own_score, own_seen : ndarray, shape (B, U, H, H, LANES), (B, U, H, LANES), \
+(B, U, H, q, LANES)
+        W among the hand, times the mean, and its rows over beta; of each user.
+    """
+    count, n, fingers = len(spread), mean.shape[1], len(hand)
+    precision, score = np.zeros((count, size, size, LANES)), np.zeros((count, size, LANES))
+    chi, log_det = np.zeros((count, LANES)), np.zeros((count, LANES))
+    own = np.zeros((count, people, fingers, fingers, LANES))
+    own_score = np.zeros((count, people, fingers, LANES))
+    own_seen = np.zeros((count, people, fingers, size, LANES))
+    matrix, weight = np.empty((n, n, LANES)), np.empty((n, n, LANES))
+    root, back = np.empty((n, n, LANES)), np.empty((n, n, LANES))
+    pull = np.empty((n, LANES))
+    for b in range(count):
+        for r in range(len(mean)):
+            for i in range(n):
+                for j in range(i + 1):
+                    for x in range(LANES):
+                        matrix[i, j, x] = covariance[r, i, j]
+                for x in range(LANES):
+                    matrix[i, i, x] += spread[b, i, x]
+            _invert(matrix, root, back, weight, log_det[b])
+            for i in range(n):
+                row = entry[r, i]
+                for x in range(LANES):
+                    pull[i, x] = 0.0
+                for j in range(n):
+                    for x in range(LANES):
+                        pull[i, x] += weight[i, j, x] * mean[r, j]
+                        precision[b, row, entry[r, j], x] += weight[i, j, x]
+                for x in range(LANES):
+                    score[b, row, x] += pull[i, x]
+                    chi[b, x] += pull[i, x] * mean[r, i]
+            u = user[r]
+            for i in range(fingers):
+                row = hand[i]
+                for x in range(LANES):
+                    own_score[b, u, i, x] += pull[row, x]
+                for j in range(fingers):
+                    for x in range(LANES):
+                        own[b, u, i, j, x] += weight[row, hand[j], x]
+                for j in range(n):
+                    for x in range(LANES):
+                        own_seen[b, u, i, entry[r, j], x] += weight[row, j, x]
+    return precision, score, chi, log_det, own, own_score, own_seen
