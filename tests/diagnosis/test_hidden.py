@@ -13,7 +13,7 @@ from linear_bench import RIGID, Device
 from bayeshaptic.diagnosis.close_loop import close_loop, with_average
 from bayeshaptic.diagnosis.closed import Closed
 from bayeshaptic.diagnosis.hidden.average import average, looked_at
-from bayeshaptic.diagnosis.hidden.evidence import Evidence
+from bayeshaptic.diagnosis.hidden.evidence import Evidence, asked
 from bayeshaptic.diagnosis.hidden.forces import force_suspects, slope_of
 from bayeshaptic.diagnosis.hidden.hidden import averaged, with_hidden
 from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
@@ -164,8 +164,8 @@ def test_sizes_of_another_recording_are_read_off_its_evidence() -> None:
     shape = np.array([[10.0], [10.0], [10.0], [10.0], [10.0]])
     log = np.array([-0.1, -0.4, -1.6, 0.2, 0.5])
     own = Evidence(size, shape, np.full(5, 0.2), log + 0.1, log)
-    assert own.of(size, shape) == pytest.approx(log)
-    others = own.of(np.array([0.5, 8.0, 2.0, -0.5]), np.full((4, 1), 9.0))
+    assert own.of(asked(size, shape)) == pytest.approx(log)
+    others = own.of(asked(np.array([0.5, 8.0, 2.0, -0.5]), np.full((4, 1), 9.0)))
     assert others == pytest.approx([-0.025, -6.4, -0.4, 0.05])
     assert own.with_more(2 * log) == pytest.approx(np.log(0.2 * np.exp(3 * log + 0.1).sum()))
 

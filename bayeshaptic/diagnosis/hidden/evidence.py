@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import logsumexp
 
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -39,24 +39,55 @@ class Evidence:
         """Log evidence of the effect together with what others say of its sizes, shape (C,)."""
         return float(logsumexp(self.log + said, b=self.weight))
 
-    def of(self, size: Floats, shape: Floats) -> Floats:
-        """What the data say of other sizes (D,) with the shapes (D, K) that come closest, (D,).
+    def of(self, asked: Asked) -> Floats:
+        """What the data say of other sizes (D,) with the shapes that come closest, (D,).
 
         In between linear over the logarithm of the size; beyond the ends as the square of the size,
         which is what the log likelihood of a small change goes with.
         """
-        out = np.zeros(len(size))
+        out = np.zeros(len(asked.size))
         kinds, which = np.unique(self.shape, axis=0, return_inverse=True)
-        near = _nearest(kinds, shape)
-        for kind in np.unique(near):
-            for positive in (True, False):
-                asked = (near == kind) & ((size > 0) == positive)
-                known = (which.ravel() == kind) & ((self.size > 0) == positive)
-                if asked.any() and known.any():
-                    out[asked] = _interpolated(
-                        np.abs(size[asked]), np.abs(self.size[known]), self.by_data[known]
-                    )
+        near = _nearest(kinds, asked.shapes)
+        for number, rows in asked.parts:
+            size, kind = asked.size[rows], which.ravel() == near[number]
+            known = kind & ((self.size > 0) == (size[0] > 0))
+            if known.any():
+                out[rows] = _interpolated(
+                    np.abs(size), np.abs(self.size[known]), self.by_data[known]
+                )
         return out
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Sizes that evidence is asked for, in parts of one shape and one sign.
+
+    Attributes
+    ----------
+    size : ndarray, shape (D,)
+    shapes : ndarray, shape (S, K)
+        Each once.
+    parts : list of (int, ndarray of int)
+        Which shape, and which of the sizes.
+    """
+
+    size: Floats
+    shapes: Floats
+    parts: list[tuple[int, Ints]]
+
+
+def asked(size: Floats, shape: Floats) -> Asked:
+    """Sizes (D,) with the shapes (D, K), put in order once for all that are asked.
+
+    Parameters
+    ----------
+    size, shape : ndarray, shape (D,), (D, K)
+    """
+    shapes, which = np.unique(shape, axis=0, return_inverse=True)
+    key = 2 * which.ravel() + (size > 0)
+    order = np.argsort(key, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
+    return Asked(size, shapes, [(int(key[part[0]]) // 2, part) for part in parts])
 
 
 def _nearest(kinds: Floats, shape: Floats) -> Floats:

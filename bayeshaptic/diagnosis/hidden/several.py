@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.diagnosis.hidden.average import Told
+from bayeshaptic.diagnosis.hidden.evidence import asked
 from bayeshaptic.diagnosis.hidden.hidden import Hidden, HiddenEffect, averaged
 from bayeshaptic.diagnosis.hidden.weighed import Weighed
 from bayeshaptic.stability.critical import CriticalStiffness
@@ -106,9 +107,10 @@ def _by_others(weighed: Sequence[Weighed], number: Ints) -> list[Told]:
     size = np.concatenate([part for one, own in pairs for part in (one.size, own.size)])
     shape = np.concatenate([part for one, own in pairs for part in (one.shape, own.shape)])
     asks = np.repeat(number, [len(one.size) + len(own.size) for one, own in pairs])
+    wanted = asked(size, shape)
     said = np.zeros(len(size))
     for own, whose in zip(evidence, number, strict=True):
-        said += np.where(asks == whose, 0.0, own.of(size, shape))
+        said += np.where(asks == whose, 0.0, own.of(wanted))
     ends = np.cumsum([len(part) for one, own in pairs for part in (one.size, own.size)])
     parts = np.split(said, ends[:-1])
     return [Told(*both) for both in zip(parts[::2], parts[1::2], strict=True)]
