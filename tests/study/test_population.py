@@ -414,6 +414,47 @@ def test_small_matrices_are_inverted_as_numpy_does() -> None:
         inverse_and_log_det(matrices * np.where(np.arange(7) == 3, -1.0, 1.0)[:, None, None])
 
 
+def test_what_recordings_say_is_summed_as_numpy_does() -> None:
+    """Of 13 spreads (no whole number of lanes), three users, two configurations."""
+    rng = np.random.default_rng(3)
+    roots = rng.standard_normal((5, 4, 9))
+    covariance, mean = roots @ roots.transpose(0, 2, 1), rng.standard_normal((5, 4))
+    likelihoods = tuple(
+        GaussianLikelihood(m, np.linalg.inv(v), v, 0.0)
+        for m, v in zip(mean, covariance, strict=True)
+    )
+    user, place = np.array([0, 0, 1, 2, 2]), np.array([0, 1, 0, 0, 1])
+    hand, device = np.array([1, 3]), np.array([0, 2])
+    level = Hierarchy(likelihoods, user, place, hand, device, np.zeros(4), np.ones(4))
+    spread = rng.uniform(0.1, 2.0, (13, 4))
+    weight = np.linalg.inv(covariance + spread[:, None, :, None] * np.eye(4))
+    np.testing.assert_allclose(level.weight(spread), weight, atol=1e-12)
+    pull, seen = np.einsum("brij,rj->bri", weight, mean), weight @ level.design
+    members = np.equal.outer(np.arange(3), user).astype(float)
+    plain = (
+        np.einsum("rip,briq->bpq", level.design, seen),
+        np.einsum("rip,bri->bp", level.design, pull),
+        np.einsum("bri,ri->b", pull, mean),
+        -np.linalg.slogdet(weight)[1].sum(axis=1),
+        np.einsum("ur,brij->buij", members, weight[:, :, hand][..., hand]),
+        np.einsum("ur,bri->bui", members, pull[..., hand]),
+        np.einsum("ur,briq->buiq", members, seen[:, :, hand]),
+    )
+    for one, other in zip(level._summed(spread, 3), plain, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+
+
+def test_a_cavity_is_the_mean_of_normal_densities() -> None:
+    rng = np.random.default_rng(4)
+    means, roots, x = (rng.standard_normal(s) for s in ((6, 3), (6, 3, 8), (20, 3)))
+    covariances = roots @ roots.transpose(0, 2, 1)
+    rest = Cavity(means, np.linalg.inv(np.linalg.cholesky(covariances)))
+    off = x - means[:, None]
+    square = np.einsum("kbi,kij,kbj->kb", off, np.linalg.inv(covariances), off)
+    plain = np.exp(-0.5 * square) / np.sqrt(np.linalg.det(covariances))[:, None]
+    np.testing.assert_allclose(rest(x), np.log(plain.mean(axis=0)), atol=1e-10)
+
+
 def test_a_sampler_that_is_stopped_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     calls = []
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, at_peak
 from bayeshaptic.inference.population.hierarchy import Hierarchy
@@ -35,17 +34,12 @@ class Cavity:
 
     def __call__(self, x: Floats) -> Floats:
         """Log density of points of shape (B, D); shape (B,)."""
-        chunk = 2000
-        parts = [self._density(x[start : start + chunk]) for start in range(0, len(x), chunk)]
-        return np.concatenate(parts) if parts else np.empty(0)
+        from bayeshaptic.inference.population.positive_kernel import log_mixture
 
-    def _density(self, x: Floats) -> Floats:
-        """Log density of a few points at a time, which keeps the arrays of (K, B, D) small."""
-        white = x @ self.whitening.transpose(0, 2, 1)
-        white -= (self.whitening @ self.means[:, :, None])[:, None, :, 0]
         scale = np.log(np.diagonal(self.whitening, axis1=1, axis2=2)).sum(axis=1)
-        logs = scale[:, None] - 0.5 * np.einsum("kbd,kbd->kb", white, white)
-        return np.asarray(logsumexp(logs, axis=0) - np.log(len(logs)), float)
+        middle = (self.whitening @ self.means[:, :, None])[..., 0]
+        inner = np.ascontiguousarray(self.whitening.transpose(1, 2, 0))
+        return log_mixture(np.ascontiguousarray(x), inner, np.ascontiguousarray(middle.T), scale)
 
     def moments(self) -> tuple[Floats, Floats]:
         """Mean (D,) and covariance (D, D) of the mixture."""

@@ -174,3 +174,38 @@ def summed(
                     for x in range(LANES):
                         own_seen[b, u, i, entry[r, j], x] += weight[row, j, x]
     return precision, score, chi, log_det, own, own_score, own_seen
+
+
+@kernel
+def log_mixture(x: Floats, whitening: Floats, middle: Floats, scale: Floats) -> Floats:
+    """Log of the mean density of K normal distributions at points of shape (B, D), (B,).
+
+    Parameters
+    ----------
+    x : ndarray, shape (B, D)
+    whitening : ndarray, shape (D, D, K)
+        Inverses of the Cholesky factors of the covariances; only the lower triangles are read.
+    middle : ndarray, shape (D, K)
+        The means, times these.
+    scale : ndarray, shape (K,)
+        Log determinants of these.
+    """
+    count, size, parts = len(x), x.shape[1], len(scale)
+    out, logs, white = np.empty(count), np.empty(parts), np.empty(parts)
+    for b in range(count):
+        for k in range(parts):
+            logs[k] = scale[k]
+        for i in range(size):
+            for k in range(parts):
+                white[k] = -middle[i, k]
+            for j in range(i + 1):
+                for k in range(parts):
+                    white[k] += whitening[i, j, k] * x[b, j]
+            for k in range(parts):
+                logs[k] -= 0.5 * white[k] * white[k]
+        top = logs.max()
+        total = 0.0
+        for k in range(parts):
+            total += np.exp(logs[k] - top)
+        out[b] = top + np.log(total) - np.log(parts)
+    return out
