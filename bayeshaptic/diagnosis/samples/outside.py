@@ -92,8 +92,11 @@ def outside(samples: Samples) -> Outside:
 
 
 def _loudness(errors: Floats, position: Floats) -> Floats:
-    """Mean square of the errors in each block, over the usual one, shape (N // BLOCK,)."""
-    blocks = len(errors) // BLOCK
+    """Mean square of the errors in each block but the last, over the usual one, (N // BLOCK - 1,).
+
+    Of what pushes in the last no motion tells, and an integral is worst known at its end.
+    """
+    blocks = len(errors) // BLOCK - 1
     squares = np.mean(errors[: blocks * BLOCK].reshape(blocks, BLOCK) ** 2, axis=1)
     return np.asarray(squares / max(float(np.median(squares)), (_TINY * np.std(position)) ** 2))
 
