@@ -47,7 +47,7 @@ LOST, WILD = 4.0, 4.0
 OUTSIDE = 10.0
 """Mean square of the errors in the least clear of a few moments, over the usual one (outside).
 
-Of 160 clean recordings and 1,124 others two are above (docs/effects.md); the largest other is 7.3."""
+Of 160 clean recordings and 1,124 others two are above (docs/effects.md); the next has 7.3."""
 JITTER, JITTER_STAMPED = 7.0, 2.5
 """Rise of the noise with the speed, in standard deviations from blocks of samples; the second
 where the time stamps show jitter already."""
