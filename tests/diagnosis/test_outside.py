@@ -117,6 +117,17 @@ def test_a_clean_recording_has_none(device: str) -> None:
     assert found.moments == () and not found.force.any()
 
 
+@pytest.mark.parametrize("effect", [(), ("lost_command",)])
+def test_without_noise_rounding_is_no_moment_and_no_force_is_left(effect: tuple[str, ...]) -> None:
+    """Where errors are of the last digits those at the beginning are forty times the others."""
+    bench = BENCHES["phantom"].quiet()
+    for name in effect:
+        bench = bench.with_effect(name)
+    made = simulate(bench, WhiteNoise(bench.force_rms, 200.0, 0.7, 10.0), seed=1)
+    found = outside(as_recorded(recording_from_arrays(**made.signals)))
+    assert found.moments == () and not found.force.any()
+
+
 def test_what_lasts_is_no_moment() -> None:
     recording = recorded("phantom", ("lost_command", (("begin_s", 4.0), ("length_s", 3.0))))
     assert outside(as_recorded(recording)).moments == ()

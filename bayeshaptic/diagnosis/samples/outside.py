@@ -28,7 +28,7 @@ _ONE = 8  # blocks between two that are one moment
 _BESIDE = 3  # blocks before and after: of how it begins and ends less can be seen
 _MOST, _LONGEST = 5, 0.2  # moments, and their share of the recording
 _ROUNDS = 4  # for the size of what pushed, which is that of what is found
-_TINY = 1e-9  # of the motion: errors where it is predicted exactly
+_TINY = 1e-8  # of the motion: errors where it is predicted to within rounding
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def outside(samples: Samples) -> Outside:
     if statistic <= thresholds.OUTSIDE:
         return replace(nothing, statistic=statistic)
     # What the regression learnt of the moments themselves, it unlearns.
-    found = replace(nothing, moments=moments)
+    found = Outside(moments, np.zeros(recording.samples), statistic)
     predictor = samples.without(found.acts).predictor
     if predictor is None:
         return nothing
@@ -88,7 +88,7 @@ def outside(samples: Samples) -> Outside:
     left = predictor.errors(samples.position, recording.force + found.force)
     if _loudness(left, recording.position).max() > _QUIET:  # it was no force
         return nothing
-    return replace(found, statistic=statistic)
+    return found
 
 
 def _loudness(errors: Floats, position: Floats) -> Floats:
