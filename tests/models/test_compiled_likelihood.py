@@ -126,6 +126,9 @@ def test_no_value_depends_on_the_batch_around_it() -> None:
     likelihood = Likelihood(model, windows(3))
     theta = model.values * np.exp(0.5 * RNG.standard_normal((33, model.size)))
     theta[5:9, model.names.index("delay_s")] = 3e-4  # the tables of a delay are kept
+    theta[7, model.names.index("kc")] *= 300  # by its poles alone, which needs no tables
+    theta[20:26, model.names.index("delay_s")] = 4e-4
+    theta[[20, 22, 23], model.names.index("kc")] *= 300
     together = likelihood(theta)
     assert np.array_equal(together, [likelihood(row[None])[0] for row in theta])
     assert np.array_equal(together[::-1], likelihood(theta[::-1]))

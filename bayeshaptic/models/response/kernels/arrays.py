@@ -90,6 +90,8 @@ class Space(NamedTuple):
     factor : ndarray, shape (2, L)
         Hold and delay.
     response : ndarray, shape (R, 2, L)
+    turns : ndarray, shape (1,)
+        The delay that the matrices and `factor` are of; nan before the first.
     """
 
     matrix: Floats
@@ -100,3 +102,4 @@ class Space(NamedTuple):
     begun: Floats
     factor: Floats
     response: Floats
+    turns: Floats

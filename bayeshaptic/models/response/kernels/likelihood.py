@@ -97,7 +97,7 @@ def deviations(form: RationalArrays, windows: WindowArrays, scale: Floats, out: 
     space, count, first = space_of(form), len(windows.weight), 0
     re, im = np.empty(count), np.empty(count)
     while first < len(out):
-        last = rows_from(first, form.turns)
+        last = rows_from(first, form)
         respond_together(form, first, last, space)
         for row in range(first, last):
             real, imag = space.response[row - first, 0], space.response[row - first, 1]
@@ -116,7 +116,7 @@ def log_likelihood(form: RationalArrays, windows: WindowArrays, out: Floats) -> 
     re, im, power = np.empty(count), np.empty(count), np.empty((TOGETHER, count))
     mantissa = np.empty(count, np.int64)
     while first < len(out):
-        last = rows_from(first, form.turns)
+        last = rows_from(first, form)
         respond_together(form, first, last, space)
         _powers(windows, space.response, re, im, power[: last - first])
         for row in range(first, last):

@@ -28,10 +28,15 @@ TOGETHER = 4  # rows whose responses stay in the nearest cache
 
 
 @kernel(inline=True)
-def rows_from(first: int, turns: Floats) -> int:
-    """Where the rows end that are taken together with this one: they have its delay."""
-    last = first + 1
+def rows_from(first: int, form: RationalArrays) -> int:
+    """Where the rows end that are taken together with this one.
+
+    They have its delay, and are by their poles alone where it is.
+    """
+    turns, alone, last = form.turns, form.pole_count[first] < 0, first + 1
     while last < len(turns) and last - first < TOGETHER and turns[last] == turns[first]:
+        if (form.pole_count[last] < 0) != alone:
+            break
         last += 1
     return last
 
@@ -50,18 +55,25 @@ def space_of(form: RationalArrays) -> Space:
         np.zeros((4, nodes)),
         np.empty((2, nodes)),
         np.empty((TOGETHER, 2, nodes)),
+        np.full(1, np.nan),
     )
 
 
 @kernel(inline=True)
 def respond_together(form: RationalArrays, first: int, last: int, space: Space) -> None:
-    """The responses of rows with one delay, in `space.response`.
+    """The responses of the rows of `rows_from`, in `space.response`.
 
-    The tables of a delay stay in `space`: rows are taken in their order.
+    The tables of a delay stay in `space` for the rows that follow.
     """
     turns = form.turns[first]
     late = turns - math.floor(turns)
-    if first == 0 or turns != form.turns[first - 1]:
+    if form.pole_count[first] < 0:  # their poles are all there is
+        for row in range(first, last):
+            space.response[row - first] = 0.0
+            _add_poles(form, row, space, space.response[row - first])
+        return
+    if turns != space.turns[0]:
+        space.turns[0] = turns
         alias_matrix(late, False, form.bernoulli, form.binomials, space.matrix)
         if len(form.high):
             alias_matrix(late, True, form.bernoulli, form.binomials, space.far_matrix)
@@ -203,7 +215,7 @@ def _delay(turns: float, theta: Floats, hold: Floats, out_re: Floats, out_im: Fl
 
 @kernel(inline=True)
 def _add_poles(form: RationalArrays, row: int, space: Space, response: Floats) -> None:
-    """Add the closed form of a row's poles; a negative count: they are all there is."""
+    """Add the closed form of a row's poles."""
     re, im, real, imag = space.poles[0], space.poles[1], response[0], response[1]
     hold_re, hold_im = form.hold[0], form.hold[1]
     re[:], im[:] = 0.0, 0.0
@@ -219,8 +231,6 @@ def _add_poles(form: RationalArrays, row: int, space: Space, response: Floats) -
             size = 1.0 / (below_re * below_re + below_im * below_im)
             re[node] += size * (above_re * below_re + above_im * below_im)
             im[node] += size * (above_im * below_re - above_re * below_im)
-    if form.pole_count[row] < 0:
-        real[:], imag[:] = 0.0, 0.0
     whole = math.floor(form.turns[row])
     for node in range(len(re)):
         c, s = cos_sin(form.theta[node] * whole)
@@ -234,7 +244,7 @@ def respond(form: RationalArrays, out: Floats) -> None:
     space = space_of(form)
     first = 0
     while first < len(out):
-        last = rows_from(first, form.turns)
+        last = rows_from(first, form)
         respond_together(form, first, last, space)
         for row in range(first, last):
             for node in range(len(form.theta)):
