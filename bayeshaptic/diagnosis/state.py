@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,6 +137,11 @@ class State:
     @property
     def model(self) -> Model:
         return self.fit.model
+
+    @cached_property
+    def errors(self) -> Floats:
+        """Weighted rms on windows that took no part in the fit, and on all, shape (2,)."""
+        return _errors(self.fit)
 
 
 @dataclass(frozen=True)
@@ -285,11 +291,11 @@ def compared_errors(before: State, after: State) -> tuple[Floats, Floats]:
         there, own = (f.likelihood.noise_variance for f in (before.fit, fit))
         louder = replace(windows, scatter=windows.scatter * np.interp(at, known, there) / own)
         fit = summarise(fit.model, louder, polish(fit.model, louder, fit.theta))
-    was, now = (
-        np.array([held_out_rms(one, CHOOSE), np.sqrt(one.reduced_chi_square)])
-        for one in (before.fit, fit)
-    )
-    return was, now
+    return before.errors, after.errors if fit is after.fit else _errors(fit)
+
+
+def _errors(fit: Fit) -> Floats:
+    return np.array([held_out_rms(fit, CHOOSE), np.sqrt(fit.reduced_chi_square)])
 
 
 def describe_gain(gain: float) -> str:

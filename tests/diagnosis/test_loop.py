@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.signal import chirp
 
-from bayeshaptic.diagnosis import loop as closing
+from bayeshaptic.diagnosis import loop as closing, state as states
 from bayeshaptic.diagnosis.loop import Loop, trace
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest, smooth_columns
 from bayeshaptic.diagnosis.state import Accepted, State, Trial, compared_errors, held_out_rms
@@ -158,6 +158,17 @@ def test_what_was_part_of_the_noise_is_judged_by_that_noise(family: str, raised:
     was, now = compared_errors(before, after)
     assert bool(np.any(now > 5 * was)) == raised
     assert raised or np.allclose(now, was, rtol=0.02)
+
+
+def test_errors_of_a_state_are_those_of_every_candidate_beside_it(monkeypatch) -> None:
+    """They take a fit, and were asked for once a candidate."""
+    _, etfe, fit = fitted(False, 8.0, MODE)
+    before, accepted = State(etfe, fit), Accepted("some", "some", "linear", "")
+    asked = []
+    monkeypatch.setattr(states, "held_out_rms", lambda one, part: asked.append(one) or 1.0)
+    for after in (State(etfe, replace(fit), (accepted,)) for _ in range(3)):
+        assert compared_errors(before, after)[0][0] == 1.0
+    assert sum(one is fit for one in asked) == 1 and len(asked) == 4
 
 
 def test_a_fit_to_what_the_noise_hid_is_no_error_of_what_was_mended() -> None:
