@@ -12,8 +12,10 @@ from bayeshaptic.diagnosis.base import best_direct
 from bayeshaptic.diagnosis.base.best_direct import traced_directly
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals import residual
-from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
+from bayeshaptic.diagnosis.state import Accepted, State, Trial
+from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.trials import direct
+from bayeshaptic.diagnosis.trials.direct import trace_directly
 from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
 from bayeshaptic.numerics.spending import Meter
 from benchmarks.through_reference import make
@@ -227,3 +229,17 @@ def test_a_rubbing_loop_whose_friction_no_test_of_a_force_sees() -> None:
         case.friction * case.bench.force_rms,
         rtol=0.1,
     )
+
+
+def test_what_the_one_candidate_that_convinces_leaves_is_looked_at_once(monkeypatch) -> None:
+    """Nothing is compared with it, and what it leaves is what is left when it is taken."""
+    there = SimpleNamespace(theta=np.zeros(1), impossible=())
+    accepted = Accepted("extra_delay", "another delay", "linear", "")
+    looked: list[State] = []
+    monkeypatch.setattr(direct, "_left", lambda state: looked.append(state) or ())
+    trial = Trial(accepted, State(None, there, (accepted,)), 500.0, 125.0, 1)
+    monkeypatch.setattr(direct, "_trials", lambda *_: [trial])
+    base = State(None, SimpleNamespace(theta=np.ones(1)))
+    found = trace_directly(Traced(UNEXPLAINED, "linear", base, (), ()), Meter())
+    assert [one.name for one in found.state.accepted] == ["extra_delay"]
+    assert len(looked) == 1

@@ -16,6 +16,7 @@ one has an effect named, with a gain of 39: its fit had ended in another valley.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from bayeshaptic.diagnosis import acceptance, thresholds
@@ -107,15 +108,21 @@ def _round(before: Traced, meter: Meter) -> Traced | None:
     """The record with one more effect; None where none convinces."""
     trials = _trials(before.state, before.after, meter)
     open_ = [t for t in trials if t.convincing and not t.state.fit.impossible]
-    left = {id(trial): _left(trial.state) for trial in open_}
+    left: dict[int, tuple[Test, ...]] = {}
+
+    def remaining(trial: Trial) -> tuple[Test, ...]:
+        if id(trial) not in left:
+            left[id(trial)] = _left(trial.state)
+        return left[id(trial)]
+
     chosen = acceptance.choose(
         open_,
-        lambda trial: acceptance.excess(left[id(trial)]),
+        lambda trial: acceptance.excess(remaining(trial)),
         lambda trial: worth(trial.state.fit),
     )
     if chosen is None or not _is_known_to_hold(chosen):
         return None
-    return _accepting(before, chosen, trials, open_)
+    return _accepting(before, chosen, trials, open_, remaining)
 
 
 def with_trial(before: Traced, trial: Trial) -> Traced:
@@ -127,11 +134,19 @@ def with_trial(before: Traced, trial: Trial) -> Traced:
         Of the state that it was tried on.
     trial : Trial
     """
-    return _accepting(before, trial, [trial], [trial])
+    return _accepting(before, trial, [trial], [trial], lambda one: _left(one.state))
 
 
-def _accepting(before: Traced, chosen: Trial, trials: list[Trial], open_: list[Trial]) -> Traced:
+def _accepting(
+    before: Traced,
+    chosen: Trial,
+    trials: list[Trial],
+    open_: list[Trial],
+    remaining: Callable[[Trial], tuple[Test, ...]],
+) -> Traced:
     """The record with the chosen trial; others that are open are `open_`.
+
+    `remaining` tells what the tests still see of a trial as it stands.
 
     A force that acts may bend the base model's fit into a valley that is none without it: one held
     device stayed there by 92 in log likelihood, with six of eleven parameters wrong.
@@ -139,7 +154,8 @@ def _accepting(before: Traced, chosen: Trial, trials: list[Trial], open_: list[T
     state = acceptance.with_ties(chosen, open_)
     if chosen.accepted.acts:
         state = replace(state, fit=likeliest(state.fit, state.etfe))
-    tests = _left(state)
+    same = state.fit.theta is chosen.state.fit.theta
+    tests = remaining(chosen) if same else _left(state)
     *earlier, own = state.accepted
     evidence = f"raises the log likelihood of all windows by {chosen.gain_fit:.0f}"
     state = replace(state, accepted=(*earlier, replace(own, evidence=evidence)))
