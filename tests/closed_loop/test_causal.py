@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.recordings.response.estimators.noise_slope import noise_slopes
 from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.recordings.response.spectra import RandomSpectra
+from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 from benchmarks.strangers import loops
 from benchmarks.through_reference import Case, make
@@ -28,6 +30,30 @@ from benchmarks.through_reference import Case, make
 TIME = "time-varying"
 # Held PHANToMs, whose counts are coarse, of 5 to 19 s.
 COARSE = (446, 576, 614, 706)
+
+
+def test_scores_are_sums_over_windows_and_nodes() -> None:
+    rng = np.random.default_rng(3)
+
+    def drawn(*shape: int):
+        return rng.normal(size=shape) + 1j * rng.normal(size=shape)
+
+    nodes, design, changes = rng.uniform(1, 9, (20, 3)), drawn(20, 3, 4), drawn(20, 3, 5)
+    windows = Windows(nodes, design, drawn(20, 3), rng.uniform(1, 2, 20), np.full(20, 9.0))
+    found = causal.scores(SimpleNamespace(response=lambda at: 1 / at), windows, changes)
+    score, information = np.zeros(6), np.zeros((6, 6))
+    for window in range(20):
+        own = design[window, :, :3]
+        left = windows.target[window] - own @ (1 / nodes[window])
+        moved = np.hstack([own @ changes[window], design[window, :, 3:]])
+        power = windows.scatter[window] + np.linalg.norm(left) ** 2
+        along = moved.conj().T @ left
+        score += 16 / power * along.real
+        information += 16 / power * (moved.conj().T @ moved).real
+        information -= 16 / power**2 * np.outer(along, along.conj()).real
+    np.testing.assert_allclose(found.score * found.size, score, rtol=1e-10)
+    sizes = np.outer(found.size, found.size)
+    np.testing.assert_allclose(found.covariance * sizes, information, rtol=1e-10, atol=1e-9)
 
 
 def right(case: Case) -> tuple[Fit, Etfe]:

@@ -125,14 +125,21 @@ def scores(fit: Fit, windows: Windows, changes: Complexes) -> Scores:
     weight = 2 * (windows.lines - 1) / power
     along = np.einsum("wkc,wk->wc", moved.conj(), left)
     # What of a change goes with the noise itself is the controller's answer, and tells nothing.
-    both = np.einsum("w,wkc,wkd->cd", weight, moved.conj(), moved).real
-    answers = np.einsum("w,wc,wd->cd", weight / power, along, along.conj()).real
+    both = _products(np.sqrt(weight)[:, None, None] * moved)
+    answers = _products(np.sqrt(weight / power)[:, None] * along)
     size = np.sqrt(np.maximum(np.diag(both), np.finfo(float).tiny))
     return Scores(
         (weight[:, None] * along.real).sum(axis=0) / size,
         (both - answers) / np.outer(size, size),
         size,
     )
+
+
+def _products(columns: Complexes) -> Floats:
+    """Real parts of all inner products of columns, shape (..., C): shape (C, C)."""
+    flat = columns.reshape(-1, columns.shape[-1])
+    parts = np.concatenate([flat.real, flat.imag])
+    return np.asarray(parts.T @ parts)
 
 
 def _own_changes(fit: Fit, frequency_hz: Floats) -> Complexes:
