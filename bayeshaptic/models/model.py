@@ -76,7 +76,7 @@ class Model(Shown):
         """Whether somebody holds the device."""
         return self.structure.held
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(parameter.name for parameter in self.parameters)
 
