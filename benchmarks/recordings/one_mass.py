@@ -160,8 +160,8 @@ def make(seed: int, noise: float | None = None, along_too: bool = False) -> Case
     if dry:
         bench = bench.with_effect("coulomb_friction", force=dry)
     done = run_loop(bench, control, seconds, seed=seed, give_up=100 * stroke)
-    way = np.linspace(done.position.min(), done.position.max(), 400)
-    mean, forward, backward = (float(along.force(which, way).mean()) for which in range(3))
+    at = done.position
+    mean, forward, backward = (float(along.force(which, at).mean()) for which in range(3))
     truth = np.array(
         [
             mass,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,22 +16,38 @@ _SIZES = (1e-5, 1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6)  # of 
 
 @dataclass(frozen=True)
 class Way:
-    """Where a recording has been: the lowest and the highest position."""
+    """Where a recording has been.
+
+    Attributes
+    ----------
+    low, high : float
+        Of its positions.
+    means : ndarray, shape (WAVES,)
+        Of the half waves, over its samples.
+    """
 
     low: float
     high: float
+    means: Floats = field(repr=False)
 
     @classmethod
     def of(cls, position: Floats) -> Way:
-        return cls(float(position.min()), float(position.max()))
+        low, high = float(position.min()), float(position.max())
+        return cls(low, high, _half_waves(position, low, high).mean(axis=1))
 
 
 def waves(position: Floats, way: Way) -> Floats:
-    """cos(pi j s), j from 1, over the share s of the way; shape (WAVES, N).
+    """cos(pi j s) less its mean, j from 1, over the share s of the way; shape (WAVES, N).
 
-    Their mean over the way is zero: constant force and dry friction are means over it.
+    Over the samples that the way is of, what a force along it is on average is in the constant
+    force and the dry friction alone.  Means over the way itself are another matter: how much of a
+    slow wave lies in those depends on where the way happens to begin and to end.
     """
-    share = np.clip((position - way.low) / (way.high - way.low), 0.0, 1.0)
+    return np.asarray(_half_waves(position, way.low, way.high) - way.means[:, None])
+
+
+def _half_waves(position: Floats, low: float, high: float) -> Floats:
+    share = np.clip((position - low) / (high - low), 0.0, 1.0)
     return np.asarray(np.cos(np.pi * np.arange(1, WAVES + 1)[:, None] * share))
 
 

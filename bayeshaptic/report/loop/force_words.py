@@ -131,8 +131,8 @@ def motion(analysis: Analysis) -> str:
     elif found.motion.uneven_rms > worth_naming * rms:
         text += (
             " A force that changes along the way and with the direction, "
-            f"{quantity(found.motion.uneven_rms, force)} rms, was fitted with it: how much of it "
-            "is friction or constant force cannot be told, which widens both."
+            f"{quantity(found.motion.uneven_rms, force)} rms, was fitted with it: dry "
+            "friction and constant force are the means over the recording."
         )
     if not found.halves:
         return text
