@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import errno
+import os
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from numbers import Real
@@ -75,6 +77,22 @@ def refuse_place(path: Path, example: str) -> None:
         raise InputError(f"{path} is a folder; name a file, such as {path / example}")
     if not path.absolute().parent.is_dir():
         raise InputError(f"{path.parent}: no such folder; make it first")
+
+
+def refuse_circle(path: Path) -> None:
+    """Refuse a path that no system can follow.
+
+    Raises
+    ------
+    InputError
+        Where links on the way to `path` lead in a circle.
+    """
+    try:
+        os.stat(path)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            told = "a link that leads in a circle; name the file or folder itself"
+            raise InputError(f"{path}: {told}", topic="file") from None
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -8,7 +8,7 @@ import shutil
 import socket
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 # Files that appear in the folders of reports and batches, each with what stands in it.
@@ -85,6 +85,35 @@ def is_of_a_report(path: Path) -> bool | None:
     most = 1_000_000  # bytes, in which a file says what it is
     with path.open("rb") as file:
         return _MARKS[path.name] in file.read(most)
+
+
+def resolved(path: str | Path) -> Path:
+    """Where a path leads, links followed; of links in a circle one of them.
+
+    `Path.resolve` has an error of its own for these, which is no OSError, until Python 3.13.
+    """
+    return Path(os.path.realpath(path))
+
+
+@contextmanager
+def by_one_alone(folder: Path) -> Iterator[None]:
+    """A block that others of this function wait for, while it changes the files of `folder`.
+
+    The system ends the lock with its process.  Where it has none for folders (Windows, some
+    network drives), nobody waits.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    place = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(place, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(place)
 
 
 def flush(path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.errors import InputError, printable, refuse_place
-from bayeshaptic.files import whole_file, write_whole
+from bayeshaptic.files import resolved, whole_file, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -187,7 +187,7 @@ def study_text(found: Overview, path: Path, mapping: str | None) -> str:
 columns = {_toml(mapping or "time=...,force=...,position=...")}"""
     if found.of_a_response:
         columns = "period_s = 1e-3                 # of the loop: a table does not say it"
-    file = os.path.relpath(found.path.resolve(), path.resolve().parent).replace(os.sep, "/")
+    file = os.path.relpath(resolved(found.path), resolved(path).parent).replace(os.sep, "/")
     return f"""\
 # A study: one device and all its recordings. See docs/file-formats.md.
 [device]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bayeshaptic.devices.table import read_toml
 from bayeshaptic.errors import InputError
-from bayeshaptic.files import is_of_a_report
+from bayeshaptic.files import is_of_a_report, resolved
 from bayeshaptic.recordings.readers import known_suffixes
 
 # Text files that programs leave beside recordings.
@@ -49,12 +49,12 @@ def _in_folder(folder: Path, named: bool = False) -> Iterator[Path]:
     of_studies = {file for files in studies.values() for file in files}
     for path in content:
         if path.is_dir():
-            yield from (file for file in _in_folder(path) if file.resolve() not in of_studies)
+            yield from (file for file in _in_folder(path) if resolved(file) not in of_studies)
         elif (
             path.name.lower().endswith(known_suffixes())
             and path.name.lower() not in _NO_RECORDINGS
             and is_of_a_report(path) is not True
-            and path.resolve() not in of_studies
+            and resolved(path) not in of_studies
         ):
             yield path
 
@@ -68,4 +68,4 @@ def _files_of(path: Path) -> tuple[Path, ...]:
     if not isinstance(entries, list):
         return ()
     files = [entry.get("file") for entry in entries if isinstance(entry, dict)]
-    return (path, *((path.parent / file).resolve() for file in files if isinstance(file, str)))
+    return (path, *(resolved(path.parent / file) for file in files if isinstance(file, str)))

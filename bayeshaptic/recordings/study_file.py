@@ -11,7 +11,8 @@ from pathlib import Path
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device, device_from_table, device_names, load_device
 from bayeshaptic.devices.table import Table, read_toml
-from bayeshaptic.errors import InputError, Notice, nearest
+from bayeshaptic.errors import InputError, Notice, nearest, refuse_circle
+from bayeshaptic.files import resolved
 from bayeshaptic.recordings.columns import parse_columns
 from bayeshaptic.recordings.cut import Cut, Span
 from bayeshaptic.recordings.feedback import read_feedback
@@ -71,7 +72,7 @@ def read_study(path: str | os.PathLike[str], allow_outside: bool = False) -> Stu
         raise InputError(
             f"{path}: no [device] table; it needs at least a name, or a kind and a name"
         )
-    home = None if allow_outside else path.parent.resolve()
+    home = None if allow_outside else resolved(path.parent)
     device, columns, notices = _device(table.content["device"], path, home)
     entries = table.content.get("recording")
     if not isinstance(entries, list) or not entries:
@@ -111,7 +112,7 @@ def _refuse_twice(entries: Sequence[StudyEntry], columns: Columns, path: Path) -
     """
     known: dict[Path, list[tuple[int, StudyEntry]]] = {}
     for number, entry in enumerate(entries, start=1):
-        file = entry.path.resolve()
+        file = resolved(entry.path)
         of_one = next((one for one in known if one == file or same_content(one, file)), file)
         others = known.setdefault(of_one, [])
         for other, earlier in others:
@@ -121,7 +122,7 @@ def _refuse_twice(entries: Sequence[StudyEntry], columns: Columns, path: Path) -
             if alike and _overlap(entry, earlier):
                 is_one = (
                     f"is recording {other} already"
-                    if file == earlier.path.resolve()
+                    if file == resolved(earlier.path)
                     else f"is a copy of {earlier.path.name}, recording {other}"
                 )
                 raise InputError(
@@ -159,7 +160,8 @@ def _pooled(entries: Sequence[StudyEntry], pool: bool | None) -> tuple[StudyEntr
 def _file(folder: Path, file: str, home: Path | None, where: str) -> Path:
     """A file by what the study calls it; refused where it is not inside `home`."""
     path = folder / file
-    if home is not None and not path.resolve().is_relative_to(home):
+    refuse_circle(path)
+    if home is not None and not resolved(path).is_relative_to(home):
         raise InputError(
             f"{where}: {file} is outside the study's folder; copy it there, or allow it with "
             "--allow-outside"

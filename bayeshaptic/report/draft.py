@@ -5,11 +5,19 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from bayeshaptic.errors import InputError
-from bayeshaptic.files import flush, is_of_a_report, known_as, owner, remove_dead_drafts
+from bayeshaptic.files import (
+    by_one_alone,
+    flush,
+    is_of_a_report,
+    known_as,
+    owner,
+    remove_dead_drafts,
+    resolved,
+)
 
 
 @contextmanager
@@ -43,10 +51,10 @@ def refuse_to_replace(folder: Path, names: Iterable[str], sources: Iterable[str 
     InputError
         With the file, and what to do.
     """
-    read = {Path(source).resolve() for source in sources}
+    read = {resolved(source) for source in sources}
     for name in sorted(names):
         path = folder / name
-        if path.resolve() in read:
+        if resolved(path) in read:
             raise InputError(
                 f"{path}: the report has a file of this name, which would replace the recording; "
                 "rename the recording, or name another folder for the report"
@@ -85,35 +93,48 @@ def report_in(
     if not str(out_dir).strip():
         raise InputError("the report's folder has an empty name; give one")
     stale = tuple(stale)
-    out = Path(out_dir).resolve()
+    out = resolved(out_dir)
     if out.exists() and not out.is_dir():
         raise InputError(f"{out_dir}: is a file; name a folder for the report.")
     with draft_in(out if out.exists() else out.parent) as draft, known_as(out, draft):
         yield draft
-        refuse_to_replace(out, {*stale, *(path.name for path in draft.iterdir())}, sources)
-        for name in stale:
-            if not (draft / name).exists():
-                (out / name).unlink(missing_ok=True)
-        move_all(draft, out, last)
+        move_all(draft, out, last, stale, sources)
 
 
-def move_all(draft: Path, folder: Path, last: str) -> None:
+def move_all(
+    draft: Path,
+    folder: Path,
+    last: str,
+    stale: Iterable[str] = (),
+    sources: Iterable[str | Path] = (),
+) -> None:
     """Move every file of a draft into `folder`, on the disk before it has its name.
 
-    A new folder appears at once; in an older one `last` is missing while the files change.
+    A new folder appears at once; in an older one `last` is missing while the files change. Two
+    processes that report there at the same time do so one after the other: what is there then is
+    one report.
 
     Parameters
     ----------
     draft, folder : Path
     last : str
         The file that others wait for.
+    stale, sources
+        See `report_in`.
     """
     files = sorted(draft.iterdir(), key=lambda path: path.name == last)
     for path in files:
         flush(path)
     if not folder.exists():
-        draft.rename(folder)
-        return
-    (folder / last).unlink(missing_ok=True)
-    for path in files:
-        os.replace(path, folder / path.name)
+        # Somebody else's may have appeared since: files are in it, and nothing takes its place.
+        with suppress(OSError):
+            draft.rename(folder)
+            return
+    names = {path.name for path in files}
+    with by_one_alone(folder):
+        refuse_to_replace(folder, {*stale, *names}, sources)
+        (folder / last).unlink(missing_ok=True)
+        for name in set(stale) - names:
+            (folder / name).unlink(missing_ok=True)
+        for path in files:
+            os.replace(path, folder / path.name)

@@ -9,7 +9,7 @@ from typing import Any
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.files import write_text
+from bayeshaptic.files import resolved, write_text
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.drawing.look import own_look
 from bayeshaptic.report.figures.pictures import (
@@ -80,7 +80,7 @@ def write_report(
     sources = [path for path in of if path is not None]
     with report_in(out_dir, _LAST, _MAY_BE_MISSING, sources) as folder, own_look():
         _write_all(result, folder, origin)
-    return Path(out_dir).resolve() / "report.html"
+    return resolved(out_dir) / "report.html"
 
 
 def _write_all(result: Result, folder: Path, origin: Mapping[str, Any] | None) -> None:

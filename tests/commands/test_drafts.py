@@ -7,11 +7,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
+from bayeshaptic import cli
 from bayeshaptic.errors import InputError
 from bayeshaptic.files import remove_dead_drafts, write_whole
 from bayeshaptic.report.draft import draft_in, move_all, report_in
@@ -33,6 +36,59 @@ def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
     assert (out / "a").read_text() == "new"
     write_whole(out / "b", "x")
     assert sorted(os.listdir(out)) == ["a", "b", "last", "z"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no lock of a folder")
+@pytest.mark.parametrize("new", [False, True])
+def test_two_reports_in_one_folder_are_one_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, new: bool
+) -> None:
+    out, replace, ready = tmp_path / "out", os.replace, threading.Barrier(2)
+    files = {"1": "abd", "2": "bcd"}
+    if not new:
+        out.mkdir()
+
+    def slowly(*names: Path) -> None:
+        time.sleep(0.01)
+        replace(*names)
+
+    def report(who: str) -> None:
+        with report_in(out, "last", ["a", "b", "c"]) as draft:
+            for name in (*files[who], "last"):
+                (draft / name).write_text(who)
+            ready.wait(timeout=10)
+
+    monkeypatch.setattr(os, "replace", slowly)
+    with ThreadPoolExecutor(2) as both:
+        list(both.map(report, "12"))
+    found = {path.name: path.read_text() for path in out.iterdir()}
+    assert found in [dict.fromkeys((*own, "last"), who) for who, own in files.items()]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links")
+def test_links_in_a_circle_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.csv").symlink_to("b.csv")
+    (tmp_path / "b.csv").symlink_to("a.csv")
+    (tmp_path / "study.toml").write_text(
+        '[device]\nname = "x"\nkind = "rotational"\n[[recording]]\nfile = "a.csv"\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    lines = (
+        "report a.csv -o out",
+        "report a.csv/in.csv -o out",
+        "report study.toml -o out",
+        "report study.toml -o a.csv",
+        "inspect b.csv",
+        "batch a.csv -o out",
+    )
+    for line in lines:
+        assert cli.main(line.split()) != 0
+        told = capsys.readouterr()
+        assert "a link that leads in a circle" in told.err + told.out, line
+        assert "defect" not in told.err, line
+    assert not (tmp_path / "out").exists() or not list((tmp_path / "out").glob("**/report.html"))
 
 
 def test_an_error_names_the_file_and_not_its_draft(tmp_path: Path) -> None:

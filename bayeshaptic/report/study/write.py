@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bayeshaptic.arguments import at_the_door
-from bayeshaptic.files import write_text
+from bayeshaptic.files import resolved, write_text
 from bayeshaptic.report.draft import report_in
 from bayeshaptic.report.figures.drawing.look import own_look
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
@@ -69,7 +69,7 @@ def write_study_report(
         If `out_dir` is a file, or holds a recording, or what is of no report, under the name of one
         of these files.
     """
-    out = Path(out_dir).resolve()
+    out = resolved(out_dir)
     links = {name: _link(Path(page), out) for name, page in (pages or {}).items()}
     with report_in(out_dir, _LAST, _MAY_BE_MISSING, study.study.files) as folder, own_look():
         _write_all(study, folder, links, walls)
@@ -116,4 +116,4 @@ def _analysis_of(case: Case, study: StudyAnalysis) -> Analysis | None:
 
 
 def _link(page: Path, out: Path) -> str:
-    return Path(os.path.relpath(page.resolve(), out)).as_posix()
+    return Path(os.path.relpath(resolved(page), out)).as_posix()
