@@ -6,9 +6,13 @@ not need it.  Beside each kernel stands a plain NumPy form that it is tested aga
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections.abc import Callable
 from functools import cache, partial
 from typing import Any, TypeVar, overload
+
+from bayeshaptic.errors import InputError, one_line
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -45,8 +49,7 @@ def kernel(
     """
     if function is None:
         return partial(kernel, inline=inline, exact=exact)  # type: ignore[return-value]
-    import numba
-
+    numba = _numba()
     _listen()
     njit: Any = numba.njit
     options = {"fastmath": False if exact else _FAST, "error_model": "numpy", "nogil": True}
@@ -72,8 +75,8 @@ def callback(function: Callable[..., float]) -> Any:
         Of a module; returns a number.  The last of its arguments is an array: a kernel gives it
         where that begins (`.ctypes`), one number in the place of an array's seven.
     """
-    from numba import cfunc, float64, types
-
+    numba = _numba()
+    cfunc, float64, types = numba.cfunc, numba.float64, numba.types
     _listen()
     numbers = [float64] * (function.__code__.co_argcount - 1)
     signature = float64(*numbers, types.CPointer(float64))
@@ -81,6 +84,28 @@ def callback(function: Callable[..., float]) -> Any:
         return cfunc(signature, cache=True, error_model="numpy")(function)
     except RuntimeError:
         return cfunc(signature, error_model="numpy")(function)
+
+
+@cache
+def _numba() -> Any:
+    """numba; a setting of the environment that it cannot be loaded with is told in one line."""
+    settings = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_")}
+    try:
+        with warnings.catch_warnings():
+            # It goes on without what it cannot read, and tells that with a traceback.
+            unread = "Environment variable 'NUMBA_"
+            warnings.filterwarnings("error", unread, category=RuntimeWarning)
+            import numba
+    except (ValueError, RuntimeError, RuntimeWarning) as error:
+        if not settings:
+            raise
+        named = [name for name in settings if f"'{name}'" in str(error)] or [*settings]
+        said = " ".join(f"{name}={settings[name]}" for name in named)
+        raise InputError(
+            f"{one_line(said)} in the environment: numba cannot be loaded with it; unset it, or "
+            "give a value that numba knows"
+        ) from None
+    return numba
 
 
 def when_compiling(tell: Callable[[], None] | None) -> None:

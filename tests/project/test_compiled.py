@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from bayeshaptic.compiled import kernel, when_compiling
 
 
@@ -30,6 +32,18 @@ def test_a_compilation_is_told_once() -> None:
     finally:
         when_compiling(None)
     assert told == [1]
+
+
+@pytest.mark.parametrize("setting", ["NUMBA_NUM_THREADS=0", "NUMBA_OPT=high"])
+def test_an_environment_that_numba_cannot_read_is_no_defect(setting: str) -> None:
+    name, value = setting.split("=")
+    environment = {**os.environ, name: value}
+    code = "from bayeshaptic.compiled import kernel; kernel(abs)"
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)
+    *_, told = done.stderr.strip().splitlines()
+    assert done.returncode == 1
+    assert f"InputError: {setting} in the environment: numba cannot be loaded with it" in told
 
 
 _DIGEST = """
