@@ -141,7 +141,7 @@ def analyse_and_report(
             job.command,
             job.settings.facts(),
             job.settings.seed,
-            task.entry.path,
+            job.source if task.entry.more else task.entry.path,
             {"analyse": time.perf_counter() - began},
         )
         return result, reported(folder.name, result, folder, origin)

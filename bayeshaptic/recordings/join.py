@@ -38,7 +38,7 @@ def join_recordings(
     Returns
     -------
     Recording
-        With the facts of the first, and `joints` where the others begin.
+        With the facts of the first, and `joints` where the others begin; of no one file.
 
     Raises
     ------
@@ -66,12 +66,26 @@ def join_recordings(
         first,
         force=np.concatenate([piece.force for piece in pieces]),
         position=np.concatenate([piece.position for piece in pieces]),
-        name=name or f"{first.name} and {len(read) - 1} more",
+        name=name or name_of_several(first.name, len(read) - 1),
+        source=None,
         notices=(*notices, Notice("note", "pieces", text)),
         joints=tuple(int(end) for end in ends[:-1]),
         reference=_references(pieces),
         sensed=_sensed(pieces),
     )
+
+
+def name_of_several(first: str, others: int) -> str:
+    """What recordings that count together are called: ``step and 3 others``.
+
+    Parameters
+    ----------
+    first : str
+        The name of the first.
+    others : int
+        How many count with it.
+    """
+    return f"{first} and {others} other{'s' if others > 1 else ''}" if others else first
 
 
 def _refuse_unlike(recordings: Sequence[Recording]) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.from_columns import recording_name
+from bayeshaptic.recordings.join import name_of_several
 from bayeshaptic.recordings.study import StudyEntry
 
 
@@ -45,11 +46,13 @@ class Analysed:
 def names_of(entries: Sequence[StudyEntry]) -> list[str]:
     """What recordings are called: as their files, numbered where one name comes more than once.
 
+    Those that count together are called by the first and how many more there are.
+
     Parameters
     ----------
     entries : sequence of StudyEntry
     """
-    names = [recording_name(entry.path) for entry in entries]
+    names = [name_of_several(recording_name(one.path), len(one.more)) for one in entries]
     return [
         name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}"
         for index, name in enumerate(names)

@@ -25,6 +25,7 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
+from bayeshaptic.study.analysed import names_of
 
 PERIOD_S = 1e-3
 TRUTH = {"m": 2.0, "b": 20.0, "coulomb": 1.2, "offset": 0.5, "delay_s": 0.8e-3}
@@ -62,7 +63,7 @@ def series() -> list[Recording]:
 
 def test_a_joined_recording_falls_into_its_pieces(series: list[Recording]) -> None:
     joined = bh.join_recordings(series)
-    assert joined.name == "step 0 and 3 more" and joined.samples == sum(r.samples for r in series)
+    assert joined.name == "step 0 and 3 others" and joined.samples == sum(r.samples for r in series)
     for piece, one in zip(joined.pieces, series, strict=True):
         assert np.array_equal(piece.position, one.position) and not piece.joints
     assert joined.part(600, 2100).joints == (100, 1400)
@@ -164,7 +165,10 @@ def test_a_study_joins_what_nothing_tells_apart(tmp_path: Path) -> None:
         read('pool = "yes"\n')
     (tmp_path / "1.csv").write_text("time_s,torque_nm,angle_rad\n0,1,oops\n")
     assert read("pool = true\n") == [2]  # one that cannot be read takes none with it
-    joined = bh.read_study(path).read_all()[0]
+    study = bh.read_study(path)
+    joined = study.read_all()[0]
+    assert isinstance(joined, Recording) and joined.source is None  # of no one file
+    assert (joined.name, names_of(study.entries)) == ("0 and 1 other", ["0 and 2 others"])
     assert any(n.level == "warning" and "1.csv" in n.text for n in joined.notices)
 
 
