@@ -14,7 +14,6 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
-from fractions import Fraction
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -40,6 +39,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "p": (0, 1, "between 0 and 1, as in 0.05"),
     **dict.fromkeys(("start", "add"), (-1e300, 1e300, "other than NaN or infinity")),
     "factors": (0, 1e300, "of at least 0"),
+    "frequency_hz": (-1e300, 1e300, "other than NaN or infinity, in Hz"),
     **dict.fromkeys(("stiffness", "damping"), (-math.inf, math.inf, "other than NaN")),
 }
 """Lowest and highest value of numbers by their name, and how to say it."""
@@ -85,8 +85,7 @@ def at_the_door(function: F) -> F:
         try:
             for name, value in bound.arguments.items():
                 parameter = signature.parameters[name]
-                if isinstance(value, Fraction):
-                    value = bound.arguments[name] = float(value)
+                value = bound.arguments[name] = _plain(value)
                 if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                     _check(name, value, str(parameter.annotation), names)
             return function(*bound.args, **bound.kwargs)
@@ -114,9 +113,16 @@ def check_fields(thing: Any, names: Names) -> None:
         Where a field cannot be; the message names it.
     """
     for field in fields(thing):
-        if isinstance(getattr(thing, field.name), Fraction):
-            object.__setattr__(thing, field.name, float(getattr(thing, field.name)))
-        _check(field.name, getattr(thing, field.name), str(field.type), names)
+        value = _plain(given := getattr(thing, field.name))
+        if value is not given:
+            object.__setattr__(thing, field.name, value)
+        _check(field.name, value, str(field.type), names)
+
+
+def _plain(value: Any) -> Any:
+    """A number of a rarer type (a fraction, a short float of NumPy) as a float."""
+    odd = isinstance(value, Real) and not isinstance(value, float | Integral)
+    return float(value) if odd else value
 
 
 def instance(name: str, value: Any, kinds: type | tuple[type, ...], hint: str) -> Any:

@@ -79,16 +79,18 @@ def refuse_place(path: Path, example: str) -> None:
         raise InputError(f"{path.parent}: no such folder; make it first")
 
 
-def refuse_circle(path: Path) -> None:
+def refuse_no_path(path: Path) -> None:
     """Refuse a path that no system can follow.
 
     Raises
     ------
     InputError
-        Where links on the way to `path` lead in a circle.
+        Where links on the way to `path` lead in a circle, or where no path can be such.
     """
     try:
         os.stat(path)
+    except ValueError as error:  # a zero byte
+        raise InputError(f"{shown(str(path))} is no path ({error})", topic="file") from None
     except OSError as error:
         if error.errno == errno.ELOOP:
             told = "a link that leads in a circle; name the file or folder itself"

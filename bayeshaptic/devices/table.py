@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bayeshaptic.errors import InputError, nearest
+from bayeshaptic.errors import InputError, nearest, refuse_no_path
 
 # A study of a thousand recordings has 100 kB; nothing in one is nested deeper than a mapping of
 # columns in a recording.
@@ -26,6 +26,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         Where the file is missing, not text, not TOML, larger than `MOST_BYTES`, or nested deeper
         than `DEEPEST`.
     """
+    refuse_no_path(path)
     try:
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)

@@ -10,7 +10,7 @@ from typing import Any
 from bayeshaptic.arguments import check_fields
 from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.errors import InputError, refuse_circle
+from bayeshaptic.errors import InputError, refuse_no_path
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def refuse_file(folder: Path) -> None:
     InputError
         Where `folder`, or the nearest of its parents that exists, is not a folder to write in.
     """
-    refuse_circle(folder)
+    refuse_no_path(folder)
     nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not nearest.is_dir():
         raise InputError(f"{nearest} is a file; name a folder for the report with -o")

@@ -135,8 +135,7 @@ class Model(Shown):
                 f"but {theta.shape[1]} were given."
             )
         values: dict[str, Floats] = dict(zip(self.names, theta.T, strict=True))
-        for name, value in self.fixed.items():
-            values[name] = np.full(len(theta), value)
+        values |= {name: np.full(len(theta), value) for name, value in self.fixed.items()}
         system = LinearSystem(self.structure.build(values), values["delay_s"])
         for effect in self.effects:
             system = effect.apply(system, values)
@@ -171,6 +170,8 @@ class Model(Shown):
         theta : array_like, shape (B, P) or (P,)
             Parameters in the order of `names`, SI units.
         frequency_hz : array_like, shape (L,)
+            The exact response repeats itself above the Nyquist frequency. At zero it is the
+            compliance, infinite where no spring holds the device.
         approximation : {"exact", "continuous"}
             "continuous" is the paper's P(s) e^{-s (td + T/2)}.
         measured : bool
@@ -184,13 +185,17 @@ class Model(Shown):
         if self.period_s is None:
             raise InputError("the model has no sampling period: give period_s, or a device.")
         system = self.measured_system(theta) if measured else self.system(theta)
-        frequency_hz = np.asarray(frequency_hz, float)
-        if approximation == "exact":
-            response = system.sampled_response(frequency_hz, self.period_s)
-        elif approximation == "continuous":
-            response = system.continuous_approximation(frequency_hz, self.period_s)
-        else:
+        frequency_hz = np.atleast_1d(np.asarray(frequency_hz, float))
+        if frequency_hz.ndim > 1:
+            raise InputError(f"frequency_hz has the shape {frequency_hz.shape}; give one axis")
+        still = frequency_hz == 0  # where a free device has a pole
+        moving = np.where(still, 1.0, frequency_hz)
+        ways = {"exact": system.sampled_response, "continuous": system.continuous_approximation}
+        if approximation not in ways:
             raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
+        response = ways[approximation](moving, self.period_s)
+        if np.any(still):
+            response[:, still] = system.static_response()[:, None]
         return response[0] if np.ndim(theta) == 1 else response
 
     def to_control(self, theta: ArrayLike | None = None) -> Any:
@@ -264,9 +269,14 @@ class Model(Shown):
         ----------
         values : mapping
             Name to value; names that are no parameter of the model are left aside.
+
+        Raises
+        ------
+        InputError
+            For a value that the parameter cannot have: outside its prior's support, say.
         """
         left = tuple(p for p in self.parameters if p.name not in values)
-        known = {p.name: float(values[p.name]) for p in self.parameters if p.name in values}
+        known = {p.name: p.known(values[p.name]) for p in self.parameters if p.name in values}
         return replace(self, parameters=left, fixed={**self.fixed, **known})
 
     @at_the_door

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from bayeshaptic.errors import InputError
@@ -52,6 +53,9 @@ def unit_of(dimension: str, force_unit: str, position_unit: str) -> str:
     }[dimension]
 
 
+_NEVER_BELOW_ZERO = ("mass", "damping", "stiffness", "time")
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number that the data and the prior decide.
@@ -74,8 +78,27 @@ class Parameter:
     prior: Prior | None = None
 
     def __post_init__(self) -> None:
-        never_below_zero = self.dimension in ("mass", "damping", "stiffness", "time")
+        never_below_zero = self.dimension in _NEVER_BELOW_ZERO
         if self.prior is not None and never_below_zero and not self.prior.support[1] > 0:
             raise InputError(
                 f"the prior of {self.name} is {self.prior}; give one with values above 0."
             )
+
+    def known(self, value: float) -> float:
+        """A value of it, where it can have that one.
+
+        Raises
+        ------
+        InputError
+            For NaN and infinity, for what is outside its prior's support, and for what no prior
+            allows: masses that are not above zero, and dampers, springs and delays below it.
+        """
+        low, high = (-math.inf, math.inf) if self.prior is None else self.prior.support
+        if self.dimension in _NEVER_BELOW_ZERO:
+            low = max(low, 0.0)
+        above = value > 0 if self.dimension == "mass" else value >= low
+        if not (math.isfinite(value) and above and low <= value <= high):
+            can_be = f"{'above 0' if self.dimension == 'mass' and low <= 0 else f'from {low:g} on'}"
+            most = f", up to {high:g}" if high < math.inf else ""
+            raise InputError(f"{self.name} is {value:g}; a {self.title} can be {can_be}{most}")
+        return float(value)

@@ -46,7 +46,7 @@ def join_recordings(
         Where there are none, where one is there twice, where period or units differ, or where one
         is far too short.
     """
-    if not recordings:
+    if not len(recordings):
         raise InputError("there are no recordings to join")
     read = [recording_of(one) for one in recordings]
     first = read[0]

@@ -11,7 +11,7 @@ from pathlib import Path
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device, device_from_table, device_names, load_device
 from bayeshaptic.devices.table import Table, read_toml
-from bayeshaptic.errors import InputError, Notice, nearest, refuse_circle
+from bayeshaptic.errors import InputError, Notice, nearest, refuse_no_path
 from bayeshaptic.files import resolved
 from bayeshaptic.recordings.columns import parse_columns
 from bayeshaptic.recordings.cut import Cut, Span
@@ -160,7 +160,7 @@ def _pooled(entries: Sequence[StudyEntry], pool: bool | None) -> tuple[StudyEntr
 def _file(folder: Path, file: str, home: Path | None, where: str) -> Path:
     """A file by what the study calls it; refused where it is not inside `home`."""
     path = folder / file
-    refuse_circle(path)
+    refuse_no_path(path)
     if home is not None and not resolved(path).is_relative_to(home):
         raise InputError(
             f"{where}: {file} is outside the study's folder; copy it there, or allow it with "

@@ -140,6 +140,11 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
         ),
         (lambda: FREE_MODEL.response({"m1": 1}, [1.0]), "theta is of type dict; give numbers"),
         (lambda: FREE_MODEL.with_effect("reflex"), "effect is 'reflex'; give an effect"),
+        (lambda: FREE_MODEL.response(FREE_MODEL.values, [np.nan]), "frequency_hz is [nan]; give"),
+        (lambda: FREE_MODEL.response(FREE_MODEL.values, [[1.0]]), "frequency_hz has the shape (1,"),
+        (lambda: FREE_MODEL.with_known({"m1": -1}), "m1 is -1; a mass of the motor side can be"),
+        (lambda: bh.read_recording("\0"), "is no path (embedded null byte)"),
+        (lambda: bh.read_study("\0"), "is no path (embedded null byte)"),
         (lambda: bh.elasticities(3), "source is 3; give a Model, Fit, Posterior"),
         (lambda: bh.write_report(3, "out"), "result is 3; give what bayeshaptic.analyse"),
         (lambda: bh.device_limit([3]), "cases is [3]; give a sequence of a Case"),
@@ -187,6 +192,10 @@ def test_the_line_says_what_to_give(call: Callable[[], Any], words: str) -> None
 )
 def test_numbers_and_lists_of_like_types_are_taken(call: Callable[[], Any]) -> None:
     assert call() is not None
+
+
+def test_short_floats_of_numpy_show_themselves() -> None:
+    assert "1.00 ms" in repr(bh.rigid(period_s=np.float32(1e-3), delay_s=np.float32(1)))
 
 
 def test_a_misspelt_argument_is_named_with_its_function() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from linear_bench import LHIFAM_FREE, LHIFAM_HELD, Device, tremor
 
+import bayeshaptic as bh
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
 from bayeshaptic.models import (
@@ -277,3 +278,33 @@ def test_modes_in_time_are_those_of_step_after_step(substeps, whole):
         before = now
     found = modal_motion(force, substeps, whole, decay, new, old, np.array(weights))
     np.testing.assert_allclose(found, np.transpose(stepped), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("approximation", ["exact", "continuous"])
+def test_under_a_constant_force_a_free_device_runs_away_and_a_held_one_gives_way(approximation):
+    """Its compliance is that of the springs in a row to the ground."""
+    loose, held = bh.free(device="lhifam"), bh.grasped(device="lhifam")
+    values = dict(zip(held.names, held.values, strict=True))
+    compliance = sum(1 / values[name] for name in ("kc", "ks", "kh"))
+    two = np.stack([held.values, held.values])
+    assert np.allclose(held.response(two, [0.0, 1.0], approximation)[:, 0], compliance, rtol=1e-12)
+    assert loose.response(loose.values, 0.0, approximation) == np.inf
+    assert np.isfinite(loose.response(loose.values, [1.0], approximation))
+    alone, beside = (loose.response(loose.values, f, approximation) for f in ([1.0], [0.0, 1.0]))
+    assert alone[0] == beside[1]
+
+
+def test_a_known_value_is_one_that_the_parameter_can_have():
+    model = bh.free(device="lhifam", prior={"kc": bh.Uniform(1e4, 1e5)})
+    for known, words in (
+        ({"m1": -1}, "m1 is -1; a mass of the motor side can be above 0"),
+        ({"m1": 0}, "above 0"),
+        ({"b1": -0.1}, "b1 is -0.1; .* from 0 on"),
+        ({"kc": 1.0}, "kc is 1; .* from 10000 on, up to 100000"),
+        ({"kc": np.inf}, "kc"),
+    ):
+        with pytest.raises(InputError, match=words):
+            model.with_known(known)
+    with pytest.raises(InputError, match="delay_s is -0.0001; a loop delay can be from 0 on"):
+        bh.rigid().with_known({"delay_s": -1e-4})
+    assert model.with_known({"m1": 0.2, "b1": 0, "other": -1}).fixed["b1"] == 0.0

@@ -99,6 +99,12 @@ class LinearSystem:
             response = response + self.remainder.at(points)
         return np.asarray(response.T)
 
+    def static_response(self) -> Floats:
+        """Position over a constant force, shape (B,): infinite where nothing holds the device."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            response = self.continuous_response(np.zeros(1, complex))[:, 0].real
+        return np.where(np.isfinite(response), response, np.inf)
+
     def continuous_approximation(self, frequency_hz: Floats, period_s: float) -> Complexes:
         """P(s) e^{-s (td + T/2)}, the paper's stand-in for the sampled response; shape (B, L)."""
         s = 2j * np.pi * np.asarray(frequency_hz, float)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from bayeshaptic.errors import InputError, refuse_circle
+from bayeshaptic.errors import InputError, refuse_no_path
 from bayeshaptic.recordings.readers import delimited, hdf5, matlab, npz, spreadsheet, tdms
 from bayeshaptic.recordings.readers.apart import read_apart, write_arrays
 from bayeshaptic.recordings.readers.reader import Arrays, Reader
@@ -59,7 +59,7 @@ def read_arrays(path: Path) -> Arrays:
     InputError
         Where the file is missing, of an unknown format, unreadable, or holds no arrays.
     """
-    refuse_circle(path)
+    refuse_no_path(path)
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if path.is_dir():
