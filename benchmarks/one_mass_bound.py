@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayeshaptic.inference.time_domain.follower import Follower
+from bayeshaptic.inference.time_domain.held_force import over_span
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES, MassInLoop
 from bayeshaptic.inference.time_domain.uneven import WAVES as ALONG, Way
 from bayeshaptic.types import Floats
@@ -53,13 +54,10 @@ def innovations(case: Case, columns: Floats) -> tuple[Floats, float]:
     from scipy.linalg import solve_discrete_are
 
     mass, damping = case.truth[:2]
-    kept = np.exp(-damping / mass * PERIOD_S)
-    far = (1 - kept) * mass / damping
-    motion = np.array([[1, far], [0, kept]])
-    push = np.array([[PERIOD_S - far], [1 - kept]]) / damping
+    motion, push = over_span(mass, damping, PERIOD_S)
     seen = np.array([[1.0, 0.0]])
     count = np.array([[case.resolution**2 / 12]])
-    pushed = push @ push.T * case.noise**2
+    pushed = np.outer(push, push) * case.noise**2
     spread = solve_discrete_are(motion.T, seen.T, pushed, count)
     size = float((seen @ spread @ seen.T + count)[0, 0])
     gain = motion @ spread @ seen.T / size

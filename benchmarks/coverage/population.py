@@ -1,8 +1,7 @@
 """Is what a study says of people true?  Simulated studies of people from a known population.
 
     python -m benchmarks.coverage.population [--studies 5] [--ess 500] [--first 1]
-        [--device phantom ...]
-        [--without-device] [--damper 0.05] [--keep FOLDER] [--known]
+        [--device phantom ...] [--without-device] [--damper 0.05] [--keep FOLDER] [--known]
 
 Each study has 12 users, 30 s each, on the virtual bench; hands are drawn around the paper's Table
 I (PHANToM) or II (LHIfAM), with correlations, the device is the same for all.  Shown are how many
