@@ -28,6 +28,7 @@ from bayeshaptic.report.loop import force_words
 from bayeshaptic.rig import Bench, run_loop
 
 _REACH = 4.5  # standard deviations: 1 in 500 with eight degrees of freedom
+BARE = {"m": TRUTH["m"], "b": TRUTH["b"]}
 FOLLOWER = Follower(*Feedback(*GAINS).law(1e-3))
 STRIBECK = {"force": 1.5, "static": 2.4, "velocity": 0.02}
 
@@ -211,8 +212,7 @@ def slow() -> tuple[Recording, Follower]:
         rate, last[0] = (position - last[0]) / 1e-3, position
         return float(spring * (wanted[k] - position) - damper * rate)
 
-    values = {"m": TRUTH["m"], "b": TRUTH["b"]}
-    bench = Bench("rigid", values, delay_s=TRUTH["delay_s"], encoder_resolution=2e-5)
+    bench = Bench("rigid", BARE, delay_s=TRUTH["delay_s"], encoder_resolution=2e-5)
     done = run_loop(bench, controller, 10.0)
     recording = recording_from_arrays(done.force, done.position, period_s=1e-3)
     return recording, Follower(*Feedback(spring, damper).law(1e-3))
@@ -227,6 +227,20 @@ def test_counts_are_not_taken_for_damping_that_fades() -> None:
     seen = [score for score in scores(motion, recording, forces) if score is not None]
     assert len(seen) > 4
     assert all(abs(score.t) < _REACH for score in seen)
+
+
+@pytest.mark.parametrize("levels", [(1.0, -1.0), (1.3, -0.8), (1.0, -1.0, 0.0)])
+def test_a_power_of_a_command_of_two_levels_is_no_force_of_its_own(levels: Any) -> None:
+    """It had t = 6 to 17 in clean recordings: the command itself, which no fit has as a column."""
+    rng = np.random.default_rng(3)
+    command = 3.0 * np.repeat(rng.choice(levels, 500), rng.integers(1, 30, 500))[:4000]
+    bench = Bench("rigid", BARE, delay_s=TRUTH["delay_s"], encoder_resolution=2e-6)
+    done = run_loop(bench, lambda k, _: float(command[k]), 4.0)
+    recording = recording_from_arrays(done.force, done.position, period_s=1e-3)
+    motion = fit_motion(recording, None)
+    asked = unlike_one_mass(recording, motion.velocity(recording))
+    (cubed,) = (force for why, force in asked if "large commands" in why)
+    assert not cubed.any() and scores(motion, recording, [cubed]) == [None]
 
 
 def test_what_is_unlike_one_mass_is_so_in_any_unit_of_time() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.columns import SPENT
+from bayeshaptic.diagnosis.residuals.columns import ROUNDING, SPENT
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 
@@ -75,5 +75,18 @@ def _out_of_proportion(command: Floats) -> Iterator[tuple[str, Floats]]:
     saturates = (
         "the motor gives another share of large commands than of small ones, as where it saturates"
     )
-    yield saturates, command * (command / size) ** 2
-    yield "the motor gives another share of commands one way than the other", np.abs(command)
+    yield saturates, _beside(command, command * (command / size) ** 2)
+    one_way = "the motor gives another share of commands one way than the other"
+    yield one_way, _beside(command, np.abs(command))
+
+
+def _beside(command: Floats, force: Floats) -> Floats:
+    """What of a force is neither the command itself nor constant; zero where that is rounding.
+
+    A power of a command of two levels is that command. A gain of its own is no gain that changes:
+    with the mass it is what the mass is, but for what begins and what counts round.
+    """
+    alone = np.stack([np.ones_like(command), command], axis=1)
+    rest = force - alone @ np.linalg.lstsq(alone, force, rcond=None)[0]
+    is_it = float(np.linalg.norm(rest)) <= ROUNDING * float(np.linalg.norm(force))
+    return np.zeros_like(force) if is_it else rest
