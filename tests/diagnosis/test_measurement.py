@@ -18,6 +18,7 @@ from bayeshaptic.diagnosis.samples.clipped import clipped
 from bayeshaptic.diagnosis.samples.faults import faults
 from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
 from bayeshaptic.diagnosis.samples.prediction import as_recorded
+from bayeshaptic.diagnosis.samples.repeated import held
 from bayeshaptic.diagnosis.samples.tones import find_tones
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.inference.fit import Fit
@@ -190,6 +191,27 @@ def test_held_samples_are_counted_and_filled_in(probability: float) -> None:
     assert error[1] < 0.3 * error[0]
     # And next to nothing of what was right is touched.
     assert np.mean(look.mended.position[~wrong] != clean[~wrong]) < 0.01
+
+
+@pytest.mark.parametrize("bench", [PHANTOM, Bench.from_device("lhifam")], ids=["phantom", "lhifam"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_reading_that_hung_is_filled_in_to_its_end(bench: Bench, seed: int) -> None:
+    """What looked right in between was left, the jump at the end taken for a new zero."""
+    made = simulate(bench, WhiteNoise(0.5 * bench.force_rms, 200.0, 0.7, SECONDS), seed=seed)
+    position, hung = made.position.copy(), slice(3000, 3100)
+    position[hung] = position[3000]
+    count = bench.encoder_resolution
+    recording = recording_from_arrays(
+        **made.signals | {"position": position}, encoder_resolution=count
+    )
+    assert not [notice for notice in recording.notices if notice.topic == "jumps"]
+    wrong, statistic = held(as_recorded(recording))
+    gone = np.abs(made.position - position)
+    assert gone.max() > 50 * count  # it could be seen
+    assert statistic > 50
+    assert wrong[hung].sum() > 60 and wrong.sum() <= wrong[hung].sum() + 5
+    filled = as_recorded(recording).without(wrong).position
+    assert np.abs(filled - made.position).max() < 4 * count
 
 
 def test_clipping_is_found_at_its_limits_and_filled_in() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Samples
-from bayeshaptic.recordings.signals.runs import runs
+from bayeshaptic.recordings.signals.runs import HUNG, runs
 
 
 def held(samples: Samples) -> tuple[Bools, float]:
@@ -20,7 +20,9 @@ def held(samples: Samples) -> tuple[Bools, float]:
         How many there are, less those samples that are as far off without repeating anything.
     """
     position = samples.recording.position
-    repeated = np.concatenate([[False], np.diff(position) == 0]) & ~samples.missing
+    steps = np.diff(position, prepend=position[0])
+    leaps = np.abs(steps) > 1.5 * samples.unit
+    repeated = (steps == 0) & (np.arange(len(steps)) > 0) & ~samples.missing
     if samples.predictor is None:
         return np.zeros_like(repeated), 0.0
     units = 1.5  # increments a sample that no rounding turns into zero
@@ -30,7 +32,7 @@ def held(samples: Samples) -> tuple[Bools, float]:
     errors = 5.0  # how far off a repeated sample must be, in errors of the prediction
     rounds = 6
     for _ in range(rounds):
-        trial = samples.without(wrong)
+        trial = samples.without(_to_their_ends(wrong, repeated, leaps))
         if trial.predictor is None:
             return np.zeros_like(repeated), 0.0
         limit = errors * trial.predictor.spread
@@ -41,8 +43,35 @@ def held(samples: Samples) -> tuple[Bools, float]:
         wrong |= more
     # What was filled in must be elsewhere, too; a device that rests is not.
     confirmed = 0.6  # of that, how far the filled-in position must lie from the repeated one
-    wrong &= np.abs(trial.position - position) > confirmed * limit
-    return wrong, float(wrong.sum() - np.sum(off & ~repeated))
+    filled, away = _to_their_ends(wrong, repeated, leaps), trial.position - position
+    filled &= _rms_of_runs(away, filled) > confirmed * limit
+    elsewhere = filled & (np.abs(away) > confirmed * limit)
+    return filled, float(elsewhere.sum() - np.sum(off & ~repeated))
+
+
+def _to_their_ends(wrong: Bools, repeated: Bools, leaps: Bools) -> Bools:
+    """Wrong samples, and those behind them in runs that end in a leap: nothing was read there.
+
+    One that is where the device was again by chance looks right, and so do the last, to which what
+    is filled in before them is led. As true ones they would lead it there, however far the device
+    has gone. A device that rested, for longer, leaves by a count.
+    """
+    found = wrong.copy()
+    first, stop = runs(repeated)
+    count = np.concatenate([[0], np.cumsum(wrong)])
+    hung = (count[stop] > count[first]) & np.append(leaps, False)[stop]
+    hung &= stop - first <= HUNG
+    for a, b in zip(first[hung], stop[hung], strict=True):
+        found[a + int(np.argmax(wrong[a:b])) : b] = True
+    return found
+
+
+def _rms_of_runs(values: Floats, flags: Bools) -> Floats:
+    """Of each run of flags its root mean square, at all of its samples; zero elsewhere, (N,)."""
+    found = np.zeros_like(values)
+    for a, b in zip(*runs(flags), strict=True):
+        found[a:b] = np.sqrt(np.mean(values[a:b] ** 2))
+    return found
 
 
 def _obvious(position: Floats, fast: float) -> Bools:

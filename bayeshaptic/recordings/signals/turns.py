@@ -9,6 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.runs import HUNG
 from bayeshaptic.types import Bools, Floats
 
 _TURN = 2 * np.pi
@@ -70,7 +71,8 @@ def without_jumps(position: Floats) -> tuple[Floats, tuple[Notice, ...]]:
     """The position without jumps to anywhere, and a warning of them.
 
     No mass goes in one period eight times as far as in any of the ten before and after: an encoder
-    was set to zero or missed counts, or what stands on both sides was not recorded in one go.
+    was set to zero or missed counts, or what stands on both sides was not recorded in one go. A
+    reading that hung, and is back where the device has gone since, is for those who fill it in.
 
     Parameters
     ----------
@@ -85,6 +87,7 @@ def without_jumps(position: Floats) -> tuple[Floats, tuple[Notice, ...]]:
     most = sliding_window_view(np.pad(size, _AROUND), _AROUND).max(axis=1)
     around = np.maximum(most[: len(steps)], most[_AROUND + 1 :])
     jumps = size > np.maximum(_FARTHER * around, max(_most(steps), _COUNTS * count))
+    jumps &= ~_caught_up(size, jumps)
     if not 0 < np.mean(jumps) <= _MOST_OFTEN:
         return position, ()
     beside = np.pad(steps, 1)
@@ -103,6 +106,22 @@ def without_jumps(position: Floats) -> tuple[Floats, tuple[Notice, ...]]:
     mended = position - np.concatenate([[0.0], np.cumsum(off)])
     mended.setflags(write=False)
     return mended, (Notice("warning", "jumps", text),)
+
+
+def _caught_up(size: Floats, jumps: Bools) -> Bools:
+    """Jumps by which a reading that hung is back where the device has gone since, shape (N - 1,).
+
+    Over all of the rows in which nothing was read they are no farther than steps beside these.
+    """
+    found, moved = np.zeros_like(jumps), np.flatnonzero(size)
+    for jump in map(int, np.flatnonzero(jumps)):
+        before = int(moved[max(int(np.searchsorted(moved, jump)) - 1, 0)])
+        rows = jump - before
+        if 1 < rows <= HUNG:
+            sides = slice(max(before - _AROUND + 1, 0), before + 1), slice(jump + 1, jump + _AROUND)
+            farthest = max(float(size[side].max(initial=0.0)) for side in sides)
+            found[jump] = size[jump] <= rows * _FARTHER * farthest
+    return found
 
 
 def _bits(counts: float, most: float) -> int:
