@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -117,14 +118,40 @@ def test_a_clean_recording_has_none(device: str) -> None:
     assert found.moments == () and not found.force.any()
 
 
-@pytest.mark.parametrize("effect", [(), ("lost_command",)])
-def test_without_noise_rounding_is_no_moment_and_no_force_is_left(effect: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("name", ["phantom", "lhifam"])
+def test_a_command_that_is_lost_is_found_without_any_noise(name: str, held: bool) -> None:
+    """The regression was right of the excited band alone: no force was found, or one of 500 times
+    the command."""
+    still = replace(Bench.from_device(name, held), encoder_resolution=1e-13)
+    band = WhiteNoise(still.force_rms, 200.0, 0.7, SECONDS)
+    lost = still.with_effect("lost_command", begin_s=5.0, length_s=0.2)
+    whole, found = (
+        outside(as_recorded(recording_from_arrays(**simulate(bench, band, seed=2).signals)))
+        for bench in (still, lost)
+    )
+    assert whole.moments == () and whole.statistic < thresholds.OUTSIDE
+    (moment,) = found.moments
+    assert moment.start < 5000 < 5200 < moment.stop
+    missed = -simulate(lost, band, seed=2).force[5000:5200]
+    assert np.corrcoef(found.force[5000:5200], missed)[0, 1] > 0.9
+
+
+def test_without_noise_rounding_is_no_moment() -> None:
     """Where errors are of the last digits those at the beginning are forty times the others."""
     bench = BENCHES["phantom"].quiet()
-    for name in effect:
-        bench = bench.with_effect(name)
     made = simulate(bench, WhiteNoise(bench.force_rms, 200.0, 0.7, 10.0), seed=1)
     found = outside(as_recorded(recording_from_arrays(**made.signals)))
+    assert found.moments == () and not found.force.any()
+
+
+def test_a_moment_that_is_refused_leaves_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What no force explains: here a force that explains nothing."""
+    monkeypatch.setattr(
+        "bayeshaptic.diagnosis.samples.outside._force",
+        lambda *given: np.ones(given[2].stop - given[2].start),
+    )
+    found = outside(as_recorded(with_moment("lhifam, held", "bump")))
     assert found.moments == () and not found.force.any()
 
 
