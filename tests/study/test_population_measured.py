@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import SeedSequence
 from toy_study import toy_model
 
 import bayeshaptic as bh
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.population.cavity import cavity
-from bayeshaptic.inference.population.gaussian_likelihood import linearised
+from bayeshaptic.inference.population.gaussian_likelihood import described, linearised
 from bayeshaptic.inference.population.hyperparameters import Unknowns
 from bayeshaptic.inference.population.infer import (
     infer_population,
@@ -54,6 +55,28 @@ def test_linearised_likelihood_is_that_of_the_model(posteriors: list[Posterior])
     assert left.std() < 0.1  # nats; the likelihood itself varies by more than 1
     bare = replace(posterior, windows=None)
     assert linearised(bare, here, x.mean(axis=0), x.std(axis=0)) is None
+    assert described(bare, here, posterior.draws) is None
+
+
+def test_a_description_does_not_depend_on_the_draws_that_it_was_made_of(
+    posteriors: list[Posterior],
+) -> None:
+    here = study_coordinates(posteriors[0].model)
+    found = infer_population(posteriors, ["ana", "ben", "eva"], seed=1)
+    assert found._hierarchy is not None and found.chains is not None
+    phi, _ = found.chains.in_order(2000)
+    peaks, widths = [], []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        rest = cavity(found._hierarchy, 1, phi, rng)
+        exact = sampled(Wanted(posteriors[1], "ben", here, 4000, rng), rest, SeedSequence(seed))
+        assert exact is not None
+        description = described(posteriors[1], here, exact.draws)
+        assert description is not None
+        peaks.append(description.mean)
+        widths.append(np.sqrt(np.diag(description.covariance)))
+    assert np.all(np.ptp(peaks, axis=0) < 0.1 * np.mean(widths, axis=0))
+    np.testing.assert_allclose(widths, np.tile(np.mean(widths, axis=0), (3, 1)), rtol=0.1)
 
 
 def joint_draws(posteriors: list[Posterior]) -> tuple[Floats, Floats]:
@@ -135,7 +158,7 @@ def test_all_ways_to_one_recording_agree(posteriors: list[Posterior]) -> None:
     rest = cavity(found._hierarchy, 1, phi, rng)
     wanted = Wanted(posteriors[1], "ben", here, 4000, rng)
     ways = [found.recordings[1], from_own(wanted, rest)]
-    exact = sampled(wanted, rest, np.random.SeedSequence(6))
+    exact = sampled(wanted, rest, SeedSequence(6))
     assert exact is not None and exact.good
     x = here.coordinate(exact.draws)
     for way in ways:

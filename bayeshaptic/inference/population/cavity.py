@@ -12,9 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayeshaptic.inference.population.gaussian_likelihood import GaussianLikelihood, at_peak
 from bayeshaptic.inference.population.hierarchy import Hierarchy
-from bayeshaptic.numerics.weights import tempered
+from bayeshaptic.numerics.weights import systematic, tempered
 from bayeshaptic.types import Floats
 
 
@@ -40,14 +39,6 @@ class Cavity:
         middle = (self.whitening @ self.means[:, :, None])[..., 0]
         inner = np.ascontiguousarray(self.whitening.transpose(1, 2, 0))
         return log_mixture(np.ascontiguousarray(x), inner, np.ascontiguousarray(middle.T), scale)
-
-    def moments(self) -> tuple[Floats, Floats]:
-        """Mean (D,) and covariance (D, D) of the mixture."""
-        mean = self.means.mean(axis=0)
-        roots = np.linalg.inv(self.whitening)
-        within = (roots @ roots.transpose(0, 2, 1)).mean(axis=0)
-        off = self.means - mean
-        return mean, within + off.T @ off / len(off)
 
 
 def cavity(hierarchy: Hierarchy, r: int, phi: Floats, rng: np.random.Generator) -> Cavity:
@@ -93,28 +84,5 @@ def cavity(hierarchy: Hierarchy, r: int, phi: Floats, rng: np.random.Generator) 
     count = 0.2  # share of the hyperparameters that must count: a few vectors say nothing
     weight = tempered(0.5 * far + 0.5 * np.linalg.slogdet(seen)[1], count * len(phi))
     components = 120  # draws of the hyperparameters that a cavity is a mixture over
-    chosen = rng.choice(len(phi), min(components, len(phi)), p=weight)
+    chosen = systematic(weight, min(components, len(phi)), rng)
     return Cavity(mean[chosen], np.linalg.inv(np.linalg.cholesky(covariance[chosen])))
-
-
-def described(x: Floats, rest: Cavity) -> GaussianLikelihood:
-    """The Gaussian likelihood that, times the cavity, has the moments of the tilted distribution.
-
-    Parameters
-    ----------
-    x : ndarray, shape (n, D)
-        Draws of the tilted distribution, equally weighted.
-    rest : Cavity
-
-    Returns
-    -------
-    GaussianLikelihood
-        Its constant is arbitrary.
-    """
-    mean, covariance = x.mean(axis=0), np.cov(x.T)
-    before, wide = rest.moments()
-    precision, known = np.linalg.inv(covariance), np.linalg.inv(wide)
-    gradient = known @ (mean - before)  # of the likelihood at the mean: both slopes cancel there
-    unit = np.sqrt(np.diag(covariance))
-    least = 0.02  # curvature of a description, in units of the tilted distribution's
-    return at_peak(mean, gradient, precision - known, 0.0, unit, least)

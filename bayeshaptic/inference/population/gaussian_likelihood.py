@@ -20,9 +20,11 @@ from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.types import Floats
 
+_MOST_POINTS = 5000  # that a description looks at
 STEP = 0.05  # of a derivative, in posterior standard deviations
 # Least curvature in units of these, and of a cloud: where the data say nothing, or a ridge is bent.
-_LEAST, _LEAST_OF_CLOUD = 1e-3, 0.3
+# What is left of a recording by all others may be much narrower than what its own likelihood says.
+_LEAST, _LEAST_OF_CLOUD, _LEAST_OF_REST = 1e-3, 0.3, 0.02
 
 
 @dataclass(frozen=True)
@@ -81,10 +83,37 @@ def gaussian_likelihood(posterior: Posterior, here: Coordinates) -> GaussianLike
     -------
     GaussianLikelihood
     """
-    most_points = 5000
-    every = -(-len(posterior.draws) // most_points)
+    every = -(-len(posterior.draws) // _MOST_POINTS)
     x = here.coordinate(posterior.draws[::every])
     return fit_quadratic(x, posterior.log_likelihood.ravel()[::every])
+
+
+def described(posterior: Posterior, here: Coordinates, draws: Floats) -> GaussianLikelihood | None:
+    """The likelihood of a recording, described where a whole study says that its parameters are.
+
+    Its own logarithm is fitted, and nothing divided by what the other recordings say: that is a
+    mixture over few draws of the hyperparameters, and its errors would be those of the description.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Of the recording.
+    here : Coordinates
+        The coordinates of the study.
+    draws : ndarray, shape (n, P)
+        Of its parameters given all recordings, natural values in any order; as many are looked at
+        as of its own.
+
+    Returns
+    -------
+    GaussianLikelihood or None
+        None without the measurement, and where the model cannot be evaluated.
+    """
+    x = here.coordinate(draws[:_MOST_POINTS])
+    value = exact_likelihood(posterior, here, x)
+    if value is None or not np.isfinite(value).all():
+        return None
+    return fit_quadratic(x, value, _LEAST_OF_REST)
 
 
 def exact_likelihood(posterior: Posterior, here: Coordinates, x: Floats) -> Floats | None:
@@ -159,7 +188,9 @@ def linearised(
     return at_peak(x, gradient, curvature, value, step / STEP, _LEAST)
 
 
-def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
+def fit_quadratic(
+    x: Floats, log_likelihood: Floats, least: float = _LEAST_OF_CLOUD
+) -> GaussianLikelihood:
     """Fit a quadratic function to a log likelihood over a cloud of points, by least squares.
 
     Directions in which the log likelihood does not fall off get next to no curvature, so that the
@@ -171,6 +202,8 @@ def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
         The points.
     log_likelihood : ndarray, shape (B,)
         The log likelihood at each.
+    least : float
+        The least curvature that a direction may have, in units of the cloud's.
 
     Returns
     -------
@@ -190,7 +223,7 @@ def fit_quadratic(x: Floats, log_likelihood: Floats) -> GaussianLikelihood:
     curvature = curvature + curvature.T
     slope = found[1 : size + 1]
     value = float(level + found[0])
-    own = at_peak(np.zeros(size), slope, curvature, value, np.ones(size), _LEAST_OF_CLOUD)
+    own = at_peak(np.zeros(size), slope, curvature, value, np.ones(size), least)
     out, back = vectors / width, (vectors * width).T
     return GaussianLikelihood(
         middle + own.mean @ back,

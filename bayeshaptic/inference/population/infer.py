@@ -75,10 +75,10 @@ def infer_population(
     Notes
     -----
     Each recording's likelihood is described by a Gaussian function (`gaussian_likelihood`) where
-    all recordings together say that its parameters are, in two rounds (`settled`), and by moments
-    where that is poor (`redescribed`).  emcee samples the spreads and correlations, all else is
-    integrated out (`hierarchy`); in the end each recording's own parameters are drawn by its exact
-    likelihood (`reweight`).
+    all recordings together say that its parameters are, in two rounds (`settled`), and over draws
+    of the exact distribution where that is poor (`redescribed`).  emcee samples the spreads and
+    correlations, all else is integrated out (`hierarchy`); in the end each recording's own
+    parameters are drawn by its exact likelihood (`reweight`).
     """
     began = time.perf_counter()
     report = told(progress) or silent

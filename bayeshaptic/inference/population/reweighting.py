@@ -20,8 +20,8 @@ import numpy as np
 
 from bayeshaptic.inference.coordinates import Coordinates
 from bayeshaptic.inference.population.below import Below, draw_below
-from bayeshaptic.inference.population.cavity import Cavity, cavity, described
-from bayeshaptic.inference.population.gaussian_likelihood import exact_likelihood
+from bayeshaptic.inference.population.cavity import Cavity, cavity
+from bayeshaptic.inference.population.gaussian_likelihood import described, exact_likelihood
 from bayeshaptic.inference.population.hierarchy import Hierarchy
 from bayeshaptic.inference.population.sampler import TOLERABLE, run_ensembles
 from bayeshaptic.inference.posterior import Posterior
@@ -115,19 +115,21 @@ def redescribed(
 ) -> Hierarchy:
     """The levels with a better description of each likelihood whose first one is poor.
 
-    That is the Gaussian function which, with what the others say, has the moments of the exact
-    distribution (one round of expectation propagation): near a wall, or on a ridge that is bent,
-    the model is not linear over the width of what is known.  The likelihood goes on beyond a wall,
-    and so does its description: the wall is the device's, and counts once.
+    That is fitted to the likelihood over draws of the recording's exact distribution given all
+    others (`gaussian_likelihood.described`): near a wall, or on a ridge that is bent, the model is
+    not linear over the width of what is known.  The likelihood goes on beyond a wall, and so does
+    its description: the wall is the device's, and counts once.
     """
     first, last = seed.spawn(2)
     below = draw_below(hierarchy, phi, here.low, np.random.default_rng(first), spike)
     here = replace(here, low=np.full(len(here.low), -np.inf))
     found, changed = list(hierarchy.likelihoods), False
     for r, own in enumerate(reweight(posteriors, users, hierarchy, below, phi, here, last)):
-        if posteriors[r].windows is not None and own.how in (OWN, SAMPLED):
-            rest = cavity(hierarchy, r, phi, np.random.default_rng(first))
-            found[r], changed = described(here.coordinate(own.draws), rest), True
+        if own.how not in (OWN, SAMPLED):
+            continue
+        better = described(posteriors[r], here, own.draws)
+        if better is not None:
+            found[r], changed = better, True
     return replace(hierarchy, likelihoods=tuple(found)) if changed else hierarchy
 
 
@@ -184,9 +186,13 @@ class Wanted:
         return Reweighted(self.user, draws, number, k, how, number / len(x))
 
     def enough(self, found: Reweighted) -> bool:
-        """Whether nothing better is worth looking for: 20 draws below 0.1 % risk are enough."""
-        least = _ENOUGH if self.count > _ENOUGH else _HARMLESS * self.count
-        return found.good and found.effective >= least
+        """Whether nothing better is worth looking for: 20 draws below 0.1 % risk are enough.
+
+        Half as many of the levels' own draws: they alone know of dampers that the device lacks,
+        and of more than some hundred draws of the hyperparameters.
+        """
+        least = _ENOUGH if self.count > _ENOUGH and found.how != DESCRIBED else 0.0
+        return found.good and found.effective >= max(least, _HARMLESS * min(self.count, _ENOUGH))
 
     def alone(self) -> Reweighted:
         """The recording by itself."""
