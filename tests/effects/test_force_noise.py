@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt, sosfiltfilt
 from test_wandering_mode import DELAY, KC, T, fitted, limit_of, recorded, step_of
 
 import bayeshaptic as bh
@@ -105,6 +106,20 @@ def test_the_limit_stays_and_the_page_names_the_noise(make) -> None:  # type: ig
     assert head.status == "safe" and 0.8 * truth < head.stiffness < truth
     (notice,) = [one for one in result.analysis.notices if one.topic == "noise of the force"]
     assert notice.level == "note" and "white" in notice.text
+
+
+@pytest.mark.parametrize("wander", [0.0, 0.1])
+def test_noise_that_was_smoothed_away_is_no_floor(wander: float) -> None:
+    """Above a force of a band positions hold what a filter left: not the noise within the band."""
+    force = sosfilt(butter(4, 150, fs=1 / T, output="sos"), RNG.standard_normal(20_000))
+    raw = played(force, force)
+    if wander:
+        raw = recorded(wander, force=force)
+    smooth = sosfiltfilt(butter(2, 200, fs=1 / T, output="sos"), raw.position)
+    for position in (raw.position, smooth):
+        recording = recording_from_arrays(force=force, position=position, period_s=T)
+        (found,) = excess.excess_noise_test(*fitted(recording))
+        assert found.flagged == (wander > 0)
 
 
 def test_a_hand_is_no_louder_than_slower_windows_leave_it() -> None:

@@ -29,10 +29,10 @@ def step_of(stiffness: float, step_s: float = T) -> tuple[np.ndarray, np.ndarray
     return both[:4, :4], both[:4, 4]
 
 
-def recorded(wander: float, samples: int = N) -> Recording:
+def recorded(wander: float, samples: int = N, force: np.ndarray | None = None) -> Recording:
     """White noise; the stiffness is another one of five every 50 ms, `wander` apart at most."""
     rng = np.random.default_rng(3)
-    force = rng.standard_normal(samples)
+    force = rng.standard_normal(samples) if force is None else force
     steps = [step_of(KC * (1 + wander * share)) for share in (-1, -0.5, 0, 0.5, 1)]
     which = np.repeat(rng.integers(5, size=samples // 50), 50)
     state, position = np.zeros(4), np.empty(samples)

@@ -199,7 +199,12 @@ def _of_the_force(recording: Recording, band_hz: tuple[float, float]) -> float:
 
 
 def _floor(recording: Recording, band_hz: tuple[float, float]) -> float | None:
-    """Median power of a line above the band, leakage projected out."""
+    """Median power of a line above the band, leakage projected out.
+
+    None where that is not alike in the faster half of it.  An encoder's noise is; where positions
+    were smoothed or interpolated before they were written down, what is left of it up there may be
+    a millionth of what the band has.
+    """
     samples = recording.samples
     frequency = np.fft.rfftfreq(samples, recording.period_s)
     scale = 1 / np.sqrt(samples)
@@ -221,4 +226,8 @@ def _floor(recording: Recording, band_hz: tuple[float, float]) -> float | None:
         left = y[lines] - basis @ (basis.T @ y[lines])
         shape = _of_the_sensor(recording, frequency[lines])
         found.append(np.sum(np.abs(left) ** 2 * shape) / (_LINES - basis.shape[1]))
-    return float(np.median(found)) if len(found) >= _FEWEST else None
+    if len(found) < _FEWEST:
+        return None
+    quiet, loud = np.quantile(found[len(found) // 2 :], [0.25, 0.75])
+    alike = loud <= 10 ** (0.1 * thresholds.EXCESS_DB) * quiet
+    return float(np.median(found)) if alike else None
