@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.diagnosis.base.alignment import LATER, MOVED
+from bayeshaptic.diagnosis.base.alignment import LATER, LESS, LESS_DELAY, MOVED
 from bayeshaptic.diagnosis.residuals.columns import SPEED, SPENT
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
@@ -50,9 +50,6 @@ _CHANGES = 0.25
 # 11 % too small and whose limits were 10 times too high.  None of 14 recordings of strangers in
 # which a force was taken off is refused by it, nor of 86 others; five looked at have 1.0 to 1.5.
 _MOSTLY = 10.0
-# Of a sampling period: so much less delay than was told is no wrong number, but another sample.  An
-# extra delay is named in eight of 510 strangers' recordings; none is refused for this.
-_LESS = 0.5
 _NO_LAW = {
     GAIN.test: "the gain of the actuator ripples along the way, which was not taken off, and where "
     "it is largest the limit is lower by that",
@@ -184,6 +181,12 @@ def _of_the_alignment(analysis: Analysis) -> list[str]:
             "the position was written down before its command acts, and by how many samples only "
             "the loop's delay would tell: say it with --delay-s, or record again"
         )
+    if any(notice.topic == LESS_DELAY for notice in analysis.notices):
+        found.append(
+            "a simpler model explains the recording with less delay than was told, as where a "
+            "position is written down before its command acts, and with that delay the limit is "
+            "lower: correct the columns, or --delay-s"
+        )
     if (less_s := _less_delay_s(analysis)) is not None:
         found.append(
             f"the recording shows {quantity(less_s, 's')} less delay than was told, as where a "
@@ -239,7 +242,7 @@ def _is_moved(analysis: Analysis) -> bool:
 
 def _less_delay_s(analysis: Analysis) -> float | None:
     """How much less delay than was told is found; None for less than half a sampling period."""
-    model, least_s = analysis.model, _LESS * analysis.etfe.period_s
+    model, least_s = analysis.model, LESS * analysis.etfe.period_s
     if not analysis.sampled or LATER not in model.names:
         return None
     draws = analysis.posterior.draws[:, model.names.index(LATER)]

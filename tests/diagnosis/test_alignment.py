@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from bayeshaptic.diagnosis.base import alignment
-from bayeshaptic.diagnosis.base.alignment import MOVED, rows_of_one_sample, with_rows_moved
+from bayeshaptic.diagnosis.base.alignment import (
+    LESS_DELAY,
+    MOVED,
+    rows_of_one_sample,
+    with_rows_moved,
+)
 from bayeshaptic.diagnosis.base.opened import opened
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.options import Options
@@ -175,3 +180,21 @@ def test_every_piece_is_moved_by_itself() -> None:
 
 def _of(said: object) -> tuple[str, ...]:
     return (said.sentence, *said.details)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("mean_of", [1, 2])
+def test_a_mode_that_only_leads_does_not_hide_a_command_that_was_smoothed(mean_of: int) -> None:
+    # With the loop's own delay told a mode damped beyond measure stood for the lead, in green.
+    bench = replace(Bench.from_device("phantom", False, "rigid"), delay_s=1.5e-3)
+    made = simulate(bench, NOISE, seed=3)
+    force = np.convolve(made.force, np.full(mean_of, 1 / mean_of))[: len(made.force)]
+    recording = recording_from_arrays(
+        force, made.position, bench.period_s, force_unit="Nm", position_unit="rad"
+    )
+    closed = close_loop(recording, hidden=False, delay_s=bench.delay_s)
+    warned = any(notice.topic == LESS_DELAY for notice in closed.analysis.notices)
+    said = headline(closed)
+    assert warned == (mean_of > 1) == (said.status == "untrusted")
+    if warned:
+        assert "less delay than was told" in said.sentence
+        assert closed.analysis.limit.quantile(0.05) > bench.true_critical_stiffness()
