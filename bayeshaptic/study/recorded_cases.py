@@ -22,47 +22,63 @@ _CONTRADICT = 1.5  # times between the intervals of two limits of one device
 
 @dataclass(frozen=True)
 class Widening:
-    """What closing the loop adds to limits: uncertain effects, and what is unexplained.
+    """What closing the loop adds to limits: effects, what is unexplained, what could hide.
 
     Attributes
     ----------
     shift, log_sd : ndarray, shape (R,)
-        Of log K_CR, in each recording.
+        Of log K_CR, in each recording: of effects, and of what is unexplained.
+    hidden : tuple of ndarray
+        Draws of what could hide does to log K_CR, in each recording.  They are no normal variable:
+        mostly nothing, and now and then far down.
     """
 
     shift: Floats
     log_sd: Floats
+    hidden: tuple[Floats, ...]
 
     def apply(self, limit: CriticalStiffness, rng: np.random.Generator) -> CriticalStiffness:
         """The limit with each draw widened as one of the recordings, at random."""
-        if not (self.shift.any() or self.log_sd.any()):
+        if not (self.shift.any() or self.log_sd.any() or any(one.any() for one in self.hidden)):
             return limit
         which = rng.integers(len(self.shift), size=len(limit.samples))
-        normal = rng.standard_normal(len(limit.samples))
-        factor = np.exp(self.shift[which] + self.log_sd[which] * normal)
-        return replace(limit, samples=limit.samples * factor)
+        log_factor = self.shift[which] + self.log_sd[which] * rng.standard_normal(len(which))
+        for number, draws in enumerate(self.hidden):
+            rows = which == number
+            log_factor[rows] += rng.choice(draws, size=int(rows.sum()))
+        return replace(limit, samples=limit.samples * np.exp(log_factor))
 
 
 def widening(some: Sequence[Analysed]) -> Widening:
     """How the limits of closed loops differ from those of their posteriors; nothing elsewhere."""
     table = [_widening(one) for one in some]
-    return Widening(*np.array(table, float).reshape(-1, 2).T)
+    shift, log_sd = np.array([own[:2] for own in table], float).reshape(-1, 2).T
+    return Widening(shift, log_sd, tuple(own[2] for own in table))
 
 
-def _widening(one: Analysed) -> tuple[float, float]:
+def _widening(one: Analysed) -> tuple[float, float, Floats]:
+    """Shift, standard deviation and draws of what could hide, of one recording."""
     analysis = one.analysis
     if analysis is None or analysis is one.result:
-        return 0.0, 0.0
-    plain = critical_stiffness(analysis.posterior, max_draws=4000).samples
-    own, logs = analysis.limit.samples, []
-    for samples in (plain, own):
-        good = samples[np.isfinite(samples) & (samples > 0)]
-        logs.append(np.log(good) if len(good) > 1 else np.zeros(2))
-    shift = float(logs[1].mean() - logs[0].mean())
-    log_sd = float(np.sqrt(max(logs[1].var() - logs[0].var(), 0.0)))
-    # What thinning alone makes of equal limits is no widening.
-    noise = 4 * float(logs[0].std()) / np.sqrt(min(len(plain), 1000))
-    return (0.0, 0.0) if abs(shift) < noise and log_sd < 3 * noise else (shift, log_sd)
+        return 0.0, 0.0, np.zeros(1)
+    # All draws, since those of the limit are all: equal limits then differ by nothing at all, and
+    # no threshold has to tell a small difference from that of other draws.
+    plain = critical_stiffness(analysis.posterior).samples
+    exact = (analysis.limit if analysis.hidden is None else analysis.hidden.declared).samples
+    before, after = _logs(plain), _logs(exact)
+    shift = float(after.mean() - before.mean())
+    log_sd = float(np.sqrt(max(after.var() - before.var(), 0.0)))
+    if analysis.hidden is None:
+        return shift, log_sd, np.zeros(1)
+    good = np.isfinite(exact) & (exact > 0)  # what could hide is one factor a draw
+    hidden = np.log(analysis.limit.samples[good] / exact[good])
+    return shift, log_sd, hidden if len(hidden) else np.zeros(1)
+
+
+def _logs(samples: Floats) -> Floats:
+    """Logs of what is neither zero nor infinite."""
+    good = samples[np.isfinite(samples) & (samples > 0)]
+    return np.log(good) if len(good) > 1 else np.zeros(2)
 
 
 def posterior(one: Analysed) -> Posterior:

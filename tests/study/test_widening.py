@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -39,6 +40,36 @@ def test_effects_and_what_is_unexplained_are_passed_on() -> None:
     ratio = np.log(wider.samples / limit.samples)
     assert ratio.mean() == pytest.approx(-0.2 / 3, abs=0.01)
     assert widening(some[:1]).apply(limit, np.random.default_rng(2)) is limit
+
+
+def test_no_widening_is_too_small_to_be_passed_on() -> None:
+    """What is dropped below a threshold switches between seeds, and by as much as the threshold."""
+    one = closed("ana", log_sd=0.02)
+    own = np.log(one.analysis.limit.samples).std()  # type: ignore[union-attr]
+    for share in (0.02, 0.05, 0.1):
+        found = widening([closed("ben", shift=-share * own)])
+        np.testing.assert_allclose(found.shift, -share * own, rtol=1e-6)
+
+
+def test_what_could_hide_keeps_its_shape() -> None:
+    """One draw in fifty far down is no wider distribution: it is what a small risk comes from."""
+    found = closed("ana")
+    limit = found.analysis.limit  # type: ignore[union-attr]
+    rng = np.random.default_rng(3)
+    factor = np.where(rng.random(len(limit.samples)) < 0.02, 0.7, 1.0)
+    hidden = SimpleNamespace(declared=limit)
+    parts = dict(vars(found.analysis)) | {
+        "limit": replace(limit, samples=limit.samples * factor),
+        "hidden": hidden,
+    }
+    found = replace(found, result=replace(found.result, analysis=FakeAnalysis(**parts)))  # type: ignore[arg-type, type-var]
+    narrow = replace(limit, samples=np.full(20_000, 100.0))
+    wide = widening([found]).apply(narrow, rng).samples
+    assert set(np.round(wide, 6)) == {70.0, 100.0}
+    # Four standard deviations of a share of 20,000 draws.
+    assert np.mean(wide < 100) == pytest.approx(np.mean(factor < 1), abs=0.004)
+    half = widening([found, closed("ben")]).apply(narrow, rng).samples
+    assert np.mean(half < 100) == pytest.approx(np.mean(factor < 1) / 2, abs=0.003)
 
 
 def test_a_case_keeps_its_widened_samples() -> None:
