@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.quantities import interval
+from bayeshaptic.recordings.join import name_of_several
 from bayeshaptic.stability.cases import FREE, Case
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.stability.draws import draws_of
@@ -111,7 +112,7 @@ def place_of(configuration: float | str | None) -> str:
 
 
 def contradictions(free: Sequence[Analysed]) -> tuple[Notice, ...]:
-    """Recordings that nobody holds, in one configuration, whose limits are far apart.
+    """Recordings that nobody holds, in one configuration, whose limits or effects differ.
 
     No hand differs between them, so that of one device they would agree.
 
@@ -123,11 +124,28 @@ def contradictions(free: Sequence[Analysed]) -> tuple[Notice, ...]:
     found: dict[str, list[Analysed]] = {}
     for one in free:
         found.setdefault("nobody holds it" + place_of(one.entry.configuration), []).append(one)
-    return tuple(
-        Notice("warning", "contradiction", _contradict(label, low, high))
+    texts = [
+        _contradict(label, low, high)
         for label, some in found.items()
         for low, high in ((min(some, key=_upper), max(some, key=_lower)),)
         if _lower(high) > _CONTRADICT * _upper(low)
+    ]
+    for label, some in found.items():
+        kinds = {one.effects: [o.name for o in some if o.effects == one.effects] for one in some}
+        if len(kinds) > 1:
+            texts.append(_other_effects(label, kinds))
+    return tuple(Notice("warning", "contradiction", text) for text in texts)
+
+
+def _other_effects(label: str, kinds: Mapping[tuple[str, ...], Sequence[str]]) -> str:
+    told = "; ".join(
+        f"{', '.join(effects) or 'no effect'} in {' and '.join(names)}"
+        for effects, names in kinds.items()
+    )
+    return (
+        f"Recordings of one case ({label}) do not agree about what the device has: {told}. Did it "
+        "change between them? Each kind is a case of its own, and the limit of the device allows "
+        "for all of them."
     )
 
 
@@ -168,7 +186,9 @@ def recorded(some: Sequence[Analysed], group: str, beside: Sequence[Case] = ()) 
     labels = [*(key[0] for key in found), *(case.label for case in beside)]
     return tuple(
         _pooled(
-            key[0] if labels.count(key[0]) == 1 else f"{key[0]} ({trials[0].name})",
+            key[0]
+            if labels.count(key[0]) == 1
+            else f"{key[0]} ({name_of_several(trials[0].name, len(trials) - 1)})",
             group,
             [one.analysis for one in trials if one.analysis is not None],
         )

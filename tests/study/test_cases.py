@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from bayeshaptic.models import build_model
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability.cases import FREE, HELD, Case, device_limit
 from bayeshaptic.stability.critical import CriticalStiffness
+from bayeshaptic.study import recorded_cases
 from bayeshaptic.study.cases import _two_names
 from bayeshaptic.study.recorded_cases import contradictions
 from bayeshaptic.types import Floats
@@ -167,6 +170,19 @@ def test_recordings_of_two_devices_contradict_each_other() -> None:
     assert "nobody holds it" in warning.text and f"by {other.name} " in warning.text
     elsewhere = replace(other, entry=replace(other.entry, configuration="folded"))
     assert not contradictions((first, elsewhere, third))
+
+
+def test_an_effect_in_one_recording_of_a_device_and_not_in_another_is_told() -> None:
+    """Friction in one of three recordings that nobody held was a case of its own in silence."""
+    some = fake_study(people=0, free=3).recordings
+    found: Any = SimpleNamespace(analysis=some[2].analysis, effect_names=("coulomb_friction",))
+    odd = replace(some[2], result=found)
+    (warning,) = contradictions((*some[:2], odd))
+    assert (warning.level, warning.topic) == ("warning", "contradiction")
+    assert f"no effect in {some[0].name} and {some[1].name}; " in warning.text
+    assert f"coulomb_friction in {odd.name}" in warning.text
+    labels = [case.label for case in recorded_cases.recorded((*some[:2], odd), FREE)]
+    assert labels[0] == f"nobody holds it ({some[0].name} and 1 other)"
 
 
 def test_a_user_with_two_names_is_asked_about() -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.quantities import estimate, percent, pure
+from bayeshaptic.quantities import estimate, percent, pure, rounded_down
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.bands import band_of
 from bayeshaptic.report.numbers.cases import is_free
@@ -57,8 +57,8 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
     if spread < hardly_db:
         first = (
             "People hardly move the critical stiffness of this device: for a person not yet seen"
-            f"{where} it is {seen}, with a spread of {pure(spread, 2)} dB (sd). Who holds it does "
-            "not matter for the limit. More people would not narrow it."
+            f"{where} it is {seen}, with a spread of {pure(spread, 2)} dB (sd). "
+            + _rare_people(case, hardly_db)
         )
     elif not math.isfinite(spread):
         first = f"For a person not yet seen{where} the critical stiffness is {seen}."
@@ -81,6 +81,22 @@ def people(study: StudyAnalysis) -> tuple[str, ...]:
     if apart:
         found.append(apart)
     return tuple(found)
+
+
+def _rare_people(case: Case, sd_db: float) -> str:
+    """Whether that holds of one person in a thousand, too: few users do not rule such a one out."""
+    one_in_1000 = case.limit.safe(0.001)
+    normal = 3.09  # standard deviations below the middle that one in a thousand is
+    far_db = normal * sd_db
+    if one_in_1000 is None:
+        return "Of one person in a thousand nothing is known."
+    if decibel(case.limit.quantile(0.5)) - decibel(one_in_1000) < far_db:
+        return "Who holds it does not matter for the limit. More people would not narrow it."
+    told = rounded_down(one_in_1000, case.limit.unit, *case.limit.quantile([0.05, 0.95]))
+    return (
+        f"That does not hold of everybody: of one person in a thousand it is below {told.text}, "
+        "as far as these people say; more people may rule that out."
+    )
 
 
 def _elsewhere(study: StudyAnalysis) -> str:
