@@ -29,6 +29,7 @@ from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.one_mass import analyse_one_mass, traced_of_one_mass
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.excess import noise_besides
+from bayeshaptic.diagnosis.samples.command_times import command_times
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.widening.discrepancy import with_discrepancy
 from bayeshaptic.diagnosis.widening.law_error import with_law_error
@@ -117,6 +118,8 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
         notices += mode_above_band(state.fit, state.etfe, analysis.limit)
     if (noise := noise_besides(state.fit, state.etfe)) is not None:
         notices += (noise.notice(state.etfe),)
+    if (times := command_times(state.fit, state.etfe)) is not None:
+        notices += times.notices
     seconds = _stages(begun.seconds, tracing_s, base.seconds, analysis.seconds)
     wide = with_law_error(analysis.posterior, begun.fit, traced, seed)
     stated, louder = wide or analysis.posterior, analysis.noise_scale

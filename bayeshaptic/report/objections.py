@@ -20,6 +20,7 @@ from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, how_computed, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
+from bayeshaptic.report.beside_command import beside_command, what_changes
 from bayeshaptic.report.beyond_band import beyond_band
 from bayeshaptic.report.in_closed_loop import in_closed_loop
 from bayeshaptic.report.numbers.held_still import held_still
@@ -29,7 +30,6 @@ from bayeshaptic.report.numbers.misfit import (
     misfit_is_clear,
     residual_is_noticed,
 )
-from bayeshaptic.report.numbers.result import may_be_held
 from bayeshaptic.report.numbers.stand_ins import stand_ins
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.numbers.unstated import unstated
@@ -40,9 +40,6 @@ if TYPE_CHECKING:
 
 HEADLINE_RISKS = (0.01, 0.05)
 _OPEN = 10.0  # times the lower end of the limit's 90 % interval: a median beyond that is open
-# Of the speed that the command makes: 46 clean devices that nobody holds, of two simulations, stay
-# below 0.03 (0.13 for a sweep of 2 s).
-_BESIDES = 0.25
 # Of the power of the response at the limit: from 0.28 on friction may be all of the damping there.
 # It is asked only where the noise of the device is flagged: in none of 60 clean recordings.
 _CHANGES = 0.25
@@ -95,8 +92,8 @@ def _of_the_loop(closed: Closed) -> list[str]:
     if closed.changing_at_limit > _CHANGES:
         found.append(
             "what the device does at the frequency of the limit is not the same from moment to "
-            "moment, by as much as it answers there (a mode that wanders, a cable that slips, "
-            "friction): the limit of the mean is not that of the device"
+            f"moment, by as much as it answers there ({what_changes(closed.analysis)}): the limit "
+            "of the mean is not that of the device"
         )
     if changes(closed):
         found.append(
@@ -154,13 +151,8 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             "what was sensed lags beyond the delay that is known, and whether that is in the loop "
             "or in the sensor of force or motion, which the loop does without, nobody can tell"
         )
-    if _is_moved(analysis):
-        hand = "a hand (--held yes) or " if may_be_held(analysis) else ""
-        found.append(
-            "the device moves beside what its command does, at more than "
-            f"{percent(_BESIDES)} of that speed: something else moves it, {hand}the floor, or a "
-            "force that was not found, and dry friction beside such a motion looks like damping"
-        )
+    if (moved := beside_command(analysis)) is not None:
+        found.append(moved)
     return found
 
 
@@ -228,16 +220,6 @@ def _of_the_limit(analysis: Analysis) -> list[str]:
             f"with probability {percent(never)} the loop is unstable however soft the wall is"
         )
     return found
-
-
-def _is_moved(analysis: Analysis) -> bool:
-    """Whether something but the command moves a device that nobody is said to hold."""
-    recording = analysis.etfe.unbroken
-    if analysis.model.held or not analysis.sampled or analysis.etfe.through_reference:
-        return False
-    if recording is None or analysis.in_loop is not None or has_feedback(analysis.notices):
-        return False
-    return analysis.moved_besides > _BESIDES
 
 
 def _less_delay_s(analysis: Analysis) -> float | None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import butter, chirp, lfilter, sosfilt
+from scipy.signal import butter, chirp, filtfilt, lfilter, sosfilt
 from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
 
 from bayeshaptic.errors import InputError
@@ -122,6 +122,17 @@ def test_virtual_walls_and_servos_are_feedback(case: str) -> None:
         found = judge(force, position)
         assert found.has_feedback
         assert not found.swapped
+
+
+def test_a_position_that_was_smoothed_with_later_samples_is_named_beside_feedback() -> None:
+    """It knows the force before that acts; in one of open loop, too."""
+    force = np.random.default_rng(4).standard_normal(20_000)
+    speed = lfilter([0, 1], [1, -0.998], force)
+    position = filtfilt(*butter(2, 0.2), lfilter([1], [1, -0.9999], speed))
+    recording = recording_from_arrays(force, position, 1e-3)
+    found = what_drives_what(recording, rough_response(recording), "a file")
+    (notice,) = (one for one in found if one.topic == "feedback")
+    assert notice.level == "warning" and "filtfilt" in notice.text
 
 
 def test_a_spring_that_a_hand_leads_is_not_taken_for_exchanged_columns() -> None:

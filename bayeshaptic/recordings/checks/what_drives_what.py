@@ -119,7 +119,9 @@ def _feedback(evidence: str, against: bool, far_past: bool = False) -> Notice:
         text = (
             f"The force was computed from the motion ({evidence}): the recording was made in "
             "closed loop, so the ETFE, the fit and K_CR are biased. Excite the device with a force "
-            "that does not depend on the motion."
+            "that does not depend on the motion. A position that was smoothed with samples yet to "
+            "come (filtfilt, splines) knows the force before it acts, and looks the same: then "
+            "give the position as it was read."
         )
     if against:
         text += (
