@@ -97,14 +97,18 @@ def recording_from_arrays(
 
         every = put_back(signals.force, position, signals.reference, timing.rows, where)
         signals = _Signals(*every)
-    position, jumps = without_jumps(signals.position)
+    position, joints, jumps = without_jumps(signals.position, signals.force)
     start, stop = moving_part(signals.force, position, increment_unit(position) or 0.0)
     notices += (*timing.notices, *jumps, *_at_rest(start, stop, len(position)))
     signals = replace(signals, position=position)[start:stop]
     often, first = written_each((signals.force, signals.position))
     loop_s = often * timing.period_s
+    skipped = first % often if often > 1 else 0
+    joints = tuple(
+        -((start + skipped - joint) // often) for joint in joints if start < joint < stop
+    )
     if often > 1:
-        signals = signals[first % often :: often]
+        signals = signals[skipped::often]
         notices += (_written_each(often, loop_s),)
     elif held > 1 and (stamps is None or period_s is None):
         notices += (_held(signals.force, held, loop_s, stamps is not None),)
@@ -121,6 +125,7 @@ def recording_from_arrays(
         time_jitter=timing.jitter,
         source=source,
         notices=notices,
+        joints=joints,
     )
 
 

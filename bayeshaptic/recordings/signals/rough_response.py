@@ -109,7 +109,7 @@ def _left_by_one_mass(s: Complexes, velocity: Complexes, period_s: float) -> flo
 
 
 def rough_response(recording: Recording) -> RoughResponse:
-    """Welch's averages over a twelfth of the recording, or 4096 samples.
+    """Welch's averages over a twelfth of the recording, or 4096 samples, none across its joints.
 
     Parameters
     ----------
@@ -121,11 +121,18 @@ def rough_response(recording: Recording) -> RoughResponse:
     """
     from scipy.signal import csd, welch
 
-    segment = int(min(4096, recording.samples // 12))
+    longest = max(span.stop - span.start for span in recording.spans)
+    segment = int(min(4096, recording.samples // 12, longest))
     options = {"fs": 1 / recording.period_s, "nperseg": segment, "detrend": "linear"}
-    frequency, force_power = welch(recording.force, **options)
-    _, position_power = welch(recording.position, **options)
-    _, cross = csd(recording.force, recording.position, **options)
+    pieces = [span for span in recording.spans if span.stop - span.start >= segment]
+    sums: list[Complexes] = []
+    for span in pieces:
+        force, position = recording.force[span], recording.position[span]
+        frequency, pushes = welch(force, **options)
+        powers = pushes, welch(position, **options)[1], csd(force, position, **options)[1]
+        sums.append((2 * len(force) // segment - 1) * np.array(powers, dtype=complex))
+    force_power, position_power, cross = np.sum(sums, axis=0)
+    force_power, position_power = force_power.real, position_power.real
     excited = force_power > 1e-4 * force_power.max()
     excited[:3] = False  # the window smears drift over the first lines
     if not np.any(excited):

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.recordings.signals.filling import ORDER, fit_predictor
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.runs import HUNG
-from bayeshaptic.types import Bools, Floats
+from bayeshaptic.types import Bools, Floats, Ints
 
 _TURN = 2 * np.pi
 # How far from a turn a jump may be, in fast steps elsewhere: what moves goes on across it.
@@ -23,6 +25,12 @@ _FARTHER = 8.0  # goes a jump to anywhere than any step around it,
 _AROUND = 10  # rows before and after it,
 _COUNTS = 20  # and than so many counts, which an encoder at rest does not flicker by
 _MOST_OFTEN = 1e-3  # of all rows: what moves so more often is how it moves
+# Mean square of what the motion after a jump is off from what the motion before leads to expect,
+# over the worst beside it, from where on it is another motion. Of 138 simulated recordings of all
+# kinds, loops too, whose encoder is set to zero up to three times, two are above.
+_ANOTHER = 6.0
+_MEANS = 1, 4, 16  # rows
+_TINY = 1e-8  # of the motion: errors where it is predicted to within rounding
 
 
 def unwrapped(
@@ -67,60 +75,143 @@ def unwrapped(
     )
 
 
-def without_jumps(position: Floats) -> tuple[Floats, tuple[Notice, ...]]:
-    """The position without jumps to anywhere, and a warning of them.
+def without_jumps(
+    position: Floats, force: Floats
+) -> tuple[Floats, tuple[int, ...], tuple[Notice, ...]]:
+    """The position without jumps to anywhere, where other motions begin, and a warning of them.
 
-    No mass goes in one period eight times as far as in any of the ten before and after: an encoder
-    was set to zero or missed counts, or what stands on both sides was not recorded in one go. A
+    No mass goes in one period eight times as far as in any of the ten before and after. Where the
+    motion goes on after a jump, an encoder was set to zero or missed counts: it is counted on
+    across. Where another motion begins, what stands on both sides was not recorded in one go. A
     reading that hung, and is back where the device has gone since, is for those who fill it in.
 
     Parameters
     ----------
+    position, force : ndarray, shape (N,)
+
+    Returns
+    -------
     position : ndarray, shape (N,)
+    joints : tuple of int
+        Samples at which another motion begins.
+    notices : tuple of Notice
     """
     steps = np.diff(position)
     size = np.abs(steps)
     if np.count_nonzero(steps) < _FEWEST_STEPS:
-        return position, ()
+        return position, (), ()
     count = increment_unit(position) or 0.0
     # The most of ten steps: those before step k begin at its own place, those after ten further on.
     most = sliding_window_view(np.pad(size, _AROUND), _AROUND).max(axis=1)
     around = np.maximum(most[: len(steps)], most[_AROUND + 1 :])
     jumps = size > np.maximum(_FARTHER * around, max(_most(steps), _COUNTS * count))
-    jumps &= ~_caught_up(size, jumps)
+    jumps &= ~_caught_up(position, jumps)
     if not 0 < np.mean(jumps) <= _MOST_OFTEN:
-        return position, ()
+        return position, (), ()
     beside = np.pad(steps, 1)
     off = np.where(jumps, steps - (beside[:-2] + beside[2:]) / 2, 0.0)
     if count:
         off = count * np.round(off / count)
-    edges = np.concatenate([[0], np.flatnonzero(jumps) + 1, [len(position)]])
-    longest = int(np.argmax(np.diff(edges)))
-    text = (
-        f"The position jumps {_times(jumps)}, the first time at {_first(jumps)} by "
-        f"{steps[jumps][0]:.4g}, farther than in any step around it: an encoder was set to zero or "
-        "missed counts, rows were lost, or two recordings stand in one file. It was counted on "
-        "across; what moved in between is not known. Record again without, or read what has none, "
-        f"--rows {edges[longest] + 1}:{edges[longest + 1]}."
-    )
+    first = np.flatnonzero(jumps) + 1
+    mended = position - np.concatenate([[0.0], np.cumsum(off)])
+    # Where one is the beginning of another recording, so are the others, as far as anybody knows.
+    another = first if _surprise(mended, force, first, count) > _ANOTHER else first[:0]
+    off[another - 1] = 0.0  # how far one recording lies from the next nothing tells
     mended = position - np.concatenate([[0.0], np.cumsum(off)])
     mended.setflags(write=False)
-    return mended, (Notice("warning", "jumps", text),)
+    return mended, tuple(map(int, another)), (_told(steps, jumps, another),)
 
 
-def _caught_up(size: Floats, jumps: Bools) -> Bools:
+def _surprise(position: Floats, force: Floats, first: Ints, count: float) -> float:
+    """How far the motion from any of these rows on is off from what the motion before leads to.
+
+    The mean square of the errors of predictions from both sides of a jump, over the usual one; of
+    means over more and more rows, too: behind a coarse encoder few rows tell no velocity.
+
+    Parameters
+    ----------
+    position, force : ndarray, shape (N,)
+    first : ndarray of int
+    count : float
+        Of the encoder, which rounds the position; 0 where it is not known.
+    """
+    found = [0.0]
+    for rows in _MEANS:
+        blocks = len(position) // rows
+        moved, pushed = (
+            signal[: blocks * rows].reshape(blocks, rows).mean(axis=1)
+            for signal in (position, force)
+        )
+        jumped = np.unique(first // rows)
+        after = np.zeros(blocks, dtype=bool)
+        after[jumped[jumped < blocks]] = True  # no regression across a jump
+        predictor = fit_predictor(moved, pushed, after)
+        if predictor is None:
+            break
+        errors = predictor.errors(moved, pushed)
+        least = max(count**2 / 12 / rows, (_TINY * float(np.std(position))) ** 2)
+        everywhere = _mean_squares(errors, range(0, blocks - ORDER + 1, ORDER))
+        # What the jump was, and where in its block, is not known: it is what leaves least.
+        jump = np.stack([predictor.past[:ORDER], np.cumsum(predictor.past[:ORDER])], axis=1)
+        for block in map(int, jumped[jumped + ORDER <= blocks]):
+            left = errors[block : block + ORDER]
+            left = left - jump @ np.linalg.lstsq(jump, left, rcond=None)[0]
+            # A sweep, a hand or an end stop is harder to predict at one time than at another.
+            beside = _mean_squares(errors, (block + k * ORDER for k in (-2, -1, 1, 2)))
+            usual = max(float(np.median(everywhere)), max(beside, default=0.0), least)
+            found.append(float(np.mean(left**2)) / usual)
+    return max(found)
+
+
+def _mean_squares(errors: Floats, begin: Iterable[int]) -> list[float]:
+    """Mean squares of errors in stretches that begin so, of those that are whole."""
+    return [
+        float(np.mean(errors[row : row + ORDER] ** 2))
+        for row in begin
+        if 0 <= row <= len(errors) - ORDER
+    ]
+
+
+def _told(steps: Floats, jumps: Bools, another: Ints) -> Notice:
+    """A warning of jumps, of which at some rows another motion begins."""
+    said = (
+        f"The position jumps {_times(jumps)}, the first time at {_first(jumps)} by "
+        f"{steps[jumps][0]:.4g}, farther than in any step around it"
+    )
+    across = "an encoder was set to zero or missed counts. It was counted on across"
+    if len(another):
+        text = (
+            f"{said}, and the motion does not go on from there as it was: several recordings stand "
+            f"in one file, or rows were lost. They are read as {len(another) + 1} pieces, each by "
+            "itself; report on each recording that should count alone with --rows."
+        )
+        return Notice("warning", "jumps", text)
+    edges = np.concatenate([[0], np.flatnonzero(jumps) + 1, [len(jumps) + 1]])
+    longest = int(np.argmax(np.diff(edges)))
+    text = (
+        f"{said}, and the motion goes on: {across}; what moved in between is not known. Record "
+        f"again without, or read what has none, --rows {edges[longest] + 1}:{edges[longest + 1]}."
+    )
+    return Notice("warning", "jumps", text)
+
+
+def _caught_up(position: Floats, jumps: Bools) -> Bools:
     """Jumps by which a reading that hung is back where the device has gone since, shape (N - 1,).
 
-    Over all of the rows in which nothing was read they are no farther than steps beside these.
+    They are no farther than some times what it goes beside them in as many rows as nothing was
+    read. Behind a coarse encoder a slow motion hangs for a while between any two counts.
     """
-    found, moved = np.zeros_like(jumps), np.flatnonzero(size)
+    found, moved = np.zeros_like(jumps), np.flatnonzero(np.diff(position))
     for jump in map(int, np.flatnonzero(jumps)):
         before = int(moved[max(int(np.searchsorted(moved, jump)) - 1, 0)])
         rows = jump - before
         if 1 < rows <= HUNG:
-            sides = slice(max(before - _AROUND + 1, 0), before + 1), slice(jump + 1, jump + _AROUND)
-            farthest = max(float(size[side].max(initial=0.0)) for side in sides)
-            found[jump] = size[jump] <= rows * _FARTHER * farthest
+            sides = (
+                position[max(before - rows + 1, 0) : before + 1],
+                position[jump + 1 : jump + 1 + rows],
+            )
+            farthest = max(float(np.ptp(side)) for side in sides if len(side))
+            found[jump] = abs(position[jump + 1] - position[jump]) <= _FARTHER * farthest
     return found
 
 
