@@ -160,7 +160,7 @@ def make(seed: int, noise: float | None = None, along_too: bool = False) -> Case
     if dry:
         bench = bench.with_effect("coulomb_friction", force=dry)
     done = run_loop(bench, control, seconds, seed=seed, give_up=100 * stroke)
-    at = done.position
+    at = done.position[:-1][np.diff(done.position) != 0]  # where it moves
     mean, forward, backward = (float(along.force(which, at).mean()) for which in range(3))
     truth = np.array(
         [

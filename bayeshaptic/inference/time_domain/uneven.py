@@ -23,7 +23,7 @@ class Way:
     low, high : float
         Of its positions.
     means : ndarray, shape (WAVES,)
-        Of the half waves, over its samples.
+        Of the half waves, over the samples at which it moves.
     """
 
     low: float
@@ -33,13 +33,14 @@ class Way:
     @classmethod
     def of(cls, position: Floats) -> Way:
         low, high = float(position.min()), float(position.max())
-        return cls(low, high, _half_waves(position, low, high).mean(axis=1))
+        moves = np.diff(position, append=position[-1]) != 0
+        return cls(low, high, _half_waves(position[moves], low, high).mean(axis=1))
 
 
 def waves(position: Floats, way: Way) -> Floats:
     """cos(pi j s) less its mean, j from 1, over the share s of the way; shape (WAVES, N).
 
-    Over the samples that the way is of, what a force along it is on average is in the constant
+    Over the samples at which it moved, what a force along it is on average is in the constant
     force and the dry friction alone.  Means over the way itself are another matter: how much of a
     slow wave lies in those depends on where the way happens to begin and to end.
     """

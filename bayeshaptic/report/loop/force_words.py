@@ -132,7 +132,7 @@ def motion(analysis: Analysis) -> str:
         text += (
             " A force that changes along the way and with the direction, "
             f"{quantity(found.motion.uneven_rms, force)} rms, was fitted with it: dry "
-            "friction and constant force are the means over the recording."
+            "friction and constant force are the means over the motion."
         )
     if not found.halves:
         return text

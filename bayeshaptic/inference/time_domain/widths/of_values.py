@@ -40,7 +40,7 @@ def covariance_of_values(there: Linearised) -> Floats:
 def covariance_of_shared(whole: Floats, found: Ridge) -> Floats:
     """Of the values that all pieces share, shape (5, 5), of that of all values.
 
-    Dry friction and constant force are means over the recording.  What a force along the way has
+    Dry friction and constant force are means over the motion.  What a force along the way has
     beyond the half waves that are fitted moves these by a share of the longest wave's size.
     """
     spread = whole[:SHARED, :SHARED].copy()
