@@ -14,8 +14,8 @@ from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Floats
 
 # Of a half wave along the way: what is in its mean that the half waves fitted do not describe. Of
-# 118 loops 90 % intervals hold dry friction and constant force in 88 and 71 % without it, in 95 and
-# 87 % with this, in 98 and 94 % with twice as much.
+# 199 loops 90 % intervals hold dry friction and constant force in 89 and 73 % without it, in 96 and
+# 90 % with this, in 98 and 96 % with twice as much.
 _UNDESCRIBED = 0.05
 
 
