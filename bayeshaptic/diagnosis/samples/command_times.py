@@ -82,7 +82,7 @@ class CommandTimes:
             "noise to the model, whose delay is the mean. Log every command of the servo's, and "
             "when it took effect."
         )
-        return (Notice("warning", TOPIC, text),)
+        return (Notice("note", TOPIC, text),)
 
 
 @dataclass(frozen=True)
