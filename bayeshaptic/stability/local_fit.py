@@ -14,6 +14,7 @@ from bayeshaptic.types import Complexes, Floats
 
 _RICHER = 5  # degree of the polynomial that tells whether a window is too wide
 _SPANS = np.geomspace(0.6, 0.02, 14)  # half widths over the centre frequency, widest first
+_ALIKE = 1e10  # condition above which nodes are too few places: those of pieces are the same
 _OUTLIER = 1.6  # share of its own noise variance that a window keeps at least: a tremor is a peak
 
 
@@ -183,6 +184,8 @@ def _widest(data: ResponseData, centre_hz: float, inverted: bool) -> LocalFit | 
         equations = every[near[within]].reshape(-1, _RICHER + 2)
         triangle: Complexes = np.asarray(np.linalg.qr(equations, mode="r"))
         triangle[:, :-1] *= (_SPANS[0] / span) ** np.arange(_RICHER + 1)  # its own powers
+        if np.linalg.cond(triangle[:-1, :-1]) > _ALIKE:
+            break
         left = np.cumsum(np.abs(triangle[::-1, -1]) ** 2)[::-1]  # by k coefficients: at k
         fewer, more = float(left[order + 1]), float(left[_RICHER + 1])
         enough = fewer - more < better and fewer < freedom + 3 * np.sqrt(1.2 * freedom)

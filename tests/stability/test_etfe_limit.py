@@ -10,7 +10,7 @@ from linear_bench import LHIFAM_FREE, Device
 from scipy.signal import chirp
 
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings import recording_from_arrays
+from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -194,3 +194,23 @@ def test_a_line_that_sweeps_hardly_excite_does_not_bend_its_neighbours(seed):
     # The worst of 140 complex errors: 6 standard deviations of each part have a chance of 2e-6;
     # with bent lines they were 15 to 290.
     assert np.max(np.abs(wrong) / [fit.relative_sd for fit in fits]) < 6
+
+
+def test_pieces_whose_windows_are_the_same_leave_no_polynomial_free():
+    """Below the second window of each: their quintics were of rounding, and 1/G was 1e-10."""
+    device = Bench("rigid", {"m": 0.4, "b": 3.0}, delay_s=0.3e-3, encoder_resolution=1e-7)
+    pieces = [
+        simulate(device, np.random.default_rng(seed).standard_normal(3431), seed=seed)
+        for seed in range(4)
+    ]
+    etfe = estimate_etfe(
+        join_recordings(
+            [recording_from_arrays(one.force, one.position, period_s=1e-3) for one in pieces]
+        )
+    )
+    measured = np.abs(1 / etfe.value)
+    places = np.geomspace(*etfe.band_hz, 100)
+    fits = [fit for hz in places if (fit := local_fit(response_data(etfe), hz))]
+    assert len(fits) > 80
+    for fit in fits:
+        assert 0.1 * measured.min() < abs(fit.inverse) < 10 * measured.max()
