@@ -89,8 +89,8 @@ def refuse_no_path(path: Path) -> None:
     """
     try:
         os.stat(path)
-    except ValueError as error:  # a zero byte
-        raise InputError(f"{shown(str(path))} is no path ({error})", topic="file") from None
+    except ValueError:  # a zero byte
+        raise InputError(f"{shown(str(path))} is no path", topic="file") from None
     except OSError as error:
         if error.errno == errno.ELOOP:
             told = "a link that leads in a circle; name the file or folder itself"
