@@ -113,9 +113,8 @@ def check_fields(thing: Any, names: Names) -> None:
         Where a field cannot be; the message names it.
     """
     for field in fields(thing):
-        value = _plain(given := getattr(thing, field.name))
-        if value is not given:
-            object.__setattr__(thing, field.name, value)
+        value = _plain(getattr(thing, field.name))
+        object.__setattr__(thing, field.name, value)
         _check(field.name, value, str(field.type), names)
 
 

@@ -141,7 +141,7 @@ class State:
     @cached_property
     def errors(self) -> Floats:
         """Weighted rms on windows that took no part in the fit, and on all, shape (2,)."""
-        return _errors(self.fit)
+        return np.array([held_out_rms(self.fit, CHOOSE), np.sqrt(self.fit.reduced_chi_square)])
 
 
 @dataclass(frozen=True)
@@ -284,18 +284,14 @@ def compared_errors(before: State, after: State) -> tuple[Floats, Floats]:
     beside the little noise that they leave, what the model lacks may stand out further than all of
     it did before.  Both are fitted and weighed with the noise that was there before.
     """
-    fit = after.fit
     if after.accepted[-1].family in ("nonlinear", "measurement"):
-        windows = fit.windows
+        fit, windows = after.fit, after.fit.windows
         known, at = (w.frequency_hz.mean(axis=1) for w in (before.fit.windows, windows))
         there, own = (f.likelihood.noise_variance for f in (before.fit, fit))
         louder = replace(windows, scatter=windows.scatter * np.interp(at, known, there) / own)
         fit = summarise(fit.model, louder, polish(fit.model, louder, fit.theta))
-    return before.errors, after.errors if fit is after.fit else _errors(fit)
-
-
-def _errors(fit: Fit) -> Floats:
-    return np.array([held_out_rms(fit, CHOOSE), np.sqrt(fit.reduced_chi_square)])
+        after = replace(after, fit=fit)
+    return before.errors, after.errors
 
 
 def describe_gain(gain: float) -> str:

@@ -188,14 +188,9 @@ class Model(Shown):
         frequency_hz = np.atleast_1d(np.asarray(frequency_hz, float))
         if frequency_hz.ndim > 1:
             raise InputError(f"frequency_hz has the shape {frequency_hz.shape}; give one axis")
-        still = frequency_hz == 0  # where a free device has a pole
-        moving = np.where(still, 1.0, frequency_hz)
-        ways = {"exact": system.sampled_response, "continuous": system.continuous_approximation}
-        if approximation not in ways:
+        if approximation not in ("exact", "continuous"):
             raise InputError(f'approximation is "exact" or "continuous", not {approximation!r}.')
-        response = ways[approximation](moving, self.period_s)
-        if np.any(still):
-            response[:, still] = system.static_response()[:, None]
+        response = system.response(frequency_hz, self.period_s, approximation == "exact")
         return response[0] if np.ndim(theta) == 1 else response
 
     def to_control(self, theta: ArrayLike | None = None) -> Any:
@@ -214,18 +209,12 @@ class Model(Shown):
             If python-control is not installed, the model has no sampling period, or no finite
             number of states.
         """
-        from bayeshaptic.models.response.state_space import state_space
+        from bayeshaptic.models.response.state_space import of_python_control
 
         if self.period_s is None:
             raise InputError("the model has no sampling period: give period_s, or a device.")
-        try:
-            import control
-        except ImportError:
-            raise InputError(
-                "python-control is not installed, and to_control() needs it: pip install control."
-            ) from None
         system = self.system(self.values if theta is None else theta)
-        return control.ss(*state_space(system, self.period_s), self.period_s)
+        return of_python_control(system, self.period_s)
 
     def log_prior(self, theta: ArrayLike) -> Floats:
         """Log prior density of parameter vectors `theta` of shape (B, P); shape (B,)."""
@@ -273,7 +262,7 @@ class Model(Shown):
         Raises
         ------
         InputError
-            For a value that the parameter cannot have: outside its prior's support, say.
+            For a value that the parameter cannot have.
         """
         left = tuple(p for p in self.parameters if p.name not in values)
         known = {p.name: p.known(values[p.name]) for p in self.parameters if p.name in values}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.linalg import expm
 from scipy.signal import tf2ss
@@ -41,6 +43,29 @@ def state_space(system: LinearSystem, period_s: float) -> Matrices:
     early, now = _held(a, b, 1.0 - (turns - whole))
     late, before = _held(a, b, turns - whole)
     return _delayed(early @ late, now, early @ before, c, whole)
+
+
+def of_python_control(system: LinearSystem, period_s: float) -> Any:
+    """The same as a ``control.StateSpace``.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        Of one parameter vector.
+    period_s : float
+
+    Raises
+    ------
+    InputError
+        Where python-control is not installed, or the system has no finite number of states.
+    """
+    try:
+        import control
+    except ImportError:
+        raise InputError(
+            "python-control is not installed, and to_control() needs it: pip install control."
+        ) from None
+    return control.ss(*state_space(system, period_s), period_s)
 
 
 def _held(a: Floats, b: Floats, share: float) -> tuple[Floats, Floats]:

@@ -99,7 +99,17 @@ class LinearSystem:
             response = response + self.remainder.at(points)
         return np.asarray(response.T)
 
-    def static_response(self) -> Floats:
+    def response(self, frequency_hz: Floats, period_s: float, exact: bool) -> Complexes:
+        """The sampled response, or its stand-in, and at zero the compliance; shape (B, L)."""
+        still = frequency_hz == 0  # where a free device has a pole
+        moving = np.where(still, 1.0, frequency_hz)
+        way = self.sampled_response if exact else self.continuous_approximation
+        response = way(moving, period_s)
+        if np.any(still):
+            response[:, still] = self._compliance()[:, None]
+        return response
+
+    def _compliance(self) -> Floats:
         """Position over a constant force, shape (B,): infinite where nothing holds the device."""
         with np.errstate(divide="ignore", invalid="ignore"):
             response = self.continuous_response(np.zeros(1, complex))[:, 0].real

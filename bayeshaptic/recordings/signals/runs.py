@@ -8,7 +8,9 @@ import numpy as np
 
 from bayeshaptic.types import Bools, Floats, Ints
 
-HUNG = 250  # rows that a reading hangs for at most; a device that rests does so for longer
+# Rows that a reading hangs for at most; a device that rests does so for longer. Of 150 that hang
+# for 10 to 250 rows none is taken for a jump; of longer ones only what looks wrong is filled in.
+HUNG = 250
 _FEWEST_CHANGES = 100
 _FEWEST_AT_REST, _LEAST_AT_REST = 100, 0.02  # rows of a standstill, and their share
 _AS_FAR = 0.5  # as a force pushes a mass where it moves; under less a device may just rest
