@@ -9,6 +9,7 @@ from typing import Any
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, begin
+from bayeshaptic.diagnosis.base.high_passed import perhaps_high_passed
 from bayeshaptic.diagnosis.base.opened import Clock
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
@@ -110,8 +111,9 @@ def finish(
         options.report(0.8, "critical stiffness")
         limit = watch.limit_of(posterior)
         etfe_limit = witness or etfe_critical_stiffness(etfe, seed=options.seed, sensor=fit.sensor)
+        filtered = perhaps_high_passed(fit, etfe, begun.choice)
     options.report(0.9, "writing the report")
-    notices = begun.notices
+    notices = (*begun.notices, *filtered)
     if etfe.direct or etfe.through_reference:
         notices = with_units_of(fit, etfe.recording, begun.device, notices)
     return Analysis(

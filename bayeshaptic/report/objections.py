@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.diagnosis.base.alignment import LATER, LESS, LESS_DELAY, MOVED
+from bayeshaptic.diagnosis.base.high_passed import TOPIC as HIGH_PASSED
 from bayeshaptic.diagnosis.residuals.columns import SPEED, SPENT
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
@@ -150,6 +151,12 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
         found.append(
             "what was sensed lags beyond the delay that is known, and whether that is in the loop "
             "or in the sensor of force or motion, which the loop does without, nobody can tell"
+        )
+    if any(notice.topic == HIGH_PASSED for notice in analysis.notices):
+        found.append(
+            "a device explains the recording better if its position was high-passed before it was "
+            "written down, and its limit is lower: record positions as they are read, with "
+            "whatever drift, or say --held where somebody holds it, or nobody"
         )
     if (moved := beside_command(analysis)) is not None:
         found.append(moved)

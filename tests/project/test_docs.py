@@ -13,6 +13,7 @@ import pytest
 
 import bayeshaptic
 from bayeshaptic.cli import build_parser, main
+from bayeshaptic.diagnosis.base import high_passed
 from bayeshaptic.diagnosis.base.alignment import LESS_DELAY, MOVED
 from bayeshaptic.faq import entries, entry
 
@@ -186,7 +187,7 @@ def test_every_warning_has_an_entry() -> None:
         if len(call.args) > 2 and isinstance(call.args[1], ast.Constant)
     }
     topics |= {"a person not yet seen", "device limit"}  # "No {part}: why" of a study
-    topics |= {LESS_DELAY, MOVED}
+    topics |= {LESS_DELAY, MOVED, high_passed.TOPIC}
     assert {"feedback", "units", "misfit", "not steady"} <= topics
     for topic in sorted(topics):
         assert topic in entry(topic).title.split(", ") and entry(topic).paragraphs

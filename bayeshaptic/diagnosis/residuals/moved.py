@@ -44,6 +44,19 @@ def slow_velocity(position: Floats, period_s: float) -> Floats:
     return np.gradient(low_pass(position, _edge_hz(period_s), period_s), period_s)
 
 
+def left_of_position(fit: Fit, recording: Recording) -> float:
+    """What neither the command nor coasting explains of the position, as a share of it (rms).
+
+    Parameters
+    ----------
+    fit : Fit
+    recording : Recording
+    """
+    besides = recording.position - commanded_motions(fit, recording)[0, 0]
+    coasted, _ = coasting(fit.model.system(fit.theta), besides, recording.period_s)
+    return float(np.std(besides - coasted) / np.std(recording.position))
+
+
 def moved_besides(fit: Fit, recording: Recording) -> float:
     """How fast a device that nobody holds moves beside what its command does, as a share of that.
 

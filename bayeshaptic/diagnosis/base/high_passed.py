@@ -1,0 +1,163 @@
+"""Whether the position may have been high-passed before it was written down.
+
+A drift is often taken off a position by a high-pass, in a logger or by hand.  One mass m under
+viscous damping b is then recorded as 1/((m s + b)(s + w)), which is a mass on an overdamped spring
+to the last digit, with a damping of b + m w: a hand, a second mass that hardly moves, or a spring
+takes up what the filter did, and the limit, which goes with the damping, is that of a device that
+nobody has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayeshaptic.diagnosis.residuals.moved import left_of_position
+from bayeshaptic.errors import Notice
+from bayeshaptic.inference.choose import Choice
+from bayeshaptic.inference.criterion import information_criterion
+from bayeshaptic.inference.fit import Fit
+from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.models import LinearSystem, LogNormal, Model, Parameter
+from bayeshaptic.quantities import quantity
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.stability.critical import critical_stiffness
+from bayeshaptic.types import Floats
+
+TOPIC = "high-passed position"
+_BASES = ("rigid", "free", "grasped")  # a longer chain has valleys enough without a filter
+_CORNER = "high_pass_hz"
+# Of the position, by rms: 33 high-passed ones leave 0.003 to 0.035 of themselves; held devices that
+# nobody filtered 0.14 to 0.6, of five that looked like one by their response (docs/door.md).
+_LITTLE, _HALF = 0.05, 0.5
+_SURELY = 10.0  # "very strong" evidence (R. E. Kass and A. E. Raftery, JASA 90, 1995)
+_ROUNDED = 1e-3  # of a power of ten, as a logarithm
+_LOG_SD = 1.5  # of the corner, around the lower end of the band: it only bounds the search
+
+
+@dataclass(frozen=True)
+class HighPass:
+    """A Butterworth high-pass on the recorded position, which the loop does without.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+        The corner.
+    order : int
+        1 or 2.
+    """
+
+    parameters: tuple[Parameter, ...]
+    order: int
+
+    name: ClassVar[str] = "high_pass"
+
+    @classmethod
+    def around(cls, corner_hz: float, order: int) -> HighPass:
+        """With a corner around `corner_hz`."""
+        corner = Parameter(_CORNER, "frequency", "corner", LogNormal(corner_hz, _LOG_SD))
+        return cls((corner,), order)
+
+    def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
+        """The system whose position is filtered; `values` holds the corner, shape (B,)."""
+        lag = 1 / (2 * np.pi * values[_CORNER])
+        none, one = np.zeros_like(lag), np.ones_like(lag)
+        if self.order == 1:
+            return system.with_filter(np.stack([none, lag]), np.stack([one, lag]))
+        poles = np.stack([one, np.sqrt(2) * lag, lag**2])
+        return system.with_filter(np.stack([none, none, lag**2]), poles)
+
+
+def perhaps_high_passed(fit: Fit, etfe: Etfe, choice: Choice | None) -> tuple[Notice, ...]:
+    """A warning where a device whose position was high-passed explains more.
+
+    A base model that is no larger than the fit's, with a high-pass on its position, leaves nothing
+    but noise and has a lower limit.  Its information criterion is far better than that of the same
+    model without; or the criterion is better, or half of the motion that the fit leaves is gone,
+    and it leaves next to nothing of the whole motion, which a hand would have moved slowly.  Whole
+    counts of an encoder were not filtered, but a file may have rounded what was.  How often that is
+    so: docs/door.md.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the model that is to be believed, with its effects.
+    etfe : Etfe
+        What it was fitted to.
+    choice : Choice or None
+        Where base models are found; None where a model was asked for.
+    """
+    recording = etfe.unbroken
+    if recording is None or etfe.direct or _are_counts(recording):
+        return ()
+    filtered = [
+        least_squares(model.with_effect(HighPass.around(etfe.band_hz[0], order)), etfe, most_sets=1)
+        for model in _no_larger(fit, choice)
+        for order in (1, 2)
+    ]
+    own = _limit(fit)
+    better = [
+        one
+        for one in filtered
+        if not one.misfits and _limit(one) < own and _explains_more(one, fit, recording)
+    ]
+    if not better:
+        return ()
+    found = min(better, key=_score)
+    corner_hz = found.theta[found.model.names.index(_CORNER)]
+    here, there = (quantity(k, fit.model.stiffness_unit) for k in (own, _limit(found)))
+    text = (
+        f"{found.model.name.capitalize()} explains the recording better than what was found does "
+        f"if the position was high-passed at {quantity(corner_hz, 'Hz')} before it was written "
+        f"down, by a logger, or to take a drift off it. The filter looks like damping, or like a "
+        f"hand; without it the limit would be {there}, for {here}."
+    )
+    return (Notice("warning", TOPIC, text),)
+
+
+def _explains_more(filtered: Fit, fit: Fit, recording: Recording) -> bool:
+    """Whether a filter beside the same device does, or one beside another that nobody holds."""
+    gain = _score(fit) - _score(filtered)
+    if filtered.model.name == fit.model.name and gain > _SURELY:
+        return True
+    left = left_of_position(filtered, recording)
+    return left < _LITTLE and (gain > 0 or left < _HALF * left_of_position(fit, recording))
+
+
+def _score(fit: Fit) -> float:
+    return information_criterion(fit, noise=1.0)
+
+
+def _are_counts(recording: Recording) -> bool:
+    """Whether positions are multiples of what no file rounds to: of no power of ten, m or rad."""
+    unit = increment_unit(recording.position)
+    if unit is None:
+        return False
+    powers = np.log10([unit, np.degrees(unit)])
+    return not np.any(np.abs(powers - np.round(powers)) < _ROUNDED)
+
+
+def _no_larger(fit: Fit, choice: Choice | None) -> list[Model]:
+    """Base models with the priors that they were fitted with, none larger than that of the fit."""
+    if choice is not None:
+        tried = [one.fit.model for name, one in choice.candidates.items() if name in _BASES]
+        return [model for model in tried if model.size <= fit.model.size]
+    asked = fit.model
+    for effect in asked.effects:
+        asked = asked.without_effect(effect)
+    return [asked] if asked.name in _BASES else []
+
+
+def _limit(fit: Fit) -> float:
+    """The limit of the device without what was done to the record alone."""
+    model, theta = fit.model, fit.theta
+    for effect in model.effects:
+        if isinstance(effect, HighPass):
+            theta = np.delete(theta, model.names.index(_CORNER))
+            model = model.without_effect(effect)
+    return float(critical_stiffness(model, theta).value)

@@ -1,0 +1,68 @@
+"""A position that was high-passed before it was written down: what the filter did is no damping."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from bayeshaptic.diagnosis.base.begun import begin
+from bayeshaptic.diagnosis.base.high_passed import TOPIC, perhaps_high_passed
+from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.options import Options
+from bayeshaptic.errors import Notice
+from bayeshaptic.recordings.from_arrays import recording_from_arrays
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report.headline import headline
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
+
+NOISE = WhiteNoise(0.05, 200.0, 0.7, 12.0)
+COUNT = 1.7e-6
+
+
+def recorded(
+    corner_hz: float = 0.0, order: int = 1, count: float = 0.0, held: bool = False
+) -> Recording:
+    """Of an encoder without counts, high-passed, in counts of the file."""
+    bench = Bench.from_device("phantom", held, encoder_resolution=1e-9)
+    made = simulate(bench, NOISE, seed=4)
+    position = made.position
+    if corner_hz:
+        filtering = butter(order, corner_hz, "high", fs=1 / bench.period_s, output="sos")
+        position = sosfilt(filtering, position - position[0])
+    position += 1e-7 * np.random.default_rng(5).standard_normal(len(position))
+    if count:
+        position = count * np.round(position / count)
+    signals = made.force, position, bench.period_s
+    return recording_from_arrays(*signals, force_unit="Nm", position_unit="rad")
+
+
+def asked(recording: Recording, held: bool | None = None) -> tuple[Notice, ...]:
+    begun = begin(recording, "auto", Options(held=held))
+    return perhaps_high_passed(begun.fit, begun.etfe, begun.choice)
+
+
+@pytest.mark.parametrize(("corner_hz", "order"), [(0.2, 1), (0.8, 1), (0.5, 2)])
+def test_a_filter_is_no_hand(corner_hz: float, order: int) -> None:
+    (notice,) = asked(recorded(corner_hz, order))
+    assert (notice.topic, notice.level) == (TOPIC, "warning")
+
+
+def test_no_stiffness_follows() -> None:
+    closed = close_loop(recorded(0.8), hidden=False)
+    said = headline(closed)
+    assert said.status == "untrusted" and "high-passed" in said.sentence
+    truth = Bench.from_device("phantom").true_critical_stiffness()
+    assert closed.analysis.limit.quantile(0.05) > 1.3 * truth  # what it is there to prevent
+
+
+def test_a_filter_beside_a_hand_is_seen_too() -> None:
+    assert asked(recorded(0.5, 2, held=True), held=True)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_what_was_not_filtered_is_not_doubted(held: bool) -> None:
+    assert not asked(recorded(held=held))
+
+
+def test_whole_counts_were_not_filtered_but_decimals_may_be() -> None:
+    assert not asked(recorded(0.8, count=COUNT))
+    assert asked(recorded(0.8, count=1e-6))
