@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -46,14 +47,21 @@ class Analysed:
 def names_of(entries: Sequence[StudyEntry]) -> list[str]:
     """What recordings are called: as their files, numbered where one name comes more than once.
 
-    Those that count together are called by the first and how many more there are.
+    Those that count together are called by the first and how many more there are.  No two have one
+    name, capitals aside: it is that of a folder, too.
 
     Parameters
     ----------
     entries : sequence of StudyEntry
     """
     names = [name_of_several(recording_name(one.path), len(one.more)) for one in entries]
-    return [
-        name if names.count(name) == 1 else f"{name}-{names[: index + 1].count(name)}"
-        for index, name in enumerate(names)
-    ]
+    plain = [name.casefold() for name in names]
+    taken = {name for name in plain if plain.count(name) == 1}
+    found = []
+    for name, key in zip(names, plain, strict=True):
+        if plain.count(key) > 1:
+            number = next(n for n in itertools.count(1) if f"{key}-{n}" not in taken)
+            name = f"{name}-{number}"
+            taken.add(name.casefold())
+        found.append(name)
+    return found

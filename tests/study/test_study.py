@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,9 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.models.prior_table import _FORMS
 from bayeshaptic.recordings import Recording, read_study
 from bayeshaptic.recordings.response.etfe import Etfe
+from bayeshaptic.recordings.study import StudyEntry
 from bayeshaptic.recordings.study_file import PRIOR_KEYS
+from bayeshaptic.study.analysed import names_of
 from bayeshaptic.study.analysis import analyse_study
 
 SIGNALS = np.random.default_rng(0).normal(size=(30, 2))
@@ -312,3 +315,16 @@ def test_hostile_toml(folder: Path, content: str) -> None:
     with pytest.raises(InputError, match=HOSTILE[content]) as caught:
         read_study(write(folder, content))
     assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize(
+    ("files", "names"),
+    [
+        (("a.csv", "b.csv"), ["a", "b"]),
+        (("x/a.csv", "y/a.csv"), ["a-1", "a-2"]),
+        (("x/a.csv", "y/a.csv", "a-1.csv"), ["a-2", "a-3", "a-1"]),
+        (("A.csv", "a.csv"), ["A-1", "a-2"]),  # one folder where capitals do not count
+    ],
+)
+def test_no_two_recordings_have_one_name(files: Sequence[str], names: list[str]) -> None:
+    assert names_of([StudyEntry(Path(file)) for file in files]) == names

@@ -83,6 +83,10 @@ def test_the_page_names_everybody_and_what_failed(whole: Path) -> None:
     for name in (*NAMES[:3], "free-0", "free-1", "a person not yet seen", "nobody holds it"):
         assert name in text
     assert "bad-0 failed." in text and "row 3 is 'oops'" in text
+    # What was recorded of somebody, and could not be used, says nothing of them.
+    assert "Recordings 6, 5 of them used Held by anna, ben, carla Configurations" in text
+    # Guidance is of one case, and the page is of several.
+    assert "of one case, the one that sets the limit most often: " in text
     assert "Triangles: limits known from elsewhere" in text
     for title in ("The limit of the device", "People", "Configurations", "Which walls are stable",
                   "The population of hands", "What all of this assumes"):  # fmt: skip

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 FIGURES = ("guidance_shares", "guidance_sweeps")
 
 
-def guidance_section(case: Case, analysis: Analysis | None = None) -> Section | None:
+def guidance_section(
+    case: Case, analysis: Analysis | None = None, of_several: str = ""
+) -> Section | None:
     """HTML and pictures of the guidance for one case.
 
     Parameters
@@ -29,6 +31,8 @@ def guidance_section(case: Case, analysis: Analysis | None = None) -> Section | 
         One recording, or the case that sets the limit of a device.
     analysis : Analysis, optional
         The recording's: for what to measure next.
+    of_several : str
+        What the case is called where it is one of several; nothing is said of the others.
 
     Returns
     -------
@@ -55,6 +59,7 @@ def guidance_section(case: Case, analysis: Analysis | None = None) -> Section | 
         "guidance.jinja",
         figures,
         words=words(found, experiments),
+        of_several=of_several,
         experiments=experiment_rows(found.shares, experiments),
     )
 

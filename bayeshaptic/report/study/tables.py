@@ -18,6 +18,7 @@ from bayeshaptic.stability.tail import ENOUGH_BELOW
 
 if TYPE_CHECKING:
     from bayeshaptic.inference.population.population import Population
+    from bayeshaptic.recordings.study import StudyEntry
     from bayeshaptic.stability.cases import DeviceLimit
     from bayeshaptic.stability.critical import CriticalStiffness
     from bayeshaptic.study.analysed import Analysed
@@ -29,13 +30,18 @@ _MOST_CASES = 8
 
 
 def device(study: StudyAnalysis) -> Rows:
-    """What the device is and what was recorded of it: (what, value)."""
+    """What the device is and what is known from recordings of it: (what, value).
+
+    Of a recording that could not be used nothing is known, neither of its user nor its place.
+    """
     found = study.device
-    users, places = study.study.users, _places(study)
+    used = [one.entry for one in study.recordings if one.result is not None]
+    count, places = len(study.recordings), _places(used)
+    users = dict.fromkeys(entry.user for entry in used if entry.user is not None)
     rows = [
         ("Device", f"{found.name} ({found.kind})"),
         ("Study", study.study.path.name),
-        ("Recordings", str(len(study.recordings))),
+        ("Recordings", f"{count}" + (f", {len(used)} of them used" if len(used) < count else "")),
         ("Held by", ", ".join(users) or "nobody"),
         ("Configurations", ", ".join(places) or "one, not named"),
     ]
@@ -48,8 +54,8 @@ def device(study: StudyAnalysis) -> Rows:
     return tuple(rows)
 
 
-def _places(study: StudyAnalysis) -> list[str]:
-    places = {one.entry.configuration for one in study.recordings} - {None}
+def _places(entries: Sequence[StudyEntry]) -> list[str]:
+    places = {entry.configuration for entry in entries} - {None}
     return [str(place) for place in sorted(places, key=lambda p: (isinstance(p, str), p))]
 
 

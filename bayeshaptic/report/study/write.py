@@ -99,7 +99,8 @@ def _sections(study: StudyAnalysis, folder: Path) -> list[Section]:
     walls = limits_section(table, resolution=study.device.encoder_resolution)
     first = study.limit.binding[0].case
     case = next(case for case in study.cases if case.label == first)
-    advice = guidance_section(case, _analysis_of(case, study))
+    alone = len(study.cases) == 1
+    advice = guidance_section(case, _analysis_of(case, study), "" if alone else case.label)
     return [walls] if advice is None else [walls, advice]
 
 
