@@ -116,6 +116,39 @@ def by_one_alone(folder: Path) -> Iterator[None]:
         os.close(place)
 
 
+@contextmanager
+def locked_file(path: Path) -> Iterator[bool]:
+    """A block with a file that is locked, and goes with it; false where another has the lock.
+
+    The system ends the lock with its process, and the file that one left that died is taken over.
+    Where it has no locks (Windows, some network drives), everybody has one.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield True
+        return
+    while True:
+        place = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(place, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(place)
+            yield False
+            return
+        except OSError:
+            break
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(place), os.stat(path)):
+                break
+        os.close(place)  # who had the lock has removed the file since
+    try:
+        yield True
+    finally:
+        path.unlink(missing_ok=True)
+        os.close(place)
+
+
 def flush(path: Path) -> None:
     """See to it that the content of a file is on the disk."""
     with path.open("rb+") as file:

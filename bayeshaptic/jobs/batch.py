@@ -33,7 +33,7 @@ from bayeshaptic.jobs.manifest import (
 )
 from bayeshaptic.jobs.sources import find_sources
 from bayeshaptic.recordings.from_columns import recording_name
-from bayeshaptic.report.draft import refuse_to_replace
+from bayeshaptic.report.draft import for_one_run, refuse_to_replace
 from bayeshaptic.types import Executor, Progress
 
 if TYPE_CHECKING:
@@ -159,7 +159,8 @@ def run_batch(
     Raises
     ------
     InputError
-        Where there is nothing to do, or no place to write, or a recording would be written over.
+        Where there is nothing to do, or no place to write, or a recording would be written over, or
+        where another run writes there.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # A worker that this very call is starting: it must end, and nobody catches anything there.
@@ -172,27 +173,27 @@ def run_batch(
     settings = settings or Settings()
     work = jobs([Path(source).absolute() for source in sources], folder, settings, command)
     refuse_to_replace(folder, (*INDEX_FILES, MANIFEST), [job.source for job in work])
-    folder.mkdir(parents=True, exist_ok=True)
-    for place in (folder, *(job.folder for job in work)):
-        remove_dead_drafts(place)
-    batch = _Batch(folder, settings, command, tell, {str(job.source): job for job in work})
-    old = read_manifest(folder) if resume else {}
-    todo = [job for job in work if not batch.is_done(old.get(str(job.source)), job)]
-    execute = _executor(executor)
-    again: list[Job] = []
-    try:
-        batch.write()  # for whoever asks how far it is
-        for outcome in execute(report_timed, todo) if todo else ():
-            if outcome.error is None or outcome.refused:
-                batch.end(outcome)
-            else:
-                again.append(outcome.item)
-        for job in again:
-            for outcome in execute(report_timed, [job]):
-                batch.end(outcome)
-    finally:
-        batch.write()
-    return tuple(batch.entries.values())
+    with for_one_run(folder):
+        for place in (folder, *(job.folder for job in work)):
+            remove_dead_drafts(place)
+        batch = _Batch(folder, settings, command, tell, {str(job.source): job for job in work})
+        old = read_manifest(folder) if resume else {}
+        todo = [job for job in work if not batch.is_done(old.get(str(job.source)), job)]
+        execute = _executor(executor)
+        again: list[Job] = []
+        try:
+            batch.write()  # for whoever asks how far it is
+            for outcome in execute(report_timed, todo) if todo else ():
+                if outcome.error is None or outcome.refused:
+                    batch.end(outcome)
+                else:
+                    again.append(outcome.item)
+            for job in again:
+                for outcome in execute(report_timed, [job]):
+                    batch.end(outcome)
+        finally:
+            batch.write()
+        return tuple(batch.entries.values())
 
 
 def report_timed(job: Job) -> tuple[tuple[Reported, ...], float]:

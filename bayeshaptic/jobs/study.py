@@ -19,7 +19,7 @@ from bayeshaptic.jobs.recording import reported
 from bayeshaptic.provenance import provenance
 from bayeshaptic.recordings.study import Study
 from bayeshaptic.recordings.study_file import read_study
-from bayeshaptic.report.draft import refuse_to_replace
+from bayeshaptic.report.draft import for_one_run, refuse_to_replace
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.write import NAMES, write_study_report
@@ -66,9 +66,10 @@ def report_study(job: Job, progress: Progress | None, workers: int = 1) -> tuple
                 pages[number] = Reported(names[number], error=outcome.error)
                 yield outcome
 
-    analysed = _analysed(study, job, progress, executor)
-    done = tuple(pages[number] for number in sorted(pages))
-    return (*done, *_device(analysed, job.folder, done, progress))
+    with for_one_run(job.folder):
+        analysed = _analysed(study, job, progress, executor)
+        done = tuple(pages[number] for number in sorted(pages))
+        return (*done, *_device(analysed, job.folder, done, progress))
 
 
 def report_population(
@@ -105,9 +106,10 @@ def report_population(
         names = [Path(folder).name for folder in folders_of(tasks, job.folder)]
         yield from _executor(progress, names, workers)(analyse, tasks)
 
-    analysed = _analysed(study, job, progress, executor)
-    failed = tuple(Reported(one.name, error=one.error) for one in analysed.failed)
-    return (*failed, *_device(analysed, job.folder, None, progress))
+    with for_one_run(job.folder):
+        analysed = _analysed(study, job, progress, executor)
+        failed = tuple(Reported(one.name, error=one.error) for one in analysed.failed)
+        return (*failed, *_device(analysed, job.folder, None, progress))
 
 
 def analyse_and_report(

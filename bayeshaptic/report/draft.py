@@ -14,6 +14,7 @@ from bayeshaptic.files import (
     flush,
     is_of_a_report,
     known_as,
+    locked_file,
     owner,
     remove_dead_drafts,
     resolved,
@@ -33,6 +34,39 @@ def draft_in(folder: Path) -> Iterator[Path]:
         yield draft
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def for_one_run(folder: Path) -> Iterator[None]:
+    """A block that fills `folder` with several reports, and that no other process enters for it.
+
+    What two of them write would be a mixture of both: a study's page with links to the recordings
+    of another.  The folder is made, and goes again where nothing came of it.  The system ends the
+    lock with its process; where it has none (Windows, some network drives), nobody is refused.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    InputError
+        Where another process is in such a block.
+    """
+    new = [path for path in (folder, *folder.absolute().parents) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with locked_file(folder / ".in-use") as alone:
+            if not alone:
+                raise InputError(
+                    f"{folder}: another run of bayeshaptic is writing there; wait until it has "
+                    "ended, or name another folder with -o"
+                )
+            yield
+    finally:
+        with suppress(OSError):  # not empty
+            for path in new:
+                path.rmdir()
 
 
 def refuse_to_replace(folder: Path, names: Iterable[str], sources: Iterable[str | Path]) -> None:

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,10 @@ import pytest
 from bayeshaptic import cli
 from bayeshaptic.errors import InputError
 from bayeshaptic.files import remove_dead_drafts, write_whole
-from bayeshaptic.report.draft import draft_in, move_all, report_in
+from bayeshaptic.jobs.batch import run_batch
+from bayeshaptic.jobs.job import Job, Settings
+from bayeshaptic.jobs.study import report_population, report_study
+from bayeshaptic.report.draft import draft_in, for_one_run, move_all, report_in
 
 
 def test_a_draft_is_moved_or_leaves_nothing(tmp_path: Path) -> None:
@@ -63,6 +67,46 @@ def test_two_reports_in_one_folder_are_one_of_them(
         list(both.map(report, "12"))
     found = {path.name: path.read_text() for path in out.iterdir()}
     assert found in [dict.fromkeys((*own, "last"), who) for who, own in files.items()]
+
+
+CLAIM = """
+import os, sys
+from pathlib import Path
+from bayeshaptic.report.draft import for_one_run
+with for_one_run(Path(sys.argv[1])):
+    print("in", flush=True)
+    sys.stdin.read()
+    os.kill(os.getpid(), 9)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no lock of a file")
+def test_two_studies_are_not_written_into_one_folder(tmp_path: Path) -> None:
+    """Nor two batches; who died is in nobody's way."""
+    out, study, batch = tmp_path / "new" / "out", tmp_path / "study.toml", tmp_path / "a.csv"
+    (tmp_path / "free.csv").write_text("no recording")
+    batch.write_text("no recording")
+    study.write_text('[device]\nname = "lhifam"\n[[recording]]\nfile = "free.csv"\n')
+    command = [sys.executable, "-c", CLAIM, str(out)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None and other.stdout.readline()
+        job = Job(study, out, Settings())
+        for run in (
+            partial(report_study, job, None),
+            partial(report_population, job, None),
+            partial(run_batch, [batch], out),
+        ):
+            with pytest.raises(InputError, match="out: another run of bayeshaptic is writing"):
+                run()
+        assert os.listdir(out) == [".in-use"]
+        other.communicate(b"")
+    assert os.listdir(out) == [".in-use"]  # it could not tidy up
+    with for_one_run(out), pytest.raises(InputError, match="another run"), for_one_run(out):
+        pass
+    assert os.listdir(out) == []
+    shutil.rmtree(tmp_path / "new")
+    assert [one.page for one in report_study(job, None)] == [None]  # nothing could be used
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.stability.cases import CONFIGURATION, FREE
+from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD
 from bayeshaptic.study.recorded_cases import place_of
 
 if TYPE_CHECKING:
@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 def is_free(label: str, group: str) -> bool:
     """Whether nobody holds the device in a case, recorded or predicted along a coordinate."""
     return group == FREE or (group == CONFIGURATION and label.endswith("nobody holds it"))
+
+
+def held_cases(study: StudyAnalysis) -> tuple[Case, ...]:
+    """Of everybody who was recorded: those in the population, then those who are not."""
+    apart = [case for case in study.cases if case.group == HELD and case not in study.users]
+    return (*study.users, *apart)
 
 
 def has_draws(case: Case) -> bool:

@@ -91,6 +91,6 @@ def _people_caption(study: StudyAnalysis) -> str:
     if any(reference.held for reference in study.study.references):
         text += " Triangles: limits known from elsewhere, which took no part in the analysis."
     return (
-        f"{text} Below: everybody who was recorded, by their own recording alone and together with "
-        "what all people say; bars are 90 % intervals."
+        f"{text} Below: everybody of the population, by their own recording alone and together "
+        "with what all people say; bars are 90 % intervals."
     )

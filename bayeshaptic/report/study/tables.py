@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.quantities import Rounded, interval, percent, pure, quantity, rounded_down, scale
-from bayeshaptic.report.numbers.cases import has_draws, raw_limits
+from bayeshaptic.report.numbers.cases import has_draws, held_cases, raw_limits
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel
 from bayeshaptic.report.numbers.hidden import amount
 from bayeshaptic.report.numbers.rows import Rows
@@ -175,13 +175,18 @@ def unshown_cases(study: StudyAnalysis) -> int:
 
 
 def users(study: StudyAnalysis) -> Rows:
-    """Every user: (user, own recording alone in dB, given all people in dB, sd of each)."""
+    """Every user: (user, own recording alone in dB, given all people in dB, sd of each).
+
+    Of one who is not in the population, others say nothing.
+    """
     alone = raw_limits(study)
     rows = []
-    for case in study.users:
-        own = alone.get(case.label, ())
-        given: tuple[str, ...] = ("too few draws to say", _DASH, _DASH, _DASH)
-        if has_draws(case):
+    for case in held_cases(study):
+        inside = case in study.users
+        own = alone.get(case.label, ()) if inside else (case.limit,)
+        why = "too few draws to say" if inside else "not in the population"
+        given: tuple[str, ...] = (why, _DASH, _DASH, _DASH)
+        if inside and has_draws(case):
             given = (
                 *(f"{decibel(case.limit.quantile(p)):.2f}" for p in (0.5, 0.05, 0.95)),
                 pure(spread_db(case), 2),

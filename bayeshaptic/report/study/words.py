@@ -10,7 +10,7 @@ import numpy as np
 from bayeshaptic.quantities import estimate, percent, pure, rounded_down
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.bands import band_of
-from bayeshaptic.report.numbers.cases import is_free
+from bayeshaptic.report.numbers.cases import held_cases, is_free
 from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.report.numbers.hidden import amount
 
@@ -117,7 +117,7 @@ def _elsewhere(study: StudyAnalysis) -> str:
 def _between(study: StudyAnalysis) -> str:
     """The lowest and the highest of the people that were seen in one configuration."""
     place = _place(study.new_person[0])
-    seen = [case for case in study.users if _place(case) == place]
+    seen = [case for case in held_cases(study) if _place(case) == place]
     if len(seen) < 2:
         return ""
     order = sorted(seen, key=lambda case: case.limit.quantile(0.5))
