@@ -8,7 +8,6 @@ import numpy as np
 
 from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.feedback import Feedback, doubts, has_feedback, how_computed
-from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.added_noise import command_innovations
 from bayeshaptic.recordings.signals.causality.causality import causality
@@ -62,7 +61,7 @@ def through_reference(
     if np.ptp(found) == 0:
         return alone, (*notices, unusable(f"{what} never moves the command"))
     tried = replace(recording, reference=found)
-    judged = causality(replace(unbroken(tried), force=found))
+    judged = causality(replace(tried, force=found))
     if what in (_COLUMN, _DECLARED) and judged.has_feedback:
         why = f"{what} answers to the motion itself ({judged.evidence})"
         return alone, (*notices, unusable(f"{why}: check its gains, its filter and its sign"))

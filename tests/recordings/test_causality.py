@@ -20,6 +20,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.check import check_recording
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
+from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.read import read_recording
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import (
@@ -122,6 +123,29 @@ def test_virtual_walls_and_servos_are_feedback(case: str) -> None:
         found = judge(force, position)
         assert found.has_feedback
         assert not found.swapped
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_pieces_are_not_foretold_by_the_pieces_before(case: str) -> None:
+    """Across their joints a fifth of open loops was feedback, and loops were none."""
+    rng = np.random.default_rng(11)
+    scale, critical = SCALE[case.split()[0]], CRITICAL[case]
+    count, each = 6, 1500
+    excitation = scale["rms"] * band_noise(rng, (4 * count, each), 300.0)
+    share = np.repeat([0.0, 0.0, 0.1, 0.3], count)
+
+    def control(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        return wanted - critical * share * position[:, k]
+
+    made = record(case, excitation, rng, control=control)
+    ways = [signal.reshape(4, count, each) for signal in made]
+    for number, (force, position) in enumerate(zip(*ways, strict=True)):
+        pieces = [
+            recording_from_arrays(*one, period_s=PERIOD)
+            for one in zip(force, position, strict=True)
+        ]
+        found = causality(join_recordings(pieces))
+        assert found.doubt == (0 if number < 2 else 2)
 
 
 def test_a_position_that_was_smoothed_with_later_samples_is_named_beside_feedback() -> None:

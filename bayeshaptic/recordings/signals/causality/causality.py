@@ -217,13 +217,13 @@ def causality(recording: Recording) -> Causality:
     -------
     Causality
     """
-    signals = _known_then(recording)
-    first = _causality(*signals, stretches=10)
+    signals, joints = _known_then(recording), recording.joints
+    first = _causality(*signals, stretches=10, joints=joints)
     if not first.doubt:
         return first
     again = None
     if is_sweep(recording.force):
-        again = _causality(*signals, stretches=40)
+        again = _causality(*signals, stretches=40, joints=joints)
     elif (found := find_repetition(recording.force)) is not None and found.noisy:
         rest = [_unrepeated(signal, found) for signal in signals]
         again = _causality(rest[0], rest[1], stretches=10)
@@ -232,7 +232,7 @@ def causality(recording: Recording) -> Causality:
         return again
     if first.relay or not first.has_feedback:
         return first
-    beside = _causality(*signals, stretches=10, remembered=True)
+    beside = _causality(*signals, stretches=10, remembered=True, joints=joints)
     return replace(first, far_past=not beside.has_feedback)
 
 
@@ -243,18 +243,24 @@ def _unrepeated(signal: Floats, found: Repetition) -> Floats:
 
 
 def _causality(
-    force: Floats, position: Floats, stretches: int, remembered: bool = False
+    force: Floats,
+    position: Floats,
+    stretches: int,
+    remembered: bool = False,
+    joints: tuple[int, ...] = (),
 ) -> Causality:
     most_samples = 60_000
     start = max(0, (len(force) - most_samples) // 2)
-    force, position = (signal[start : start + most_samples] for signal in (force, position))
+    stop = min(len(force), start + most_samples)
+    joints = tuple(joint - start for joint in joints if start < joint < stop)
+    force, position = (signal[start:stop] for signal in (force, position))
     at_limits = _at_limits(force)
     saturates = float(np.mean(at_limits))
     repeats = find_repetition(force, _SAME, noise=0.0) is not None
     relay = is_relay(force, position) or (not repeats and is_switched(force, position))
     left_out = at_limits if 0 < saturates < _MOST_AT_LIMIT else None
-    of_force = predict(force, position, left_out, stretches, remembered)
-    of_position = predict(position, force, stretches=stretches)
+    of_force = predict(force, position, left_out, stretches, remembered, joints)
+    of_position = predict(position, force, stretches=stretches, joints=joints)
     return Causality(
         feedback=tuple(of_force.past(floor) for _, _, floor in _LADDER),
         innovations=innovations_answer(of_force, of_position) if saturates < _MOST_AT_LIMIT else 0,

@@ -43,9 +43,10 @@ def innovations_answer(of_force: Prediction, of_position: Prediction) -> float:
     if not (usual and _FAINTEST < _power(of_force.own) < _STRONGEST and _is_white(force)):
         return 0.0
     force, position = force - force.mean(), position - position.mean()
-    # Row k of the force among those of the position.
-    at = np.searchsorted(of_position.rows, of_force.rows)
+    # Row k of the force among those of the position, and none whose past is of another piece.
+    rows, at = of_position.rows, np.searchsorted(of_position.rows, of_force.rows)
     inside = at >= _LAST
+    inside[inside] = rows[at[inside]] - rows[at[inside] - _LAST] == _LAST
     force, at = force[inside], at[inside]
     summed = np.concatenate([[0.0], np.cumsum(position)])
     found = [_z(force * (summed[at - low + 1] - summed[at - high + 1])) for low, high in _SPANS]

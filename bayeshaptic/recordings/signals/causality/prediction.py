@@ -8,6 +8,7 @@ more than that (iteratively reweighted least squares; P. J. Huber, *Robust Stati
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,6 +131,7 @@ def predict(
     left_out: Bools | None = None,
     stretches: int = 10,
     remembered: bool = False,
+    joints: tuple[int, ...] = (),
 ) -> Prediction:
     """Predict each increment of `target` from the past of both signals.
 
@@ -143,12 +145,14 @@ def predict(
         Coefficients are from every second of so many.
     remembered : bool
         Whether the target's far past may predict it, too: sums that forget it slowly.
+    joints : tuple of int
+        Where pieces begin that were recorded by themselves: none is predicted from another's past.
 
     Returns
     -------
     Prediction
     """
-    rows, columns, own = _regressors(target, other, left_out, remembered)
+    rows, columns, own = _regressors(target, other, left_out, remembered, joints)
     wanted = _scaled(target[rows] - target[rows - 1])
     beside = np.stack([other[rows + lead] - other[rows - 1] for lead in _LEADS], axis=1)
     beside = (beside - beside.mean(axis=0)) / max(float(beside[:, -1].std()), _TINY)
@@ -173,21 +177,33 @@ def predict(
 
 
 def _regressors(
-    target: Floats, other: Floats, left_out: Bools | None, remembered: bool
+    target: Floats,
+    other: Floats,
+    left_out: Bools | None,
+    remembered: bool,
+    joints: tuple[int, ...],
 ) -> tuple[np.ndarray, Floats, int]:
     """Rows to predict, the columns that may predict them, and how many are of the target itself."""
-    samples = len(target)
     lags_of_itself = 60
-    lags = max(4, min(lags_of_itself, samples // 40))
-    spans = [span for span in _SPANS if span <= max(2, samples // 40)]
-    rows = np.arange(max(lags, spans[-1]) + 2, samples - _LEADS[-1])
+    edges = (0, *joints, len(target))
+    pieces = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    longest = max(piece.stop - piece.start for piece in pieces)
+    most = min(len(target) // 40, longest // 4)
+    lags = max(4, min(lags_of_itself, most))
+    spans = [span for span in _SPANS if span <= max(2, most)]
+    first = max(lags, spans[-1]) + 2
+    rows = np.concatenate([np.arange(p.start + first, p.stop - _LEADS[-1]) for p in pieces])
     if left_out is not None:
         rows = rows[~left_out[rows]]
     steps, before = np.diff(target), rows - 1
-    summed = np.cumsum(other - other.mean())
+    if joints:  # where a piece is, and what its integral began with, is its own
+        target, other = (_centred(signal, pieces) for signal in (target, other))
+    summed = np.concatenate([np.cumsum(other[p] - other[p].mean()) for p in pieces])
+    if joints:
+        summed = _centred(summed, pieces)
     own = [np.linspace(-1, 1, len(rows)), target[before]]
     own += [steps[before - lag] for lag in range(1, lags + 1)]
-    own += [memory[before] for memory in _memories(target)] if remembered else []
+    own += [memory[before] for memory in _memories(target, pieces)] if remembered else []
     theirs = [other[before], summed[before]]
     theirs += [other[before] - other[before - span] for span in spans]
     columns = np.column_stack([_scaled(column) for column in (*own, *theirs)])
@@ -195,13 +211,21 @@ def _regressors(
     return rows, columns, len(own) + 1
 
 
-def _memories(signal: Floats) -> list[Floats]:
-    """What a signal was long ago: sums that forget it more and more slowly."""
+def _centred(signal: Floats, pieces: Sequence[slice]) -> Floats:
+    """Each piece without its mean."""
+    return np.concatenate([signal[piece] - signal[piece].mean() for piece in pieces])
+
+
+def _memories(signal: Floats, pieces: Sequence[slice]) -> list[Floats]:
+    """What a signal was long ago in its piece: sums that forget it more and more slowly."""
     from scipy.signal import lfilter
 
     centred = signal - signal.mean()
     kept = [np.exp(-1 / samples) for samples in _MEMORIES if samples <= len(signal) / 20]
-    return [np.asarray(lfilter([1.0], [1.0, -keep], centred)) for keep in kept]
+    return [
+        np.concatenate([lfilter([1.0], [1.0, -keep], centred[piece]) for piece in pieces])
+        for keep in kept
+    ]
 
 
 def _scaled(signal: Floats) -> Floats:
