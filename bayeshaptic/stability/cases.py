@@ -39,6 +39,10 @@ class Case(Shown):
     joint : str or None
         Cases with the same word here are drawn together: their draws of one number belong to one
         another, as those of several configurations of one device.
+    user : str or None
+        Who was recorded; None for nobody, and for a person not yet seen.
+    configuration : float, str or None
+        In which; None without any, and where it was predicted.
     """
 
     label: str
@@ -47,6 +51,8 @@ class Case(Shown):
     draws: Floats = field(repr=False)
     limit: CriticalStiffness = field(repr=False)
     joint: str | None = None
+    user: str | None = None
+    configuration: float | str | None = None
 
     def __post_init__(self) -> None:
         instance("model", self.model, Model, "a Model (see bayeshaptic.grasped)")

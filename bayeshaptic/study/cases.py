@@ -217,23 +217,25 @@ def _new_person(population: Population, like: Sequence[Analysed], seed: int) -> 
         limit = critical_stiffness(population.model, draws)
         limit = wider.apply(replace(limit, chains=population.walkers), rng)
         label = "a new person" + place_of(place)
-        cases.append(Case(label, NEW_PERSON, population.model, draws, limit))
+        cases.append(Case(label, NEW_PERSON, population.model, draws, limit, configuration=place))
     return tuple(cases)
 
 
 def _users(population: Population, like: Sequence[Analysed], seed: int) -> tuple[Case, ...]:
     """Every user's limit given all recordings, one case a configuration."""
-    found: dict[str, list[int]] = {}
+    found: dict[tuple[str | None, float | str | None], list[int]] = {}
     for number, one in enumerate(like):
-        label = f"user {one.entry.user}" + place_of(one.entry.configuration)
-        found.setdefault(label, []).append(number)
+        found.setdefault((one.entry.user, one.entry.configuration), []).append(number)
     cases = []
-    for label, own in found.items():
+    for (user, place), own in found.items():
         rng = np.random.default_rng(np.random.SeedSequence([seed, own[0], 2]))
         draws = np.concatenate([population.recordings[number].draws for number in own])
         wider = widening([like[number] for number in own])
         limit = wider.apply(critical_stiffness(population.model, draws), rng)
-        cases.append(Case(label, HELD, population.model, draws, limit))
+        label = f"user {user}" + place_of(place)
+        cases.append(
+            Case(label, HELD, population.model, draws, limit, user=user, configuration=place)
+        )
     return tuple(cases)
 
 

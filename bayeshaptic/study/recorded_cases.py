@@ -178,37 +178,45 @@ def recorded(some: Sequence[Analysed], group: str, beside: Sequence[Case] = ()) 
     No two have one label, nor one of those `beside` them: a user's recordings may be in the
     population but for one.
     """
-    found: dict[tuple[str, ...], list[Analysed]] = {}
+    found: dict[tuple[object, ...], list[Analysed]] = {}
     for one in some:
-        who = "nobody holds it" if group == FREE else f"user {one.entry.user}"
-        label = who + place_of(one.entry.configuration)
-        found.setdefault((label, *signature(one)), []).append(one)
-    labels = [*(key[0] for key in found), *(case.label for case in beside)]
+        entry = one.entry
+        found.setdefault((entry.user, entry.configuration, *signature(one)), []).append(one)
+    own = [_label(trials[0], group) for trials in found.values()]
+    labels = [*own, *(case.label for case in beside)]
     return tuple(
         _pooled(
-            key[0]
-            if labels.count(key[0]) == 1
-            else f"{key[0]} ({name_of_several(trials[0].name, len(trials) - 1)})",
+            label
+            if labels.count(label) == 1
+            else f"{label} ({name_of_several(trials[0].name, len(trials) - 1)})",
             group,
-            [one.analysis for one in trials if one.analysis is not None],
+            trials,
         )
-        for key, trials in found.items()
+        for label, trials in zip(own, found.values(), strict=True)
     )
 
 
-def _pooled(label: str, group: str, analyses: Sequence[Analysis]) -> Case:
+def _label(one: Analysed, group: str) -> str:
+    who = "nobody holds it" if group == FREE else f"user {one.entry.user}"
+    return who + place_of(one.entry.configuration)
+
+
+def _pooled(label: str, group: str, trials: Sequence[Analysed]) -> Case:
     """All trials of one case, as many draws of each."""
+    analyses = [one.analysis for one in trials if one.analysis is not None]
+    user, configuration = trials[0].entry.user, trials[0].entry.configuration
     model = analyses[0].model
     draws = [_in_order(one) for one in analyses]
     if len(analyses) == 1:
-        return Case(label, group, model, draws[0], analyses[0].limit)
+        joined, limit = draws[0], analyses[0].limit
+        return Case(label, group, model, joined, limit, user=user, configuration=configuration)
     count = min(len(one) for one in draws)
     picks = [np.linspace(0, len(one) - 1, count).astype(int) for one in draws]
     joined = np.concatenate([one[pick] for one, pick in zip(draws, picks, strict=True)])
     samples = [a.limit.samples[pick] for a, pick in zip(analyses, picks, strict=True)]
     # Samples are kept as they are: a closed loop may have widened them.
     limit = replace(critical_stiffness(model, joined), samples=np.concatenate(samples))
-    return Case(label, group, model, joined, limit)
+    return Case(label, group, model, joined, limit, user=user, configuration=configuration)
 
 
 def _in_order(analysis: Analysis) -> Floats:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 from fake_study import fake_study
 
+from bayeshaptic.recordings.study import StudyEntry
+from bayeshaptic.report.study.population_json import population_summary
+from bayeshaptic.report.study.tables import users
 from bayeshaptic.report.study.words import people
 
 
@@ -21,3 +26,32 @@ def test_people_hardly_move_the_limit_only_where_rare_ones_do_not_either() -> No
     words = " ".join(people(replace(alike, new_person=(replace(case, limit=limit),))))
     assert "People hardly move" in words and "does not matter" not in words
     assert "That does not hold of everybody: of one person in a thousand it is below" in words
+
+
+def test_people_are_known_by_their_names_and_not_by_how_labels_begin() -> None:
+    """Of Ana's limit that of "ana (left)" was a part; who is not in the population was no one."""
+    three = fake_study(people=3)
+    names = ("ana", "ana (left)", "ana, b")
+    apart = replace(three.users[2], user=names[2], label=f"user {names[2]}")
+    inside = tuple(
+        replace(case, user=name, label=f"user {name}")
+        for case, name in zip(three.users[:2], names, strict=False)
+    )
+    entries = tuple(StudyEntry(Path(f"{name}.csv"), name) for name in names)
+    named = replace(
+        three,
+        users=inside,
+        cases=(*inside, apart),
+        study=replace(three.study, entries=entries),
+        recordings=tuple(
+            replace(one, entry=entry)
+            for one, entry in zip(three.recordings[-3:], entries, strict=True)
+        ),
+    )
+    found = {one["user"]: one["critical_stiffness"] for one in population_summary(named)["users"]}
+    for case, name in zip(named.cases, names, strict=True):
+        assert found[name]["q50"] == pytest.approx(case.limit.quantile(0.5), rel=1e-3)
+    rows = {row[0]: row[1:] for row in users(named)}
+    assert list(rows) == list(names) and rows["ana, b"][1] == "not in the population"
+    lowest = min(named.cases, key=lambda case: case.limit.quantile(0.5)).user
+    assert f"{lowest} has the lowest limit" in " ".join(people(named))

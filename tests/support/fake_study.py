@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -57,7 +58,8 @@ def fake_study(
         entry = StudyEntry(Path(f"free-{number}.csv"), configuration=place)
         recordings.append(Analysed(f"free-{number}", entry, one))
         where = "" if place is None else f", configuration {place:g}"
-        cases.append(_case(f"nobody holds it{where}", FREE, one.model, one.posterior.draws))
+        case = _case(f"nobody holds it{where}", FREE, one.model, one.posterior.draws)
+        cases.append(replace(case, configuration=place))
     for number in range(people):
         one = fake_analysis("grasped", device, spread=0.01, seed=seed + 50 + number)
         own = _hand(one.model, one.posterior.draws, spread, rng)
@@ -65,7 +67,8 @@ def fake_study(
         place = places[0] if places else None
         entry = StudyEntry(Path(f"{number}.csv"), NAMES[number], configuration=place)
         recordings.append(Analysed(NAMES[number], entry, one))
-        users.append(_case(f"user {NAMES[number]}", HELD, one.model, own[: DRAWS // 2]))
+        case = _case(f"user {NAMES[number]}", HELD, one.model, own[: DRAWS // 2])
+        users.append(replace(case, user=NAMES[number], configuration=place))
     for number in range(failed):
         entry = StudyEntry(Path(f"bad-{number}.csv"), NAMES[-1])
         recordings.append(Analysed(f"bad-{number}", entry, None, "bad.csv: row 3 is 'oops'"))
@@ -74,9 +77,8 @@ def fake_study(
         model = users[0].model
         population = _population(model, people, spread, rng)
         typical = np.tile(users[0].draws[0], (DRAWS, 1))
-        new = (
-            _case("a person not yet seen", NEW_PERSON, model, _each(model, typical, spread, rng)),
-        )
+        case = _case("a person not yet seen", NEW_PERSON, model, _each(model, typical, spread, rng))
+        new = (replace(case, configuration=places[0] if places else None),)
     if len(places) > 1:
         bands = tuple(_configurations(held, places, device) for held in (False, True))
         cases += [case for band in bands for case in band.cases]

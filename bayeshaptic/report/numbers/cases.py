@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD
-from bayeshaptic.study.recorded_cases import place_of
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
@@ -46,5 +45,5 @@ def raw_limits(study: StudyAnalysis) -> dict[str, tuple[Any, ...]]:
 
 def belongs(one: Analysed, case: Case) -> bool:
     """Whether a recording is of the user, and the configuration, of a case."""
-    user = f"user {one.entry.user}"
-    return case.label in (user, user + place_of(one.entry.configuration))
+    entry = one.entry
+    return (entry.user, entry.configuration) == (case.user, case.configuration)

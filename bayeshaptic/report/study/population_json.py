@@ -12,7 +12,6 @@ from bayeshaptic.inference.population.reweighting import ALONE
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.summary import plain, recommendation
-from bayeshaptic.study.recorded_cases import place_of
 from bayeshaptic.types import Floats
 
 if TYPE_CHECKING:
@@ -67,8 +66,7 @@ def _users(study: StudyAnalysis) -> list[dict[str, Any]]:
     """Each user's K_CR over all configurations and trials."""
     found = []
     for user in study.study.users:
-        starts = tuple(f"user {user}{after}" for after in (",", " ("))
-        own = [c for c in study.cases if c.label == f"user {user}" or c.label.startswith(starts)]
+        own = [case for case in study.cases if case.user == user]
         if own:
             found.append({"user": user, "critical_stiffness": _together(own)})
     return found
@@ -112,20 +110,12 @@ def _hidden(effect: Together) -> dict[str, Any]:
 def _new_person(study: StudyAnalysis) -> dict[str, Any] | None:
     if not study.new_person:
         return None
-    places = {place_of(e.configuration): e.configuration for e in study.study.entries}
     rows = [
-        {
-            "configuration": next((p for end, p in places.items() if _ends(case, end)), None),
-            "critical_stiffness": _limit(case.limit),
-        }
+        {"configuration": case.configuration, "critical_stiffness": _limit(case.limit)}
         for case in study.new_person
     ]
     several = len(rows) > 1
     return {**rows[0], "by_configuration": rows if several else None}
-
-
-def _ends(case: Case, ending: str) -> bool:
-    return bool(ending) and case.label.endswith(ending)
 
 
 def _limit(limit: CriticalStiffness) -> dict[str, Any]:
@@ -161,16 +151,10 @@ def _configurations(study: StudyAnalysis) -> list[dict[str, Any]] | None:
         own = [
             case
             for case in study.cases
-            if case.group == ("held" if held else "free") and _is_at(case, coordinate)
+            if case.group == ("held" if held else "free") and case.configuration == coordinate
         ]
         rows.append({"coordinate": coordinate, "held": held, "critical_stiffness": _together(own)})
     return rows or None
-
-
-def _is_at(case: Case, coordinate: float | str) -> bool:
-    name = coordinate if isinstance(coordinate, str) else f"{coordinate:g}"
-    ending = f", configuration {name}"
-    return case.label.endswith(ending) or f"{ending} (" in case.label
 
 
 def _device_limit(limit: DeviceLimit) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from bayeshaptic.report.numbers.bands import band_of
 from bayeshaptic.report.numbers.cases import held_cases, is_free
 from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.report.numbers.hidden import amount
+from bayeshaptic.study.recorded_cases import place_of
 
 if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
@@ -116,13 +117,13 @@ def _elsewhere(study: StudyAnalysis) -> str:
 
 def _between(study: StudyAnalysis) -> str:
     """The lowest and the highest of the people that were seen in one configuration."""
-    place = _place(study.new_person[0])
-    seen = [case for case in held_cases(study) if _place(case) == place]
+    place = study.new_person[0].configuration
+    seen = [case for case in held_cases(study) if case.configuration == place]
     if len(seen) < 2:
         return ""
     order = sorted(seen, key=lambda case: case.limit.quantile(0.5))
     (low, least), (high, most) = (
-        (decibel(case.limit.quantile(0.5)), _user(case)) for case in (order[0], order[-1])
+        (decibel(case.limit.quantile(0.5)), case.user) for case in (order[0], order[-1])
     )
     blur = float(np.median([spread_db(case) for case in seen]))
     same = (
@@ -131,18 +132,14 @@ def _between(study: StudyAnalysis) -> str:
         else ""
     )
     return (
-        f"Of those who were recorded{' there' if place else ''}, {least} has the lowest limit "
-        f"({low:.2f} dB) and {most} the highest ({high:.2f} dB).{same}"
+        f"Of those who were recorded{'' if place is None else ' there'}, {least} has the lowest "
+        f"limit ({low:.2f} dB) and {most} the highest ({high:.2f} dB).{same}"
     )
 
 
 def _place(case: Case) -> str:
-    """The configuration in the label of a case; empty without one."""
-    return case.label.partition(_CONFIGURATION)[2]
-
-
-def _user(case: Case) -> str:
-    return case.label.partition(_CONFIGURATION)[0].removeprefix("user ")
+    """The configuration of a case; empty without one."""
+    return place_of(case.configuration).removeprefix(_CONFIGURATION)
 
 
 def spread_db(case: Case) -> float:
