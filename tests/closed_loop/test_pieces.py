@@ -9,6 +9,7 @@ import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.base.begun import begin
+from bayeshaptic.diagnosis.base.opened import opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.residuals.pieces import force_in_pieces
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
@@ -254,3 +255,16 @@ def test_the_one_piece_that_counts_is_as_if_recorded_alone() -> None:
     assert begun.etfe.unbroken is not None and begun.etfe.unbroken.samples == pieces[0].samples
     (told,) = (n.text for n in begun.notices if (n.level, n.topic) == ("warning", "pieces"))
     assert "1 of 2 (number 2): they have a force that repeats" in told
+
+
+@pytest.mark.parametrize("first", [200, 210])
+def test_pieces_of_noise_are_no_loop(first: int) -> None:
+    """They were one: what a piece begins with tells of the end of the one before."""
+    bench = Bench.from_device("lhifam")
+    excitation = WhiteNoise(bench.force_rms, 300.0, 0.3, 3.0)
+    made = [simulate(bench, excitation, seed=seed) for seed in range(first, first + 4)]
+    pieces = [recording_from_arrays(**one.signals) for one in made]
+    topics = {
+        notice.topic for notice in opened(bh.join_recordings(pieces), "free", Options()).notices
+    }
+    assert "pieces" in topics and "feedback" not in topics

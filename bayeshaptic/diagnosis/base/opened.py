@@ -84,7 +84,8 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     if isinstance(measurement, Recording):
         with clock.stage("checks"):
             options.report(0.0, "checking the recording")
-            whole = without_lone(unbroken(measurement))
+            # Where a sample is a piece's first, no other foretells it.
+            whole = replace(without_lone(unbroken(measurement)), joints=measurement.joints)
             notices += told(measurement.feedback, check_recording(whole, device))
             unread = notices
             if one_mass:  # followed in time instead

@@ -7,6 +7,7 @@ import numpy as np
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.feedback import OR_NOISE, UNDECIDED
+from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import Causality, causality
 from bayeshaptic.recordings.signals.controller import share_by_a_law
@@ -37,7 +38,7 @@ def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> 
         raise _relay(recording, where)
     if found.has_feedback:
         return [_feedback(found.evidence, against, found.far_past)]
-    if not measured and (share := share_by_a_law(recording)) > 0:
+    if not measured and (share := share_by_a_law(unbroken(recording))) > 0:
         known = "the positions" if recording.reference is None else "positions and reference"
         law = f"in {percent(share)} of the samples a linear law of {known} makes it exactly"
         return [_feedback(law, against)]
