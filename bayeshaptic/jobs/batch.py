@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
-from bayeshaptic.files import remove_dead_drafts
+from bayeshaptic.files import remove_dead_drafts, resolved
 from bayeshaptic.jobs import executors
 from bayeshaptic.jobs.executors import Outcome
 from bayeshaptic.jobs.index import FILES as INDEX_FILES, row_of, write_index
@@ -235,7 +235,7 @@ class _Batch:
         where = job.folder.relative_to(self.folder).parent
         rows = [
             row_of(
-                (where / one.name).as_posix(),
+                (where / _within(one, job) / one.name).as_posix(),
                 job.folder if one.page is None else one.page.parent,
                 one.headline.status if one.headline else None,
                 one.error,
@@ -267,6 +267,12 @@ class _Batch:
         write_manifest(self.folder, self.entries, self.command, self.settings.facts())
         write_index(self.folder, [row for entry in self.entries.values() for row in entry.rows])
         self._written = time.monotonic()
+
+
+def _within(one: Reported, job: Job) -> str:
+    """Where a report stands in its source: in the study, where it is of one of its recordings."""
+    of_source = one.page is not None and resolved(one.page.parent) == resolved(job.folder)
+    return "" if of_source else job.folder.name
 
 
 def _executor(executor: concurrent.futures.Executor | Executor | None) -> Executor:

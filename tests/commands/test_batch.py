@@ -141,6 +141,25 @@ def test_recordings_of_one_name_are_reported_where_they_stand(
         bh.run_batch([place], tmp_path / "out", executor=executors.serial)
 
 
+def test_recordings_of_studies_are_named_with_their_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each study has its `free` and its `anna`, and the index had them all under one name."""
+
+    def study(job: Job) -> tuple[Reported, ...]:
+        free = Reported("free", job.folder / "free" / "report.html")
+        device = Reported(job.folder.name, job.folder / "report.html")
+        return free, Reported("anna", error="anna.csv: refused"), device
+
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.toml").write_text("[[recording]]\nfile='free.csv'\n")
+    monkeypatch.setattr(batch, "report_source", study)
+    bh.run_batch([tmp_path], tmp_path / "out", executor=executors.serial)
+    rows = list(csv.DictReader((tmp_path / "out" / "index.csv").read_text().splitlines()))
+    names = ["one/free", "one/anna", "one", "two/free", "two/anna", "two"]
+    assert [row["name"] for row in rows] == names
+
+
 def test_recordings_named_as_files_of_a_report_are_recordings(
     tmp_path: Path, reports: Reports
 ) -> None:
