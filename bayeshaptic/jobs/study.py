@@ -23,6 +23,7 @@ from bayeshaptic.report.draft import for_one_run, refuse_to_replace
 from bayeshaptic.report.reported import Reported
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.write import NAMES, write_study_report
+from bayeshaptic.report.write import NAMES as OF_A_RECORDING
 from bayeshaptic.study.analysed import names_of
 from bayeshaptic.study.analysis import StudyAnalysis, analyse_study
 from bayeshaptic.types import Executor, Progress
@@ -55,8 +56,12 @@ def report_study(job: Job, progress: Progress | None, workers: int = 1) -> tuple
     pages: dict[int, Reported] = {}
 
     def executor(analyse: Callable[..., Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
-        names = [Path(folder).name for folder in folders_of(tasks, job.folder)]
-        work = partial(analyse_and_report, analyse, folders_of(tasks, job.folder), job=job)
+        folders = folders_of(tasks, job.folder)
+        for folder in folders:  # before any work
+            refuse_file(folder)
+            refuse_to_replace(folder, OF_A_RECORDING, study.files)
+        names = [folder.name for folder in folders]
+        work = partial(analyse_and_report, analyse, folders, job=job)
         for outcome in _executor(progress, names, workers)(work, tasks):
             number = outcome.item.number
             if outcome.error is None:

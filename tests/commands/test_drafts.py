@@ -109,6 +109,22 @@ def test_two_studies_are_not_written_into_one_folder(tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+def test_what_is_in_the_way_of_a_study_is_told_before_any_work(tmp_path: Path) -> None:
+    study, out = tmp_path / "study.toml", tmp_path / "out"
+    (tmp_path / "free.csv").write_text("no recording")
+    study.write_text('[device]\nname = "lhifam"\n[[recording]]\nfile = "free.csv"\n')
+    out.mkdir()
+    (out / "free").write_text("a file where a folder is to be")
+    with pytest.raises(InputError, match="free is a file; name a folder"):
+        report_study(Job(study, out, Settings()), None)
+    (out / "free").unlink()
+    (out / "free").mkdir()
+    (out / "free" / "limits.csv").write_text("time_s,force_n,position_m\n")
+    with pytest.raises(InputError, match=r"limits\.csv: .* of no report; move it"):
+        report_study(Job(study, out, Settings()), None)
+    assert sorted(os.listdir(out)) == ["free"]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="links")
 def test_links_in_a_circle_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
