@@ -353,3 +353,15 @@ def test_a_measured_force_is_no_command(tmp_path: Path) -> None:
     assert overview(path).roles["force"] == "motor_torque_command"
     np.savetxt(path, columns[:, [0, 2, 3]], header="t,torque_fb,angle", comments="", delimiter=",")
     assert "measured, not commanded? Then write measured_force=" in "\n".join(lines(overview(path)))
+
+
+def test_the_range_of_a_long_recording_is_that_of_all_of_it(tmp_path: Path) -> None:
+    """It was that of its first half million rows, and so was the number of those without one."""
+    count = 600_000
+    time, force = 1e-3 * np.arange(count), np.zeros(count)
+    force[-3:] = 7.0, -5.0, np.nan
+    np.savez(tmp_path / "long.npz", time_s=time, force_n=force, position_m=np.sin(time))
+    facts = {one.name: one for one in overview(tmp_path / "long.npz").columns}
+    assert facts["time_s"].high == time[-1] and facts["time_s"].samples == count
+    assert (facts["force_n"].low, facts["force_n"].high) == (-5.0, 7.0)
+    assert facts["force_n"].missing == 1

@@ -98,10 +98,10 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
     unit = name_and_unit(name)[1]
     if values.dtype.kind not in "iufb":
         return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
-    most_rows = 500_000  # that are looked at
-    signal = np.asarray(values[:most_rows], dtype=float)
-    missing = int(np.sum(~np.isfinite(signal)))
-    signal = signal[np.isfinite(signal)]
+    most_rows = 500_000  # whose steps are looked at
+    whole = np.asarray(values, dtype=float)
+    there = np.isfinite(whole)
+    signal = whole[:most_rows][there[:most_rows]]
     if len(signal) < 3:
         return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
     steps = np.diff(signal)
@@ -113,13 +113,13 @@ def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
     return ColumnFacts(
         name,
         len(values),
-        float(signal.min()),
-        float(signal.max()),
+        float(whole.min(where=there, initial=np.inf)),
+        float(whole.max(where=there, initial=-np.inf)),
         increment_unit(signal) if spread > 0 else None,
         step if is_time else None,
         float(np.sqrt(np.mean(steps**2))) / spread if spread > 0 else np.nan,
         unit,
-        missing,
+        int(np.count_nonzero(~there)),
         is_whole(signal),
     )
 
