@@ -10,6 +10,7 @@ import pytest
 from fake_study import fake_study
 
 from bayeshaptic.recordings.study import StudyEntry
+from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.study.population_json import population_summary
 from bayeshaptic.report.study.tables import users
 from bayeshaptic.report.study.words import people
@@ -55,3 +56,22 @@ def test_people_are_known_by_their_names_and_not_by_how_labels_begin() -> None:
     assert list(rows) == list(names) and rows["ana, b"][1] == "not in the population"
     lowest = min(named.cases, key=lambda case: case.limit.quantile(0.5)).user
     assert f"{lowest} has the lowest limit" in " ".join(people(named))
+
+
+@pytest.mark.parametrize(
+    ("ways", "end"),
+    [
+        ((), "a person not yet seen holds it."),
+        ((0,), "holds it, in every configuration with nobody holding it, else in those recorded."),
+        ((1,), "in every configuration with somebody holding it, else in those recorded."),
+        ((0, 1), "holds it, in every configuration."),
+    ],
+)
+def test_every_configuration_is_that_of_whoever_was_recorded_along(
+    ways: tuple[int, ...], end: str
+) -> None:
+    """Nobody along a coordinate, and people in one place: it was said of people, too."""
+    whole = fake_study(people=3, free=2, places=(0.0, 1.0))
+    along = tuple(whole.configurations[number] for number in ways)
+    told = study_headline(replace(whole, configurations=along)).sentence
+    assert told.endswith(end)

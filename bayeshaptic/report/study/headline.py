@@ -152,7 +152,13 @@ def _scope(study: StudyAnalysis) -> str:
         holders.append("a person not yet seen")
     last = f"{', '.join(holders[:-1])} or {holders[-1]}" if len(holders) > 1 else holders[0]
     text = f"whether {last} holds it" if len(holders) > 1 else f"with {last} holding it"
-    return f"{text}, in every configuration" if CONFIGURATION in groups else text
+    along = {one.held for one in study.configurations}
+    if not along:
+        return text
+    if along >= {not is_free(case.label, case.group) for case in study.cases}:
+        return f"{text}, in every configuration"
+    who = "somebody" if True in along else "nobody"
+    return f"{text}, in every configuration with {who} holding it, else in those recorded"
 
 
 def what_binds(study: StudyAnalysis) -> str:
