@@ -10,12 +10,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.signals.runs import held_for, moving_part, written_each
-from bayeshaptic.recordings.signals.timing import LOOP, sampling_period
+from bayeshaptic.recordings.signals.runs import (
+    force_held,
+    held_for,
+    left_out,
+    moving_part,
+    position_held,
+    rows_alike,
+    written_each,
+)
+from bayeshaptic.recordings.signals.timing import Timing, sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
 from bayeshaptic.recordings.units import assumed_units, base_unit, choose_units
 from bayeshaptic.types import Floats
@@ -71,61 +78,38 @@ def recording_from_arrays(
         from 1), and for time stamps that show no even sampling.
     """
     where = str(source) if source is not None else name
-    force = _signal(force, "force", where)
-    position = _signal(position, "position", where)
+    signals = _Signals(
+        _signal(force, "force", where),
+        _signal(position, "position", where),
+        None if reference is None else _signal(reference, "reference", where),
+    )
     stamps = None if time is None else _signal(time, "time", where)
-    followed = None if reference is None else _signal(reference, "reference", where)
-    _refuse_lengths(where, force=force, position=position, reference=followed, time=stamps)
+    _refuse_lengths(where, **vars(signals), time=stamps)
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
     if time is None and period_s is None and source is None:
         raise InputError(f"{where}: no time and no period; give period_s in seconds, or time")
-    force, force_unit, _ = _in_base_unit(force, "force", force_unit, where)
-    position, position_unit, factor = _in_base_unit(position, "position", position_unit, where)
-    encoder_resolution = None if encoder_resolution is None else factor * encoder_resolution
-    held, signals = held_for(force), _Signals(force, position, followed)
-    each, first = written_each((force,))
-    if each > 1 and stamps is not None and _is_period(period_s, stamps, each):
-        signals, stamps, held = signals[first::each], stamps[first::each], 1
-    timing = sampling_period(stamps, period_s, where)
-    unit_of_force, unit_of_position = choose_units(force_unit, position_unit, kind, where)
-    angle = unit_of_position == "rad"
-    position, notices = unwrapped(signals.position, angle, encoder_resolution, where)
-    signals = replace(signals, position=position)
-    if timing.rows is not None:
-        from bayeshaptic.recordings.signals.gaps import put_back
-
-        every = put_back(signals.force, position, signals.reference, timing.rows, where)
-        signals = _Signals(*every)
-    position, joints, jumps = without_jumps(signals.position, signals.force)
-    start, stop = moving_part(signals.force, position, increment_unit(position) or 0.0)
-    notices += (*timing.notices, *jumps, *_at_rest(start, stop, len(position)))
-    signals = replace(signals, position=position)[start:stop]
-    often, first = written_each((signals.force, signals.position))
-    loop_s = often * timing.period_s
-    skipped = first % often if often > 1 else 0
-    joints = tuple(
-        -((start + skipped - joint) // often) for joint in joints if start < joint < stop
+    force, force_unit, _ = _in_base_unit(signals.force, "force", force_unit, where)
+    position, position_unit, factor = _in_base_unit(
+        signals.position, "position", position_unit, where
     )
-    if often > 1:
-        signals = signals[skipped::often]
-        notices += (_written_each(often, loop_s),)
-    elif held > 1 and (stamps is None or period_s is None):
-        notices += (_held(signals.force, held, loop_s, stamps is not None),)
-    elif (late := held_for(signals.position)) > 1:
-        notices += (_read_late(late, loop_s),)
-    notices += assumed_units(force_unit, position_unit, unit_of_force, unit_of_position)
+    count = None if encoder_resolution is None else factor * encoder_resolution
+    signals = replace(signals, force=force, position=position)
+    signals, timing, held = _on_a_clock(signals, stamps, period_s, where)
+    units = choose_units(force_unit, position_unit, kind, where)
+    rows = _continued(signals, timing, units[1] == "rad", count, where)
+    rows = _a_row_a_period(_without_standstill(rows), held, stamps is not None, period_s)
     return Recording(
-        **vars(signals),
-        period_s=loop_s,
-        force_unit=unit_of_force,
-        position_unit=unit_of_position,
+        **vars(rows.signals),
+        period_s=rows.period_s,
+        force_unit=units[0],
+        position_unit=units[1],
         name=name,
-        encoder_resolution=encoder_resolution,
+        encoder_resolution=count,
         time_jitter=timing.jitter,
         source=source,
-        notices=notices,
-        joints=joints,
+        notices=rows.notices + assumed_units(force_unit, position_unit, *units),
+        joints=rows.joints,
     )
 
 
@@ -140,6 +124,77 @@ class _Signals:
     def __getitem__(self, rows: slice) -> _Signals:
         followed = None if self.reference is None else self.reference[rows]
         return _Signals(self.force[rows], self.position[rows], followed)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The signals on an even clock, the rows at which other motions begin, and what to say."""
+
+    signals: _Signals
+    period_s: float
+    joints: tuple[int, ...]
+    notices: tuple[Notice, ...]
+
+
+def _on_a_clock(
+    signals: _Signals, stamps: Floats | None, period_s: float | None, where: str
+) -> tuple[_Signals, Timing, int]:
+    """The signals, when they were recorded, and for how many of their rows the force is held.
+
+    One row for each force, where the period that was said is that of the forces.
+    """
+    held = held_for(signals.force)
+    each, first = written_each((signals.force,))
+    if each > 1 and stamps is not None and _is_period(period_s, stamps, each):
+        signals, stamps, held = signals[first::each], stamps[first::each], 1
+    return signals, sampling_period(stamps, period_s, where), held
+
+
+def _continued(
+    signals: _Signals, timing: Timing, angle: bool, count: float | None, where: str
+) -> _Rows:
+    """Every row of the clock, the position counted on across its jumps."""
+    position, notices = unwrapped(signals.position, angle, count, where)
+    signals = replace(signals, position=position)
+    if timing.rows is not None:
+        from bayeshaptic.recordings.signals.gaps import put_back
+
+        signals = _Signals(*put_back(**vars(signals), rows=timing.rows, where=where))
+    position, joints, jumps = without_jumps(signals.position, signals.force)
+    signals = replace(signals, position=position)
+    return _Rows(signals, timing.period_s, joints, (*notices, *timing.notices, *jumps))
+
+
+def _without_standstill(rows: _Rows) -> _Rows:
+    """Without rows at either end in which the position stands still while the force goes on."""
+    force, position = rows.signals.force, rows.signals.position
+    start, stop = moving_part(force, position, increment_unit(position) or 0.0)
+    return _Rows(
+        rows.signals[start:stop],
+        rows.period_s,
+        tuple(joint - start for joint in rows.joints if start < joint < stop),
+        rows.notices + left_out(start, stop, len(position)),
+    )
+
+
+def _a_row_a_period(rows: _Rows, held: int, stamped: bool, told_s: float | None) -> _Rows:
+    """One row for each period of the loop; what is held for several rows is said.
+
+    `held` is for how many rows the force is, before any was left out.
+    """
+    signals, period_s = rows.signals, rows.period_s
+    often, first = written_each((signals.force, signals.position))
+    if often > 1:
+        joints = tuple(-((first - joint) // often) for joint in rows.joints)
+        notices = (*rows.notices, rows_alike(often, often * period_s))
+        return _Rows(signals[first::often], often * period_s, joints, notices)
+    if held > 1 and not (stamped and told_s is not None):
+        said: tuple[Notice, ...] = (force_held(signals.force, held, period_s, stamped),)
+    elif (late := held_for(signals.position)) > 1:
+        said = (position_held(late, period_s),)
+    else:
+        said = ()
+    return replace(rows, notices=rows.notices + said)
 
 
 def _in_base_unit(
@@ -164,57 +219,6 @@ def _is_period(period_s: float | None, stamps: Floats, rows: int) -> bool:
         return False
     told = rows * float(np.median(np.diff(stamps)))
     return bool(abs(told - period_s) <= 0.01 * period_s)
-
-
-def _held(force: Floats, rows: int, period_s: float, stamped: bool) -> Notice:
-    """A loop of a longer period than the rows have, or an excitation that was held."""
-    slower, each = quantity(rows * period_s, "s"), f"one row in {rows}"
-    levels = len(np.unique(force)) > 2  # two are those of a clock that people choose
-    cure = (
-        f"Say which it is: --period-s {rows * period_s:.6g} for the loop of these changes, of "
-        f"which {each} is then read, or --period-s {period_s:.6g} where the loop runs at every row "
-        "and the excitation alone was held."
-        if stamped
-        else f"If so, keep {each} alone, those at which the force changes, and say the period of "
-        "these."
-    )
-    text = (
-        f"The force is held for {rows} rows, and the position changes in between: as where a drive "
-        f"writes rows faster than its loop commands forces. That loop's period is {slower}, and "
-        f"its limit is lower than that of one of {quantity(period_s, 's')}. {cure}"
-    )
-    return Notice("warning", "period", text, (LOOP,) if levels and stamped else ())
-
-
-def _read_late(rows: int, period_s: float) -> Notice:
-    text = (
-        f"The position is held for {rows} rows, {quantity(rows * period_s, 's')}, while the force "
-        "changes in between: as where it is read more slowly than forces are commanded. The limit "
-        "is that of a loop that sees it so late. If the loop sees a new position at every row, "
-        "record that one: then the limit is higher."
-    )
-    return Notice("warning", "held position", text)
-
-
-def _at_rest(start: int, stop: int, samples: int) -> tuple[Notice, ...]:
-    if (start, stop) == (0, samples):
-        return ()
-    ends = [f"{a + 1} to {b}" for a, b in ((0, start), (stop, samples)) if b > a]
-    text = (
-        f"The position stands still in rows {' and '.join(ends)} while the force goes on, as "
-        "before an amplifier is switched on, after it is switched off, or behind a brake: these "
-        "rows were left out."
-    )
-    return (Notice("warning", "standstill", text),)
-
-
-def _written_each(often: int, period_s: float) -> Notice:
-    text = (
-        f"Every row stands {often} times in a row, as where a log is faster than the loop: one of "
-        f"each was read, and the loop's period is taken to be {quantity(period_s, 's')}. Say "
-        "otherwise with --period-s, which is that of a row."
-    )
-    return Notice("note", "time stamps", text)
 
 
 def _refuse_lengths(where: str, **signals: Floats | None) -> None:

@@ -1,4 +1,4 @@
-"""Runs of true values, and of rows that are alike."""
+"""Runs of true values, and of rows that are alike, as where a log is faster than the loop."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bayeshaptic.errors import Notice
+from bayeshaptic.quantities import quantity
+from bayeshaptic.recordings.signals.timing import LOOP
 from bayeshaptic.types import Bools, Floats, Ints
 
 # Rows that a reading hangs for at most; a device that rests does so for longer. Of 150 that hang
@@ -137,3 +140,57 @@ def _pushes(force: Floats) -> Floats:
     for _ in range(2):
         force = np.cumsum(force - force.mean(axis=-1, keepdims=True), axis=-1)
     return np.ptp(force, axis=-1)
+
+
+def rows_alike(often: int, period_s: float) -> Notice:
+    """A note that every row stands several times in a row, in a loop of this period."""
+    text = (
+        f"Every row stands {often} times in a row, as where a log is faster than the loop: one of "
+        f"each was read, and the loop's period is taken to be {quantity(period_s, 's')}. Say "
+        "otherwise with --period-s, which is that of a row."
+    )
+    return Notice("note", "time stamps", text)
+
+
+def force_held(force: Floats, rows: int, period_s: float, stamped: bool) -> Notice:
+    """A warning of a loop of a longer period than the rows have, or an excitation that was held."""
+    slower, each = quantity(rows * period_s, "s"), f"one row in {rows}"
+    levels = len(np.unique(force)) > 2  # two are those of a clock that people choose
+    cure = (
+        f"Say which it is: --period-s {rows * period_s:.6g} for the loop of these changes, of "
+        f"which {each} is then read, or --period-s {period_s:.6g} where the loop runs at every row "
+        "and the excitation alone was held."
+        if stamped
+        else f"If so, keep {each} alone, those at which the force changes, and say the period of "
+        "these."
+    )
+    text = (
+        f"The force is held for {rows} rows, and the position changes in between: as where a drive "
+        f"writes rows faster than its loop commands forces. That loop's period is {slower}, and "
+        f"its limit is lower than that of one of {quantity(period_s, 's')}. {cure}"
+    )
+    return Notice("warning", "period", text, (LOOP,) if levels and stamped else ())
+
+
+def position_held(rows: int, period_s: float) -> Notice:
+    """A warning of a position that is read more slowly than forces are commanded."""
+    text = (
+        f"The position is held for {rows} rows, {quantity(rows * period_s, 's')}, while the force "
+        "changes in between: as where it is read more slowly than forces are commanded. The limit "
+        "is that of a loop that sees it so late. If the loop sees a new position at every row, "
+        "record that one: then the limit is higher."
+    )
+    return Notice("warning", "held position", text)
+
+
+def left_out(start: int, stop: int, samples: int) -> tuple[Notice, ...]:
+    """A warning of rows left out before `start`, and from `stop` on; none where all are there."""
+    ends = [f"{a + 1} to {b}" for a, b in ((0, start), (stop, samples)) if b > a]
+    if not ends:
+        return ()
+    text = (
+        f"The position stands still in rows {' and '.join(ends)} while the force goes on, as "
+        "before an amplifier is switched on, after it is switched off, or behind a brake: these "
+        "rows were left out."
+    )
+    return (Notice("warning", "standstill", text),)
