@@ -160,7 +160,7 @@ def _continued(
         from bayeshaptic.recordings.signals.gaps import put_back
 
         signals = _Signals(*put_back(**vars(signals), rows=timing.rows, where=where))
-    position, joints, jumps = without_jumps(signals.position, signals.force)
+    position, joints, jumps = without_jumps(signals.position, signals.force, timing.period_s)
     signals = replace(signals, position=position)
     return _Rows(signals, timing.period_s, joints, (*notices, *timing.notices, *jumps))
 

@@ -13,7 +13,10 @@ from scipy.linalg import expm
 from scipy.signal import butter, chirp, lfilter
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.base.direct import opened_directly
+from bayeshaptic.diagnosis.base.opened import opened
 from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.samples.clipped import clipped
 from bayeshaptic.diagnosis.samples.faults import faults
 from bayeshaptic.diagnosis.samples.mend import Inspection, inspect, repair_measurement
@@ -194,12 +197,19 @@ def test_held_samples_are_counted_and_filled_in(probability: float) -> None:
 
 
 @pytest.mark.parametrize("bench", [PHANTOM, Bench.from_device("lhifam")], ids=["phantom", "lhifam"])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_reading_that_hung_is_filled_in_to_its_end(bench: Bench, seed: int) -> None:
-    """What looked right in between was left, the jump at the end taken for a new zero."""
+@pytest.mark.parametrize(("period_s", "seed"), [(1e-3, 1), (1e-3, 2), (2e-4, 1)])
+def test_a_reading_that_hung_is_filled_in_to_its_end(
+    bench: Bench, period_s: float, seed: int
+) -> None:
+    """What looked right in between was left, the jump at the end taken for a new zero.
+
+    A motion of less than a count a sample hid all of it.
+    """
+    bench = replace(bench, period_s=period_s)
     made = simulate(bench, WhiteNoise(0.5 * bench.force_rms, 200.0, 0.7, SECONDS), seed=seed)
-    position, hung = made.position.copy(), slice(3000, 3100)
-    position[hung] = position[3000]
+    position, first, rows = made.position.copy(), round(3 / period_s), round(0.1 / period_s)
+    hung = slice(first, first + rows)
+    position[hung] = position[first]
     count = bench.encoder_resolution
     recording = recording_from_arrays(
         **made.signals | {"position": position}, encoder_resolution=count
@@ -208,10 +218,32 @@ def test_a_reading_that_hung_is_filled_in_to_its_end(bench: Bench, seed: int) ->
     wrong, statistic = held(as_recorded(recording))
     gone = np.abs(made.position - position)
     assert gone.max() > 50 * count  # it could be seen
-    assert statistic > 50
-    assert wrong[hung].sum() > 60 and wrong.sum() <= wrong[hung].sum() + 5
+    assert statistic > 0.5 * rows
+    assert wrong[hung].sum() > 0.9 * rows and wrong.sum() <= wrong[hung].sum() + 5
     filled = as_recorded(recording).without(wrong).position
     assert np.abs(filled - made.position).max() < 4 * count
+
+
+def test_under_feedback_the_longest_part_is_fitted_in_which_nothing_hung() -> None:
+    """A controller answers to what it reads; what is not filled in made the limit too high."""
+    bench = Bench.from_device("lhifam")
+    read, hangs = np.zeros(8001), [slice(2000, 2150), slice(6000, 6200)]
+    wanted = lfilter([0.1], [1, -0.9], np.random.default_rng(3).normal(size=len(read)))
+
+    def control(k: int, position: float) -> float:
+        for rows in hangs:
+            if rows.start < k < rows.stop:
+                position = read[rows.start]
+        read[k] = position
+        return float(4000 * (2e-3 * wanted[k] - position))
+
+    made = run_loop(bench, control, 8.0, seed=2)
+    recording = recording_from_arrays(made.force, read[: len(made.force)], period_s=1e-3)
+    directly = opened_directly(opened(recording, "free", Options()), Options())
+    assert directly is not None and directly.etfe.recording is not None
+    assert directly.etfe.recording.samples == pytest.approx(3850, abs=5)
+    (said,) = [notice.text for notice in directly.notices if notice.topic == "jumps"]
+    assert said.startswith("The position hangs 2 times")
 
 
 def test_clipping_is_found_at_its_limits_and_filled_in() -> None:

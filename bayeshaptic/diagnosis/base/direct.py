@@ -12,7 +12,9 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import doubts, has_feedback, how_computed
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
+from bayeshaptic.recordings.signals.turns import hung
 
 AGAINST = "direct"  # the topic of what speaks against such a fit
 _WHATEVER = (
@@ -29,6 +31,7 @@ def opened_directly(found: Opened, options: Options) -> Opened | None:
     It is meant for recordings with feedback, and for those where feedback cannot be ruled out, also
     where a reference is known.  It is not meant for recordings in pieces, for a band that was asked
     for (it needs all lines), or for a device declared to be one mass, which is followed in time.
+    Where the reading hung, the longest part without is fitted.
 
     Parameters
     ----------
@@ -42,15 +45,36 @@ def opened_directly(found: Opened, options: Options) -> Opened | None:
     if not (through or has_feedback(found.notices)) or told_too_little(found.notices):
         return None
     try:
-        etfe = estimate_by_direct_method(replace(recording, reference=None))
+        read, hangs = _while_it_was_read(recording)
+        etfe = estimate_by_direct_method(replace(read, reference=None))
     except InputError:
         return None
     how = how_computed(found.notices)
     text = f"The force {how}; the device is read from it {_WHATEVER}"
     kept = (n for n in found.notices if n.topic not in ("feedback", "band"))
     note = Notice("note", "feedback", text, doubts(found.notices))
-    notices = (*kept, *etfe.notices, note)
+    notices = (*kept, *etfe.notices, note, *hangs)
     return replace(found, etfe=etfe, notices=notices)
+
+
+def _while_it_was_read(recording: Recording) -> tuple[Recording, tuple[Notice, ...]]:
+    """The longest part in which the reading did not hang, and a warning where it did.
+
+    What a controller answered to was what it read: nothing can be filled in there.
+    """
+    hangs = hung(recording.position, recording.period_s)
+    if not hangs:
+        return recording, ()
+    starts = [0, *(rows.stop for rows in hangs)]
+    stops = [*(rows.start for rows in hangs), recording.samples]
+    start, stop = max(zip(starts, stops, strict=True), key=lambda part: part[1] - part[0])
+    first, *others = hangs
+    times = f"{len(hangs)} times, the first time " if others else ""
+    text = (
+        f"The position hangs {times}in rows {first.start + 1} to {first.stop}, and jumps to where "
+        f"the device has gone since. Rows {start + 1} to {stop} alone were fitted."
+    )
+    return recording.part(start, stop), (Notice("warning", "jumps", text),)
 
 
 def against_direct(fit: Fit, tests: Iterable[Test], through: bool) -> tuple[Notice, ...]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.diagnosis.samples.prediction import Bools, Floats, Samples
-from bayeshaptic.recordings.signals.runs import HUNG, runs
+from bayeshaptic.diagnosis.samples.prediction import Samples
+from bayeshaptic.recordings.signals.runs import HUNG_S, runs
+from bayeshaptic.recordings.signals.turns import hung
+from bayeshaptic.types import Bools, Floats, Ints
 
 
 def held(samples: Samples) -> tuple[Bools, float]:
@@ -21,18 +23,21 @@ def held(samples: Samples) -> tuple[Bools, float]:
     """
     position = samples.recording.position
     steps = np.diff(position, prepend=position[0])
-    leaps = np.abs(steps) > 1.5 * samples.unit
     repeated = (steps == 0) & (np.arange(len(steps)) > 0) & ~samples.missing
+    ends = _in_a_leap(samples, steps, repeated)
     if samples.predictor is None:
         return np.zeros_like(repeated), 0.0
     units = 1.5  # increments a sample that no rounding turns into zero
     spreads = 4.0  # nor the noise
     fast = max(units * samples.unit, spreads * samples.predictor.spread)
-    wrong = repeated & _obvious(position, fast)
+    wrong = _obvious(position, fast)
+    for rows in hung(position, samples.recording.period_s):
+        wrong[rows] = True
+    wrong &= repeated
     errors = 5.0  # how far off a repeated sample must be, in errors of the prediction
     rounds = 6
     for _ in range(rounds):
-        trial = samples.without(_to_their_ends(wrong, repeated, leaps))
+        trial = samples.without(_to_their_ends(wrong, ends))
         if trial.predictor is None:
             return np.zeros_like(repeated), 0.0
         limit = errors * trial.predictor.spread
@@ -43,26 +48,34 @@ def held(samples: Samples) -> tuple[Bools, float]:
         wrong |= more
     # What was filled in must be elsewhere, too; a device that rests is not.
     confirmed = 0.6  # of that, how far the filled-in position must lie from the repeated one
-    filled, away = _to_their_ends(wrong, repeated, leaps), trial.position - position
+    filled, away = _to_their_ends(wrong, ends), trial.position - position
     filled &= _rms_of_runs(away, filled) > confirmed * limit
     elsewhere = filled & (np.abs(away) > confirmed * limit)
     return filled, float(elsewhere.sum() - np.sum(off & ~repeated))
 
 
-def _to_their_ends(wrong: Bools, repeated: Bools, leaps: Bools) -> Bools:
-    """Wrong samples, and those behind them in runs that end in a leap: nothing was read there.
+def _in_a_leap(samples: Samples, steps: Floats, repeated: Bools) -> tuple[Ints, Ints]:
+    """Runs of repeated samples that end in a leap, as `runs` gives them.
+
+    A device that rested, for longer, leaves by a count.
+    """
+    first, stop = runs(repeated)
+    leaps = np.append(np.abs(steps) > 1.5 * samples.unit, False)[stop]
+    short = stop - first <= round(HUNG_S / samples.recording.period_s)
+    return first[leaps & short], stop[leaps & short]
+
+
+def _to_their_ends(wrong: Bools, ends: tuple[Ints, Ints]) -> Bools:
+    """Wrong samples, and those behind them in runs in which nothing was read.
 
     One that is where the device was again by chance looks right, and so do the last, to which what
     is filled in before them is led. As true ones they would lead it there, however far the device
-    has gone. A device that rested, for longer, leaves by a count.
+    has gone.
     """
     found = wrong.copy()
-    first, stop = runs(repeated)
-    count = np.concatenate([[0], np.cumsum(wrong)])
-    hung = (count[stop] > count[first]) & np.append(leaps, False)[stop]
-    hung &= stop - first <= HUNG
-    for a, b in zip(first[hung], stop[hung], strict=True):
-        found[a + int(np.argmax(wrong[a:b])) : b] = True
+    for a, b in zip(*ends, strict=True):
+        if wrong[a:b].any():
+            found[a + int(np.argmax(wrong[a:b])) : b] = True
     return found
 
 

@@ -11,9 +11,10 @@ from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.signals.timing import LOOP
 from bayeshaptic.types import Bools, Floats, Ints
 
-# Rows that a reading hangs for at most; a device that rests does so for longer. Of 150 that hang
-# for 10 to 250 rows none is taken for a jump; of longer ones only what looks wrong is filled in.
-HUNG = 250
+# Seconds that a reading hangs for at most; a device that rests does so for longer. Of 300 that hang
+# for 0.02 to 0.25 s, at 0.25 to 10 kHz, none is taken for a jump (of 250 rows at most 88 were, all
+# above 1 kHz); of longer ones only what looks wrong is filled in.
+HUNG_S = 0.25
 _FEWEST_CHANGES = 100
 _FEWEST_AT_REST, _LEAST_AT_REST = 100, 0.02  # rows of a standstill, and their share
 _AS_FAR = 0.5  # as a force pushes a mass where it moves; under less a device may just rest

@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.signals.filling import ORDER, fit_predictor
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.signals.runs import HUNG
+from bayeshaptic.recordings.signals.runs import HUNG_S
 from bayeshaptic.types import Bools, Floats, Ints
 
 _TURN = 2 * np.pi
@@ -76,7 +76,7 @@ def unwrapped(
 
 
 def without_jumps(
-    position: Floats, force: Floats
+    position: Floats, force: Floats, period_s: float
 ) -> tuple[Floats, tuple[int, ...], tuple[Notice, ...]]:
     """The position without jumps to anywhere, where other motions begin, and a warning of them.
 
@@ -88,6 +88,7 @@ def without_jumps(
     Parameters
     ----------
     position, force : ndarray, shape (N,)
+    period_s : float
 
     Returns
     -------
@@ -97,15 +98,9 @@ def without_jumps(
     notices : tuple of Notice
     """
     steps = np.diff(position)
-    size = np.abs(steps)
-    if np.count_nonzero(steps) < _FEWEST_STEPS:
-        return position, (), ()
     count = increment_unit(position) or 0.0
-    # The most of ten steps: those before step k begin at its own place, those after ten further on.
-    most = sliding_window_view(np.pad(size, _AROUND), _AROUND).max(axis=1)
-    around = np.maximum(most[: len(steps)], most[_AROUND + 1 :])
-    jumps = size > np.maximum(_FARTHER * around, max(_most(steps), _COUNTS * count))
-    jumps &= ~_caught_up(position, jumps)
+    jumps = _to_anywhere(steps, count)
+    jumps[[rows.stop - 1 for rows in _hung(position, jumps, period_s)]] = False
     if not 0 < np.mean(jumps) <= _MOST_OFTEN:
         return position, (), ()
     beside = np.pad(steps, 1)
@@ -120,6 +115,29 @@ def without_jumps(
     mended = position - np.concatenate([[0.0], np.cumsum(off)])
     mended.setflags(write=False)
     return mended, tuple(map(int, another)), (_told(steps, jumps, another),)
+
+
+def hung(position: Floats, period_s: float) -> list[slice]:
+    """Rows that repeat the one before until a jump to where the device has gone since.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N,)
+    period_s : float
+    """
+    jumps = _to_anywhere(np.diff(position), increment_unit(position) or 0.0)
+    return _hung(position, jumps, period_s)
+
+
+def _to_anywhere(steps: Floats, count: float) -> Bools:
+    """Steps that are farther than any around them, so that no mass goes so, shape (N - 1,)."""
+    if np.count_nonzero(steps) < _FEWEST_STEPS:
+        return np.zeros(len(steps), dtype=bool)
+    size = np.abs(steps)
+    # The most of ten steps: those before step k begin at its own place, those after ten further on.
+    most = sliding_window_view(np.pad(size, _AROUND), _AROUND).max(axis=1)
+    around = np.maximum(most[: len(steps)], most[_AROUND + 1 :])
+    return np.asarray(size > np.maximum(_FARTHER * around, max(_most(steps), _COUNTS * count)))
 
 
 def _surprise(position: Floats, force: Floats, first: Ints, count: float) -> float:
@@ -195,23 +213,24 @@ def _told(steps: Floats, jumps: Bools, another: Ints) -> Notice:
     return Notice("warning", "jumps", text)
 
 
-def _caught_up(position: Floats, jumps: Bools) -> Bools:
-    """Jumps by which a reading that hung is back where the device has gone since, shape (N - 1,).
+def _hung(position: Floats, jumps: Bools, period_s: float) -> list[slice]:
+    """Rows before some of the `jumps`, shape (N - 1,), in which nothing was read.
 
-    They are no farther than some times what it goes beside them in as many rows as nothing was
-    read. Behind a coarse encoder a slow motion hangs for a while between any two counts.
+    The jump is no farther than some times what it goes beside them in as many rows. Behind a coarse
+    encoder a slow motion hangs for a while between any two counts.
     """
-    found, moved = np.zeros_like(jumps), np.flatnonzero(np.diff(position))
+    found, moved = [], np.flatnonzero(np.diff(position))
     for jump in map(int, np.flatnonzero(jumps)):
         before = int(moved[max(int(np.searchsorted(moved, jump)) - 1, 0)])
         rows = jump - before
-        if 1 < rows <= HUNG:
+        if 1 < rows <= round(HUNG_S / period_s):
             sides = (
                 position[max(before - rows + 1, 0) : before + 1],
                 position[jump + 1 : jump + 1 + rows],
             )
             farthest = max(float(np.ptp(side)) for side in sides if len(side))
-            found[jump] = abs(position[jump + 1] - position[jump]) <= _FARTHER * farthest
+            if abs(position[jump + 1] - position[jump]) <= _FARTHER * farthest:
+                found.append(slice(before + 2, jump + 1))
     return found
 
 
