@@ -107,6 +107,42 @@ class Along:
         return np.asarray(np.sum(self.height[which] * np.sin(at), axis=-1))
 
 
+@dataclass(frozen=True)
+class Besides:
+    """What acts on the mass besides command, viscous damping and dry friction.
+
+    Attributes
+    ----------
+    offset : float
+        A constant force.
+    apart : float
+        By how much friction is larger forward than backward, halved.
+    along : Along
+    white : ndarray, shape (N,)
+    slow : float
+        Velocity up to which friction grows.
+    """
+
+    offset: float
+    apart: float
+    along: Along
+    white: Floats
+    slow: float
+
+    def force(self, k: int, position: float, velocity: float) -> float:
+        """At a sample."""
+        moving = float(np.clip(velocity / self.slow, -1, 1))
+        friction = float(self.along.force(1 if moving > 0 else 2, position))
+        constant = self.offset + float(self.along.force(0, position))
+        return constant - moving * friction - abs(moving) * self.apart + self.white[k]
+
+    def means(self, position: Floats) -> tuple[float, float]:
+        """Of its friction, and of a constant force that the command overcomes, where it moves."""
+        at = position[:-1][np.diff(position) != 0]
+        mean, forward, backward = (float(self.along.force(which, at).mean()) for which in range(3))
+        return (forward + backward) / 2, (forward - backward) / 2 + self.apart - self.offset - mean
+
+
 def make(seed: int, noise: float | None = None, along_too: bool = False) -> Case:
     """One recording; controllers and references in turn.
 
@@ -132,7 +168,7 @@ def make(seed: int, noise: float | None = None, along_too: bool = False) -> Case
     apart = rng.uniform(-0.3, 0.3) * dry if uneven else 0.0
     delay = rng.uniform(0, 2) * PERIOD_S
     along = Along.drawn(uneven, dry, stroke, rng)
-    slow = 0.02 * stroke * np.sqrt(spring / mass)
+    besides = Besides(offset, apart, along, white, slow=0.02 * stroke * np.sqrt(spring / mass))
     force = [offset]
     now = dict.fromkeys(("position", "velocity", "sum", "smooth"), 0.0)
 
@@ -142,12 +178,7 @@ def make(seed: int, noise: float | None = None, along_too: bool = False) -> Case
         now["velocity"] = keep * now["velocity"] + (1 - keep) * rate
         now["sum"] += (wanted[k] - position) * PERIOD_S
         now["smooth"] = 0.8 * now["smooth"] + 0.2 * rate
-        moving = float(np.clip(now["smooth"] / slow, -1, 1))
-        friction = float(along.force(1 if moving > 0 else 2, position))
-        force[0] = (
-            offset + float(along.force(0, position)) - moving * friction - abs(moving) * apart
-        )
-        force[0] += white[k]
+        force[0] = besides.force(k, position, now["smooth"])
         follow = spring * (wanted[k] - position)
         return float(follow - derivative * now["velocity"] + integral * now["sum"])
 
@@ -160,17 +191,8 @@ def make(seed: int, noise: float | None = None, along_too: bool = False) -> Case
     if dry:
         bench = bench.with_effect("coulomb_friction", force=dry)
     done = run_loop(bench, control, seconds, seed=seed, give_up=100 * stroke)
-    at = done.position[:-1][np.diff(done.position) != 0]  # where it moves
-    mean, forward, backward = (float(along.force(which, at).mean()) for which in range(3))
-    truth = np.array(
-        [
-            mass,
-            damping,
-            dry + (forward + backward) / 2,
-            -offset - mean + (forward - backward) / 2 + apart,
-            delay,
-        ]
-    )
+    rubs, pulls = besides.means(done.position)
+    truth = np.array([mass, damping, dry + rubs, pulls, delay])
     recording = recording_from_arrays(done.force, done.position, PERIOD_S, name=f"seed {seed}")
     what = f"{controller}, {kind}, {seconds:.1f} s"
     return Case(recording, truth, what, bench.encoder_resolution, (noise or 0.0) * size)
