@@ -14,7 +14,7 @@ from bayeshaptic.models.prior import draw
 from bayeshaptic.types import Floats
 
 
-def drawn_device(path: Path, seed: int, from_prior: bool = False) -> tuple[Device, str]:
+def drawn_device(path: Path, seed: int, from_prior: bool) -> tuple[Device, str]:
     """A device with one draw's parameters, and the mechanism that they are of.
 
     Parameters

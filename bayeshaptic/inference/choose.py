@@ -173,7 +173,7 @@ def choose_model(
     fits: dict[str, Fit] = {}
     etfes: dict[str, Etfe] = {}
 
-    def fit_to(name: str, shorter: Fit | None = None, most_sets: int = SETS) -> None:
+    def fit_to(name: str, shorter: Fit | None = None, *, most_sets: int) -> None:
         model = build_model(name, device, delay_s, delay_sd_s, etfe.period_s)
         if etfe.of_measured_force:
             model = with_force_sensor(model)

@@ -31,7 +31,7 @@ from bayeshaptic.types import Executor, Progress
 _WRITING = 0.95
 
 
-def report_study(job: Job, progress: Progress | None, workers: int = 1) -> tuple[Reported, ...]:
+def report_study(job: Job, progress: Progress | None, workers: int) -> tuple[Reported, ...]:
     """The report of every recording, then that of the device.
 
     Parameters
@@ -77,9 +77,7 @@ def report_study(job: Job, progress: Progress | None, workers: int = 1) -> tuple
         return (*done, *_device(analysed, job.folder, done, progress))
 
 
-def report_population(
-    job: Job, progress: Progress | None, workers: int = 1
-) -> tuple[Reported, ...]:
+def report_population(job: Job, progress: Progress | None, workers: int) -> tuple[Reported, ...]:
     """The population part of a study alone: no reports of the recordings.
 
     Parameters

@@ -238,8 +238,8 @@ def refuse_mixed_units(force_unit: str, position_unit: str, where: str) -> None:
 def choose_units(
     force_unit: str | None,
     position_unit: str | None,
-    kind: str | None = None,
-    where: str = "recording",
+    kind: str | None,
+    where: str,
 ) -> tuple[str, str]:
     """The units of force and position where one of them, or both, are not said.
 

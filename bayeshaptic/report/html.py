@@ -59,8 +59,8 @@ _CONTENTS = (
 def render(
     result: Result,
     pictures: Mapping[str, Drawn],
-    sections: Sequence[str] = (),
-    origin: Mapping[str, Any] | None = None,
+    sections: Sequence[str],
+    origin: Mapping[str, Any] | None,
 ) -> str:
     """The page of an analysis (or of what closing the loop returns) with its figures.
 

@@ -13,7 +13,7 @@ _TOGETHER = 4096  # draws, whose responses are in memory at a time
 
 
 def limits_of(
-    model: Model, by_chain: Floats, approximation: str, known: Floats | None = None
+    model: Model, by_chain: Floats, approximation: str, known: Floats | None
 ) -> tuple[Floats, Floats, Ints]:
     """Critical stiffness, binding frequency and what binds, chain after chain.
 

@@ -21,7 +21,7 @@ FIGURES = ("guidance_shares", "guidance_sweeps")
 
 
 def guidance_section(
-    case: Case, analysis: Analysis | None = None, of_several: str = ""
+    case: Case, analysis: Analysis | None, of_several: str = ""
 ) -> Section | None:
     """HTML and pictures of the guidance for one case.
 

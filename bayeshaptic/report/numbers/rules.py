@@ -79,9 +79,7 @@ def rules_of(model: Model, draws: Floats, label: str = "") -> Rules:
     return Rules(label, ground_damping(system), np.asarray(system.delay_s), model.period_s)
 
 
-def least_damped(
-    cases: Sequence[Case], friction: float | None = None, resolution: float | None = None
-) -> Rules:
+def least_damped(cases: Sequence[Case], friction: float | None, resolution: float | None) -> Rules:
     """The rules for the case with the least damping, which they ask the smallest stiffness of."""
     every = (rules_of(case.model, case.draws, case.label) for case in cases)
     least = min(every, key=lambda rules: rules.damping)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bayeshaptic.report.numbers.rows import Rows
 
 
-def reproduce(result: Result, origin: Mapping[str, Any] | None = None) -> Rows:
+def reproduce(result: Result, origin: Mapping[str, Any] | None) -> Rows:
     """(what, value): the command, the file and its hash, the seed, the time of stages, versions.
 
     Parameters

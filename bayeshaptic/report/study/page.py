@@ -40,7 +40,7 @@ def render_study(
     study: StudyAnalysis,
     pictures: Mapping[str, Drawn],
     pages: Mapping[str, str],
-    parts: Sequence[str] = (),
+    parts: Sequence[str],
 ) -> str:
     """The page.
 

@@ -13,7 +13,6 @@ from bayeshaptic.report.numbers.rules import least_damped
 from bayeshaptic.report.page.section import Section, section
 from bayeshaptic.report.walls.words import rule_rows, width_rows, words
 from bayeshaptic.stability.cases import FREE, HELD, Case, DeviceLimit
-from bayeshaptic.stability.walls.damping import Damping
 from bayeshaptic.stability.walls.limit_table import LimitTable, limit_table
 
 if TYPE_CHECKING:
@@ -54,10 +53,7 @@ def limits_section(
 
 
 def table_of(
-    cases: Sequence[Case],
-    dampings: Sequence[Damping] | None = None,
-    draws: int = DRAWS,
-    limit: DeviceLimit | None = None,
+    cases: Sequence[Case], draws: int = DRAWS, limit: DeviceLimit | None = None
 ) -> LimitTable:
     """The limits over some cases, with fewer draws where a model takes long to look at.
 
@@ -65,9 +61,7 @@ def table_of(
     """
     slow = any(case.model.system(case.draws[:1]).dynamic_links for case in cases)
     slow_draws = 2000  # of a model without a finite set of poles
-    return limit_table(
-        cases, dampings, draws=min(draws, slow_draws) if slow else draws, limit=limit
-    )
+    return limit_table(cases, draws=min(draws, slow_draws) if slow else draws, limit=limit)
 
 
 def case_of(result: Result) -> Case:

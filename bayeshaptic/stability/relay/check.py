@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.model import Model
@@ -48,16 +47,13 @@ class RelayCheck:
     critical_estimate: float
 
 
-def check_relay(
-    measured: RelayMeasurement, model: Model, theta: ArrayLike | None = None
-) -> RelayCheck:
-    """Compare a relay measurement with a model at its own values, or at `theta`.
+def check_relay(measured: RelayMeasurement, model: Model) -> RelayCheck:
+    """Compare a relay measurement with a model at its own values.
 
     Parameters
     ----------
     measured : RelayMeasurement
     model : Model
-    theta : array_like, shape (P,), optional
 
     Returns
     -------
@@ -75,7 +71,7 @@ def check_relay(
         )
     if model.period_s is None:
         raise InputError("the model has no sampling period: give period_s, or a device.")
-    vector = np.atleast_2d(np.asarray(model.values if theta is None else theta, float))
+    vector = np.atleast_2d(np.asarray(model.values, float))
     system = model.system(vector)
     found = find_crossings(system, model.period_s)
     frequency, stiffness = found.frequency_hz[0], found.stiffness[0]

@@ -87,7 +87,7 @@ class LinkedResponse:
         return np.asarray(np.abs(phase[-1] - phase[0]) < np.pi)
 
 
-def linked_response(system: LinearSystem, period_s: float, exact: bool = True) -> LinkedResponse:
+def linked_response(system: LinearSystem, period_s: float, exact: bool) -> LinkedResponse:
     """The response of a batch of loops with dynamic links.
 
     Parameters
