@@ -208,13 +208,18 @@ def _of_the_units(analysis: Analysis) -> list[str]:
     return found
 
 
+def unconfirmed(analysis: Analysis) -> bool:
+    """Whether the closed loop's poles do not confirm some of the limits."""
+    return any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices)
+
+
 def _of_the_limit(analysis: Analysis) -> list[str]:
     found = []
     if analysis.sampled and (far := unstated(analysis)) is not None:
         found.append(far)
     if not analysis.posterior.converged:
         found.append("the sampler has not converged, so the interval may be too narrow")
-    if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
+    if unconfirmed(analysis):
         found.append("the closed loop's poles do not confirm some of the limits")
     if analysis.sampled and is_open(analysis):
         found.append(

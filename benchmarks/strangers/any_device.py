@@ -11,7 +11,7 @@ whether somebody holds them and the delay.
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -36,13 +36,6 @@ from benchmarks.strangers.recordings import simulated
 PERIODS_S = (1e-4, 2.5e-4, 5e-4, 1e-3, 1e-3, 2e-3, 4e-3, 1 / 1500, 1 / 300)
 EXCITATIONS = ("white", "white", "binary", "multisine", "sweeps", "coloured")
 USUAL_S = 1e-3  # period that the times of effects are meant for
-
-
-def one(seed: int, clean: bool = False) -> Row:
-    """What became of the recording of a seed."""
-    with np.errstate(all="ignore"):  # of a device that runs away
-        case = make(seed, clean)
-    return {"seed": seed} | analysed(case)
 
 
 def make(seed: int, clean: bool = False) -> Case | None:
@@ -148,18 +141,19 @@ def limit_of(device: States, mass: float, period_s: float, delay_s: float) -> fl
     return unit * scaled.critical_stiffness(period_s, delay_s)
 
 
-def parser_of_any(what: str | None) -> argparse.ArgumentParser:
-    """With the choice of devices that have nothing undeclared in them."""
+def main(what: str | None, made: Callable[[int, bool], Case | None]) -> None:
+    """What becomes of the recordings that are made of seeds, some without effects."""
     parser = parser_of(what)
     parser.add_argument("--clean", action="store_true", help="without effects")
-    return parser
+    asked = parser.parse_args()
 
+    def one(seed: int) -> Row:
+        with np.errstate(all="ignore"):  # of a device that runs away
+            case = made(seed, asked.clean)
+        return {"seed": seed} | analysed(case)
 
-def main() -> None:
-    asked = parser_of_any(__doc__).parse_args()
-    seeds = range(asked.first, asked.first + asked.count)
-    kept(seeds, asked.file, lambda seed: one(seed, asked.clean))
+    kept(range(asked.first, asked.first + asked.count), asked.file, one)
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, make)

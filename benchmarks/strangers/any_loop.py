@@ -17,25 +17,17 @@ from typing import Any
 import numpy as np
 
 from bayeshaptic.recordings.recording import Recording
-from benchmarks.strangers.__main__ import Row, analysed, kept
 from benchmarks.strangers.any_device import (
     PERIODS_S,
     USUAL_S,
     delay_in_steps,
     device_of,
     limit_of,
-    parser_of_any,
+    main,
     size_in_periods,
 )
 from benchmarks.strangers.draw import UNITS, Case, Draw, as_logged, base_of, effects_of, states_of
 from benchmarks.strangers.loops import LAGS, REFERENCES, declared, law_of, simulated, wanted_of
-
-
-def one(seed: int, clean: bool = False) -> Row:
-    """What became of the recording of a seed."""
-    with np.errstate(all="ignore"):  # of a device that runs away
-        case = make(seed, clean)
-    return {"seed": seed} | analysed(case)
 
 
 def make(seed: int, clean: bool = False) -> Case | None:
@@ -94,11 +86,5 @@ def make(seed: int, clean: bool = False) -> Case | None:
     return Case(recording, told, what, effects, truth, base, parameters)
 
 
-def main() -> None:
-    asked = parser_of_any(__doc__).parse_args()
-    seeds = range(asked.first, asked.first + asked.count)
-    kept(seeds, asked.file, lambda seed: one(seed, asked.clean))
-
-
 if __name__ == "__main__":
-    main()
+    main(__doc__, make)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_analysis import _tests
+from right_fit import right_fit
 
 from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED
@@ -17,21 +18,13 @@ from bayeshaptic.diagnosis.widening.deviation import Deviation, evidence, matern
 from bayeshaptic.diagnosis.widening.rest import BENDS, with_rest
 from bayeshaptic.inference.around_fit import draws_around
 from bayeshaptic.inference.fit import Fit, summarise
-from bayeshaptic.inference.least_squares import least_squares, polish
+from bayeshaptic.inference.least_squares import polish
 from bayeshaptic.inference.posterior import Posterior
-from bayeshaptic.models import rigid
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.estimate import estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 
 @pytest.fixture(scope="module")
 def clean() -> Fit:
-    """A rigid device, and the model that is right."""
-    bench = Bench("rigid", {"m": 2.0, "b": 20.0}, delay_s=5e-4, encoder_resolution=1e-6)
-    made = simulate(bench, WhiteNoise(5.0, 400.0, 0.5, 20.0), seed=3)
-    recording = recording_from_arrays(**made.signals)
-    return least_squares(rigid(period_s=1e-3), estimate_etfe(recording))
+    return right_fit()
 
 
 def left(family: str, verdict: str = UNEXPLAINED) -> Any:

@@ -5,26 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from right_fit import right_fit
 
 from bayeshaptic.diagnosis.residuals.overdispersion import correlation_length, noise_scale
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.inference.least_squares import least_squares
-from bayeshaptic.models import rigid
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.response.estimate import estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
-
-
-def fitted() -> Fit:
-    """A rigid device, and the model that is right."""
-    bench = Bench("rigid", {"m": 2.0, "b": 20.0}, delay_s=5e-4, encoder_resolution=1e-6)
-    made = simulate(bench, WhiteNoise(5.0, 400.0, 0.5, 20.0), seed=3)
-    recording = recording_from_arrays(**made.signals)
-    return least_squares(rigid(period_s=1e-3), estimate_etfe(recording))
 
 
 def test_a_residual_that_goes_on_counts_less_than_one_that_scatters() -> None:
-    fit = fitted()
+    fit = right_fit()
     assert noise_scale(fit) == 1.0
     windows = fit.windows
     nodes = windows.frequency_hz

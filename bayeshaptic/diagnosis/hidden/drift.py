@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayeshaptic.diagnosis.hidden.regression import Around, log_limits
-from bayeshaptic.diagnosis.hidden.sizes import LEAST, MOST, SEEN
+from bayeshaptic.diagnosis.hidden.sizes import MOST, SEEN, ladder
 from bayeshaptic.diagnosis.hidden.weighed import KEPT, PAIRED, Weighed
 from bayeshaptic.models import Model
 from bayeshaptic.models.structures import HAND
@@ -61,7 +61,7 @@ def weigh_drift(drift: Drift, known: Around, rng: np.random.Generator) -> Weighe
     largest = 1.0  # log change from the beginning to the end
     seen = min(SEEN * sd, largest / MOST)
     steps = 60
-    strength = seen * np.exp(np.linspace(np.log(LEAST), np.log(MOST), 2 * steps + 1)[1::2])
+    strength = seen * ladder(steps)
     likelihood = np.exp(-0.5 * (strength / sd) ** 2)
     kept = strength[systematic(likelihood, KEPT, rng)]
     factor = _worst(known, member, kept)

@@ -38,6 +38,11 @@ class Sizes:
     weight: Floats = field(repr=False)
 
 
+def ladder(steps: int) -> Floats:
+    """The middles of steps of one ratio from `LEAST` to `MOST`, shape (steps,)."""
+    return np.asarray(np.exp(np.linspace(np.log(LEAST), np.log(MOST), 2 * steps + 1)[1::2]))
+
+
 def sizes_of(suspect: Suspect, known: Around) -> Sizes:
     """Sizes for every shape: from a thirtieth of what is seen to three times that.
 
@@ -48,8 +53,7 @@ def sizes_of(suspect: Suspect, known: Around) -> Sizes:
     seen = seen_of(suspect, known)
     fine, coarse = 60, 12  # steps: of one number, and beside a grid of shapes
     steps = fine if len(seen) == 1 else coarse
-    ladder = np.exp(np.linspace(np.log(LEAST), np.log(MOST), 2 * steps + 1)[1::2])
-    strength = (np.minimum(seen, unseen.largest / MOST)[:, None] * ladder).ravel()
+    strength = (np.minimum(seen, unseen.largest / MOST)[:, None] * ladder(steps)).ravel()
     shape = np.repeat(np.arange(len(seen)), steps)
     weight = unseen.weight[shape] / steps
     if unseen.lowest < 0:

@@ -28,7 +28,7 @@ from bayeshaptic.effects.nonlinear.shapes import (
     VELOCITY,
 )
 from bayeshaptic.inference.fit import Fit
-from bayeshaptic.numerics.polynomials.polynomial import evaluate
+from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate
 from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -237,15 +237,15 @@ def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
 
 def load_response(fit: Fit, s: Complexes) -> Complexes:
     """Position of the motor over a force at the load, at points s."""
-    numerator, denominator = fit.model.system(fit.theta).mechanism.transfer_to(1)
-    points = s[:, None]
-    return np.asarray((evaluate(numerator, points) / evaluate(denominator, points))[:, 0])
+    return _ratio(*fit.model.system(fit.theta).mechanism.transfer_to(1), s)
 
 
 def pair_response(fit: Fit, s: Complexes) -> Complexes:
     """Position of the motor over a pair of forces in the connection, +1 on m1 and -1 on m2."""
     mechanism = fit.model.system(fit.theta).mechanism
-    numerator = mechanism.mutual(mechanism.drive, (0, 1))
-    denominator = mechanism.transfer()[1]
+    return _ratio(mechanism.mutual(mechanism.drive, (0, 1)), mechanism.transfer()[1], s)
+
+
+def _ratio(numerator: Polynomial, denominator: Polynomial, s: Complexes) -> Complexes:
     points = s[:, None]
     return np.asarray((evaluate(numerator, points) / evaluate(denominator, points))[:, 0])

@@ -15,7 +15,7 @@ from scipy.linalg import solveh_banded
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
-from bayeshaptic.recordings.signals.filling import Predictor
+from bayeshaptic.recordings.signals.filling import TINY, Predictor
 from bayeshaptic.recordings.signals.runs import runs
 from bayeshaptic.types import Bools, Floats
 
@@ -31,7 +31,6 @@ _ROUNDS = 4  # for the size of what pushed, which is that of what is found
 _FINE = 1e-3  # of the motion, the count of a sensor where there is none,
 _NOISELESS = 0.1  # and of that count, errors of the prediction that no sensor makes,
 _DIGITS = 10  # or so many last digits
-_TINY = 1e-8  # of the motion: errors where it is predicted to within rounding
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def outside(samples: Samples) -> Outside:
     if predictor is None:
         return nothing
     errors = predictor.errors(samples.position, recording.force)
-    noise = max(predictor.spread, _TINY * float(np.std(recording.position)))
+    noise = max(predictor.spread, TINY * float(np.std(recording.position)))
     usual = float(np.std(recording.force))
     for moment in moments:
         found.force[moment] = _force(predictor, errors, moment, noise, usual)
@@ -116,7 +115,7 @@ def _loudness(errors: Floats, position: Floats) -> Floats:
     """
     blocks = len(errors) // BLOCK - 1
     squares = np.mean(errors[: blocks * BLOCK].reshape(blocks, BLOCK) ** 2, axis=1)
-    return np.asarray(squares / max(float(np.median(squares)), (_TINY * np.std(position)) ** 2))
+    return np.asarray(squares / max(float(np.median(squares)), (TINY * np.std(position)) ** 2))
 
 
 def _moments(loud: Floats, samples: int) -> tuple[tuple[slice, ...], float]:

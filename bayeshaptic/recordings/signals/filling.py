@@ -17,6 +17,7 @@ from scipy.linalg import cho_solve, solveh_banded
 from bayeshaptic.types import Bools, Floats
 
 ORDER = 48  # samples of the past
+TINY = 1e-8  # of the motion: errors where it is predicted to within rounding
 
 
 @dataclass(frozen=True)

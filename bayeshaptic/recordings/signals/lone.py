@@ -11,8 +11,8 @@ from bayeshaptic.recordings.signals.filling import fit_predictor
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.types import Bools, Floats
 
-_FARTHER = 8.0  # than any sample around them, and than a count
-_AROUND = 10  # samples on either side
+FARTHER = 8.0  # than any sample around them, and than a count
+AROUND = 10  # samples on either side
 _ALONE = 1.5  # times as far as the two beside it, which are off by half: after a jump one is as far
 
 
@@ -35,13 +35,13 @@ def lone(position: Floats) -> Bools:
     off = np.zeros(len(position))
     off[1:-1] = np.abs(position[1:-1] - 0.5 * (position[:-2] + position[2:]))
     # Half of what one sample is off is what both beside it are.
-    apart = 1 + _AROUND // 2
-    beside = maximum_filter1d(np.pad(off, apart), _AROUND - 1)
-    found: Bools = off > _FARTHER * np.maximum(beside[: -2 * apart], beside[2 * apart :])
+    apart = 1 + AROUND // 2
+    beside = maximum_filter1d(np.pad(off, apart), AROUND - 1)
+    found: Bools = off > FARTHER * np.maximum(beside[: -2 * apart], beside[2 * apart :])
     found[1:-1] &= off[1:-1] > _ALONE * np.maximum(off[:-2], off[2:])
     found[:2] = found[-2:] = False  # of the first and the last one cannot be told
     if found.any():
-        found &= off > _FARTHER * (increment_unit(position) or 0.0)
+        found &= off > FARTHER * (increment_unit(position) or 0.0)
     return found
 
 

@@ -62,10 +62,7 @@ class RoughResponse(NamedTuple):
             return False
         x, y = np.log(frequency), np.log(np.abs(response))
         near = 0.35  # of log frequency, for a slope
-        weight = np.exp(-0.5 * ((x - x[:, None]) / near) ** 2) / frequency
-        weight /= weight.sum(axis=1, keepdims=True)
-        apart = x - (weight @ x)[:, None]
-        slope = np.sum(weight * apart * y, axis=1) / np.sum(weight * apart**2, axis=1)
+        slope = local_slopes(x, y, near, 1 / frequency)
         delay = 2 * np.pi * frequency * _DELAY * period_s
         expected = 0.5 * np.pi * np.clip(slope, -2.0, 0.0) - delay
         agreement = np.average(np.cos(np.angle(response) - expected), weights=1 / frequency)
@@ -90,6 +87,23 @@ class RoughResponse(NamedTuple):
         as_position = _left_by_one_mass(s, np.asarray(s * response), period_s)
         plain, better = 0.05, 0.1
         return bool(as_velocity < min(plain, better * as_position))
+
+
+def local_slopes(x: Floats, y: Floats, near: float, weight: Floats | float = 1.0) -> Floats:
+    """Slope of y over x around each x, by least squares with a Gaussian weight; shape (N,).
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (N,)
+    near : float
+        Standard deviation of the Gaussian, in units of x.
+    weight : ndarray, shape (N,), or float
+        Of each point, besides.
+    """
+    beside = weight * np.exp(-0.5 * ((x - x[:, None]) / near) ** 2)
+    beside /= beside.sum(axis=1, keepdims=True)
+    apart = x - (beside @ x)[:, None]
+    return np.asarray(np.sum(beside * apart * y, axis=1) / np.sum(beside * apart**2, axis=1))
 
 
 def _left_by_one_mass(s: Complexes, velocity: Complexes, period_s: float) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.recordings.signals.filling import ORDER, fit_predictor
+from bayeshaptic.recordings.signals.filling import ORDER, TINY, fit_predictor
+from bayeshaptic.recordings.signals.lone import AROUND, FARTHER
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.runs import HUNG_S
 from bayeshaptic.types import Bools, Floats, Ints
@@ -21,16 +22,15 @@ _OF_RANGE = 0.02  # five such steps are less than this share of the range
 _FEWEST_BITS = 6  # of a counter
 _FEWEST_STEPS = 100  # that tell what usual ones are
 _FEWEST_JUMPS = 3  # fewer may lead from one place of work to another
-_FARTHER = 8.0  # goes a jump to anywhere than any step around it,
-_AROUND = 10  # rows before and after it,
-_COUNTS = 20  # and than so many counts, which an encoder at rest does not flicker by
+# Counts that a jump to anywhere is farther than, which an encoder at rest does not flicker by; and
+# `FARTHER` than any of the steps `AROUND` it.
+_COUNTS = 20
 _MOST_OFTEN = 1e-3  # of all rows: what moves so more often is how it moves
 # Mean square of what the motion after a jump is off from what the motion before leads to expect,
 # over the worst beside it, from where on it is another motion. Of 138 simulated recordings of all
 # kinds, loops too, whose encoder is set to zero up to three times, two are above.
 _ANOTHER = 6.0
 _MEANS = 1, 4, 16  # rows
-_TINY = 1e-8  # of the motion: errors where it is predicted to within rounding
 
 
 def unwrapped(
@@ -135,9 +135,9 @@ def _to_anywhere(steps: Floats, count: float) -> Bools:
         return np.zeros(len(steps), dtype=bool)
     size = np.abs(steps)
     # The most of ten steps: those before step k begin at its own place, those after ten further on.
-    most = sliding_window_view(np.pad(size, _AROUND), _AROUND).max(axis=1)
-    around = np.maximum(most[: len(steps)], most[_AROUND + 1 :])
-    return np.asarray(size > np.maximum(_FARTHER * around, max(_most(steps), _COUNTS * count)))
+    most = sliding_window_view(np.pad(size, AROUND), AROUND).max(axis=1)
+    around = np.maximum(most[: len(steps)], most[AROUND + 1 :])
+    return np.asarray(size > np.maximum(FARTHER * around, max(_most(steps), _COUNTS * count)))
 
 
 def _surprise(position: Floats, force: Floats, first: Ints, count: float) -> float:
@@ -167,7 +167,7 @@ def _surprise(position: Floats, force: Floats, first: Ints, count: float) -> flo
         if predictor is None:
             break
         errors = predictor.errors(moved, pushed)
-        least = max(count**2 / 12 / rows, (_TINY * float(np.std(position))) ** 2)
+        least = max(count**2 / 12 / rows, (TINY * float(np.std(position))) ** 2)
         everywhere = _mean_squares(errors, range(0, blocks - ORDER + 1, ORDER))
         # What the jump was, and where in its block, is not known: it is what leaves least.
         jump = np.stack([predictor.past[:ORDER], np.cumsum(predictor.past[:ORDER])], axis=1)
@@ -229,7 +229,7 @@ def _hung(position: Floats, jumps: Bools, period_s: float) -> list[slice]:
                 position[jump + 1 : jump + 1 + rows],
             )
             farthest = max(float(np.ptp(side)) for side in sides if len(side))
-            if abs(position[jump + 1] - position[jump]) <= _FARTHER * farthest:
+            if abs(position[jump + 1] - position[jump]) <= FARTHER * farthest:
                 found.append(slice(before + 2, jump + 1))
     return found
 

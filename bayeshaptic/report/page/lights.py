@@ -16,7 +16,7 @@ from bayeshaptic.report.numbers.misfit import (
 )
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.report.numbers.stand_ins import stand_ins
-from bayeshaptic.report.objections import why_none
+from bayeshaptic.report.objections import unconfirmed, why_none
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -118,6 +118,6 @@ def _sampler(analysis: Analysis) -> Light:
         return Light("Sampler", DOUBT, "not run", "sampler")
     if not analysis.posterior.converged:
         return Light("Sampler", BAD, "not converged", "sampler")
-    if any(n.topic == "critical stiffness" and n.level == "warning" for n in analysis.notices):
+    if unconfirmed(analysis):
         return Light("Sampler", BAD, "limits not confirmed", "sampler")
     return Light("Sampler", GOOD, "converged", "sampler")

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.recordings.response.spectra import RandomSpectra
+from bayeshaptic.recordings.signals.rough_response import local_slopes
 from bayeshaptic.types import Complexes, Floats
 
 # Windows that reach from one frequency to so many times that; in narrower ones a slope of twelve
@@ -21,6 +22,7 @@ _WIDE = 1.15
 _POWERS = np.arange(-4.0, 17.0)
 # One window of 24 lines, 16 of which are left over, knows its slope to some 1 (an octave) to 3.
 _BELIEF_SD = 2.0
+_NEAR = 0.5  # of log frequency: neighbours that tell a slope
 
 
 def noise_slopes(spectra: RandomSpectra, left: Complexes | None = None) -> Floats:
@@ -45,20 +47,11 @@ def noise_slopes(spectra: RandomSpectra, left: Complexes | None = None) -> Float
     rounds = 3
     for _ in range(rounds):
         here = [np.interp(power, _POWERS, own) for power, own in zip(found, level, strict=True)]
-        found[:wide] = -_local_slopes(log_f, np.array(here))[:wide]
+        found[:wide] = -local_slopes(log_f, np.array(here), _NEAR)[:wide]
         found = np.clip(found, _POWERS[0], _POWERS[-1])
     belief = -0.5 * ((_POWERS - found[:wide, None]) / _BELIEF_SD) ** 2
     slopes[:wide] = _POWERS[np.argmax(likelihood[:wide] + belief, axis=1)]
     return slopes
-
-
-def _local_slopes(x: Floats, y: Floats) -> Floats:
-    """Slope of y over x around each x: weighted least squares."""
-    near = 0.5  # of log frequency: neighbours that tell a slope
-    weight = np.exp(-0.5 * ((x - x[:, None]) / near) ** 2)
-    weight /= weight.sum(axis=1, keepdims=True)
-    apart = x - (weight @ x)[:, None]
-    return np.asarray(np.sum(weight * apart * y, axis=1) / np.sum(weight * apart**2, axis=1))
 
 
 def _with_each_power(
