@@ -20,7 +20,9 @@ from bayeshaptic.inference.time_domain.held_force import over_span, position_ove
 from bayeshaptic.types import Floats, Ints
 
 _UNKNOWN = 100.0  # counts a sample, that a velocity may be off where a piece begins
-_FORGOTTEN = 5  # samples, after which it no longer matters how a piece begins
+# Samples after which it no longer matters how a piece begins: in three the command of before may
+# still arrive, and two tell position and velocity.
+_FORGOTTEN = 5
 _HELD = 5  # samples without any motion, from which on the mass rests
 _CLEAR = 1.5  # of the least variance: above it friction may have either sign
 
