@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.diagnosis.base.alignment import perhaps_early
 from bayeshaptic.diagnosis.base.asked import measurement_of
-from bayeshaptic.diagnosis.base.begun import Begun, begin
+from bayeshaptic.diagnosis.base.begun import Begun, begin, simpler
 from bayeshaptic.diagnosis.base.high_passed import perhaps_high_passed
 from bayeshaptic.diagnosis.base.opened import Clock
 from bayeshaptic.diagnosis.battery import residual_tests
@@ -111,9 +112,12 @@ def finish(
         options.report(0.8, "critical stiffness")
         limit = watch.limit_of(posterior)
         etfe_limit = witness or etfe_critical_stiffness(etfe, seed=options.seed, sensor=fit.sensor)
-        filtered = perhaps_high_passed(fit, etfe, begun.choice)
     options.report(0.9, "writing the report")
-    notices = (*begun.notices, *filtered)
+    notices = (
+        *begun.notices,
+        *perhaps_early(replace(begun, etfe=etfe), fit, simpler(begun, fit, options)),
+        *perhaps_high_passed(fit, etfe, begun.choice),
+    )
     if etfe.direct or etfe.through_reference:
         notices = with_units_of(fit, etfe.recording, begun.device, notices)
     return Analysis(

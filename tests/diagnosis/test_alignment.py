@@ -9,6 +9,7 @@ from bayeshaptic.diagnosis.base import alignment
 from bayeshaptic.diagnosis.base.alignment import (
     LESS_DELAY,
     MOVED,
+    perhaps_early,
     rows_of_one_sample,
     with_rows_moved,
 )
@@ -182,19 +183,41 @@ def _of(said: object) -> tuple[str, ...]:
     return (said.sentence, *said.details)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("mean_of", [1, 2])
-def test_a_mode_that_only_leads_does_not_hide_a_command_that_was_smoothed(mean_of: int) -> None:
-    # With the loop's own delay told a mode damped beyond measure stood for the lead, in green.
-    bench = replace(Bench.from_device("phantom", False, "rigid"), delay_s=1.5e-3)
+def smoothed(bench: Bench, mean_of: int) -> Recording:
+    """With the mean of so many commands in the record, and the last of them at the motor."""
     made = simulate(bench, NOISE, seed=3)
     force = np.convolve(made.force, np.full(mean_of, 1 / mean_of))[: len(made.force)]
-    recording = recording_from_arrays(
+    return recording_from_arrays(
         force, made.position, bench.period_s, force_unit="Nm", position_unit="rad"
     )
-    closed = close_loop(recording, hidden=False, delay_s=bench.delay_s)
+
+
+# As chosen; a mode in the base model that was asked for; an effect that was found.
+@pytest.mark.parametrize(
+    ("device", "model", "mean_of"),
+    [("rigid", "auto", 1), ("rigid", "auto", 2), ("rigid", "free", 2), ("free", "free", 2)],
+)
+def test_a_mode_that_only_leads_does_not_hide_a_command_that_was_smoothed(
+    device: str, model: str, mean_of: int
+) -> None:
+    # With the loop's own delay told a mode damped beyond measure stood for the lead, in green.
+    bench = replace(Bench.from_device("phantom", False, device), delay_s=1.5e-3)
+    closed = close_loop(smoothed(bench, mean_of), model, hidden=False, delay_s=bench.delay_s)
     warned = any(notice.topic == LESS_DELAY for notice in closed.analysis.notices)
     said = headline(closed)
     assert warned == (mean_of > 1) == (said.status == "untrusted")
     if warned:
         assert "less delay than was told" in said.sentence
         assert closed.analysis.limit.quantile(0.05) > bench.true_critical_stiffness()
+
+
+@pytest.mark.parametrize(("mean_of", "effect"), [(3, None), (1, "second_mode")])
+def test_a_mean_that_filters_too_is_less_delay_and_a_mode_is_none(
+    mean_of: int, effect: str | None
+) -> None:
+    """A hand and a mode stood for a mean of three commands: twice the limit, in green."""
+    bench = replace(Bench.from_device("phantom", False), delay_s=1.5e-3)
+    bench = bench.with_effect(effect, frequency_hz=60.0) if effect else bench
+    found = opened(smoothed(bench, mean_of), "free", Options(delay_s=bench.delay_s))
+    fit = least_squares(build_model("free", None, bench.delay_s), found.etfe)
+    assert fit.misfits and bool(perhaps_early(found, fit, [fit])) == (mean_of > 1)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from bayeshaptic.devices import Device
-from bayeshaptic.diagnosis.base.alignment import perhaps_early, realigned
+from bayeshaptic.diagnosis.base.alignment import realigned
 from bayeshaptic.diagnosis.base.asked import base_model
 from bayeshaptic.diagnosis.base.file_in_doubt import file_in_doubt
 from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
@@ -23,6 +24,8 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats
+
+_UNHELD = "rigid", "free"
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,12 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
     with clock.stage("least squares"):
         options.report(0.06, "fitting")
         etfe, fit, choice = _fit(found.etfe, base_model(model, options), found.device, options)
-        again = realigned(found, fit, model, options, _simpler(choice))
+        again = realigned(found, fit, model, options, _tried(choice, fit))
         if again is not None:
             return fitted(again, model, options)
         tried = {fit.model.name: fit}
         tried |= {name: one.fit for name, one in choice.candidates.items()} if choice else {}
         doubt = file_in_doubt(etfe, tried, found.device, options)
-        doubt = (*doubt, *perhaps_early(found, fit, _simpler(choice)))
     notices = (*found.notices, *doubt)
     parts = {**vars(found), "etfe": etfe, "notices": notices, "seconds": clock.seconds}
     return Begun(**parts, measured=found.etfe, fit=fit, choice=choice)
@@ -94,13 +96,8 @@ def _fit(
             choose_model(etfe, device, *delay, prior, options.held, seed, measured)
         )
         return choice.candidates[choice.fit.model.name].etfe or etfe, choice.fit, choice
-    if isinstance(model, Model):
-        built = model.with_prior(prior)
-    else:
-        built = build_model(model, device, *delay, etfe.period_s)
-        if etfe.of_measured_force:
-            built = with_force_sensor(built)
-        built = built.with_prior(prior)
+    built = model if isinstance(model, Model) else _built(model, etfe, device, options)
+    built = built.with_prior(prior)
 
     def fitting(response: Etfe, start: Floats | None = None) -> Fit:
         return least_squares(built, response, seed, start)
@@ -109,11 +106,41 @@ def _fit(
     return etfe, fit, None
 
 
-def _simpler(choice: Choice | None) -> tuple[Fit, ...]:
-    """Fits of candidates with fewer parameters than the chosen one, simplest first."""
+def simpler(begun: Begun, fit: Fit, options: Options) -> Iterator[Fit]:
+    """Fits of base models with fewer parameters than the one in question, simplest first.
+
+    Those that were tried; where a model was asked for, one mass and two that nobody holds; and the
+    base model without its effects.
+
+    Parameters
+    ----------
+    begun : Begun
+    fit : Fit
+        Of the base model, with effects or without.
+    options : Options
+    """
+    if begun.choice is not None:
+        yield from _tried(begun.choice, fit)
+    else:
+        for name in _UNHELD:
+            model = _built(name, begun.etfe, begun.device, options)
+            if model.size < begun.fit.model.size:
+                yield least_squares(model, begun.etfe, options.seed)
+    if fit.model.effects:
+        yield begun.fit
+
+
+def _built(name: str, etfe: Etfe, device: Device | None, options: Options) -> Model:
+    """A base model by its name, with what is known of the delay."""
+    built = build_model(name, device, options.delay_s, options.delay_sd_s, etfe.period_s)
+    return with_force_sensor(built) if etfe.of_measured_force else built
+
+
+def _tried(choice: Choice | None, fit: Fit) -> tuple[Fit, ...]:
+    """Fits of candidates with fewer parameters, simplest first."""
     fits = [other.fit for other in choice.candidates.values()] if choice else []
-    fits = [fit for fit in fits if choice and fit.model.size < choice.fit.model.size]
-    return tuple(sorted(fits, key=lambda fit: fit.model.size))
+    fits = [other for other in fits if other.model.size < fit.model.size]
+    return tuple(sorted(fits, key=lambda other: other.model.size))
 
 
 def _lower_where_undecided(choice: Choice) -> Choice:
