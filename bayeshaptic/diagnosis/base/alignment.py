@@ -181,7 +181,8 @@ def perhaps_early(found: Opened, fit: Fit, simpler: Iterable[Fit]) -> tuple[Noti
     told_s = told.fixed.get("delay_s", told.reference.get("delay_s"))
     if recording is None or told_s is None or not _tells(found, recording):
         return ()
-    chosen = " with ".join([told.name, *(effect.name.replace("_", " ") for effect in told.effects)])
+    found_too = ", ".join(effect.name.replace("_", " ") for effect in told.effects)
+    chosen = f"{told.name} with {found_too}" if found_too else told.name
     for other in simpler:
         if not other.misfits:
             continue
