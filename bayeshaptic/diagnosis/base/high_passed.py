@@ -109,24 +109,29 @@ def perhaps_high_passed(fit: Fit, etfe: Etfe, choice: Choice | None) -> tuple[No
     if not better:
         return ()
     found = min(better, key=_score)
-    corner_hz = found.theta[found.model.names.index(_CORNER)]
     here, there = (quantity(k, fit.model.stiffness_unit) for k in (own, _limit(found)))
     text = (
         f"{found.model.name.capitalize()} explains the recording better than what was found does "
-        f"if the position was high-passed at {quantity(corner_hz, 'Hz')} before it was written "
-        f"down, by a logger, or to take a drift off it. The filter looks like damping, or like a "
-        f"hand; without it the limit would be {there}, for {here}."
+        f"if the position was high-passed, at {quantity(_corner_hz(found), 'Hz')}, before it was "
+        f"written down, by a logger, or to take a drift off it. The filter looks like damping, or "
+        f"like a hand; without it the limit would be {there}, for {here}."
     )
     return (Notice("warning", TOPIC, text),)
 
 
 def _explains_more(filtered: Fit, fit: Fit, recording: Recording) -> bool:
     """Whether a filter beside the same device does, or one beside another that nobody holds."""
+    if 2 * np.pi * _corner_hz(filtered) * recording.duration_s < 1:
+        return False  # in so long a time it does nothing
     gain = _score(fit) - _score(filtered)
     if filtered.model.name == fit.model.name and gain > _SURELY:
         return True
     left = left_of_position(filtered, recording)
     return left < _LITTLE and (gain > 0 or left < _HALF * left_of_position(fit, recording))
+
+
+def _corner_hz(filtered: Fit) -> float:
+    return float(filtered.theta[filtered.model.names.index(_CORNER)])
 
 
 def _score(fit: Fit) -> float:

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 FIGURES = ("guidance_shares", "guidance_sweeps")
 
 
-def guidance_section(
-    case: Case, analysis: Analysis | None, of_several: str = ""
-) -> Section | None:
+def guidance_section(case: Case, analysis: Analysis | None, of_several: str = "") -> Section | None:
     """HTML and pictures of the guidance for one case.
 
     Parameters
