@@ -156,7 +156,7 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
         found.append(
             "a device explains the recording better if its position was high-passed before it was "
             "written down, and its limit is lower: record positions as they are read, with "
-            "whatever drift, or say --held where somebody holds it, or nobody"
+            "whatever drift, or say --held yes, if somebody held it and nothing was filtered"
         )
     if (moved := beside_command(analysis)) is not None:
         found.append(moved)

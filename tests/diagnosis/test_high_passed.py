@@ -12,6 +12,7 @@ from bayeshaptic.errors import Notice
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.page.next_step import next_steps
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 
 NOISE = WhiteNoise(0.05, 200.0, 0.7, 12.0)
@@ -50,6 +51,8 @@ def test_no_stiffness_follows() -> None:
     closed = close_loop(recorded(0.8), hidden=False)
     said = headline(closed)
     assert said.status == "untrusted" and "high-passed" in said.sentence
+    steps = next_steps(said, closed)
+    assert "as it is read" in steps[0].text and steps[1].command.endswith("--held yes")
     truth = Bench.from_device("phantom").true_critical_stiffness()
     assert closed.analysis.limit.quantile(0.05) > 1.3 * truth  # what it is there to prevent
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.diagnosis.base.high_passed import TOPIC as HIGH_PASSED
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.checks.against_device import says_the_mass
 from bayeshaptic.recordings.checks.check import USUAL_SECONDS
@@ -79,6 +80,8 @@ def next_steps(
         return _after_reference(result, command, new)
     if analysis.etfe.direct and analysis.posterior.converged:
         return (_in_open_loop(new),)
+    if any(notice.topic == HIGH_PASSED for notice in analysis.notices):
+        return _after_filter(result, command, new)
     return (_after_fit(result, command, new),)
 
 
@@ -106,6 +109,20 @@ def _after_doubtful_units(result: Result, options: Mapping[str, Any]) -> tuple[S
         f"{table}, a line each):",
         f"{source} --device MINE.toml{_said(options, _KEPT)}",
     )
+
+
+def _after_filter(result: Result, command: str, new: str) -> tuple[Step, ...]:
+    """Where the position may have been high-passed before it was written down."""
+    unfiltered = Step("Record the position as it is read, and leave its drift in it. Then:", new)
+    choice = result.analysis.choice
+    tried = {} if choice is None else choice.candidates
+    if len({one.held for one in tried.values()}) < 2:  # somebody said who held it
+        return (unfiltered,)
+    held = Step(
+        "Or say so, if somebody held the device and nothing was filtered. This recording will do:",
+        f"{command} --held yes",
+    )
+    return unfiltered, held
 
 
 def _after_fit(result: Result, command: str, new: str) -> Step:
